@@ -1,0 +1,348 @@
+r"""Weak form of the tissue: internal forces and tangent of plane-strain hyperelasticity.
+
+For the energy density :math:`\psi(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law uses the volume change,
+
+.. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad S = \partial_F\psi,\; q = \partial_\theta\psi .
+
+The elements differ only in the volume measure they use:
+
+=========  ==================================================  =============================
+element    theta at a quadrature point                         locking at nu -> 1/2
+=========  ==================================================  =============================
+q1 q2 p2   ln J of that point                                  yes (q1), mild (q2, p2)
+q1_fbar    ln J at the centroid, which is F-bar with           no
+           Fbar = (J0/J)^(1/2) F (10.1016/0045-7825(95)01001-9)
+q2p1       L2 projection of ln J onto {1, X, Y} of the cell    no
+=========  ==================================================  =============================
+
+`theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent
+is symmetric and the forces have a potential. With rows B = (grad u, theta) per quadrature point and the law's second
+derivatives D the tangent reads K = B^T D B + (curvature of ln J). Arrays: E cells, n nodes per cell, Q quadrature
+points, S sample points of ln J; N nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from evfem.errors import InputError
+from evfem.mesh import Floats, Ints, Mesh
+
+#: element -> (mesh kind, order of quadrature, how ln J is sampled)
+ELEMENTS: Mapping[str, tuple[str, int, str]] = {
+    "q1": ("quad", 3, "point"),
+    "q1_fbar": ("quad", 3, "centroid"),
+    "q2": ("quad9", 5, "point"),
+    "q2p1": ("quad9", 5, "linear"),
+    "p2": ("triangle6", 4, "point"),
+}
+
+
+def element_for(mesh: Mesh, element: str | None) -> str:
+    """Name of the element to use on `mesh`: the given one if it fits the cells, else the recommended default."""
+    if element is None:
+        return "q2p1" if mesh.corners == 4 else "p2"
+    if element not in ELEMENTS or (ELEMENTS[element][0].startswith("quad") != (mesh.corners == 4)):
+        allowed = [name for name, (kind, *_) in ELEMENTS.items() if kind.startswith("quad") == (mesh.corners == 4)]
+        raise InputError("solver.element", element, f"on {mesh.kind} cells: {', '.join(allowed)}")
+    return element
+
+
+def scikit_mesh(mesh: Mesh) -> Any:
+    """The same mesh as a scikit-fem mesh, its nodes where ours are (curved mid-nodes included)."""
+    import skfem
+
+    linear = {4: skfem.MeshQuad, 3: skfem.MeshTri}[mesh.corners]
+    vertices, t = np.unique(mesh.cells[:, : mesh.corners], return_inverse=True)
+    base = linear(np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t.reshape(-1, mesh.corners).T))
+    if mesh.order == 1:
+        return base
+    quadratic = {4: skfem.MeshQuad2, 3: skfem.MeshTri2}[mesh.corners].from_mesh(base)
+    _, ours = cKDTree(straight_points(mesh)).query(quadratic.doflocs.T)
+    return type(quadratic)(np.ascontiguousarray(mesh.points[ours].T), quadratic.t)
+
+
+def straight_points(mesh: Mesh) -> Floats:
+    """Where the nodes would be if every edge were straight, (N, 2); tells nodes apart whatever the curvature."""
+    points = mesh.points.copy()
+    if mesh.order == 2:
+        m = mesh.corners
+        corner = mesh.points[mesh.cells[:, :m]]
+        points[mesh.cells[:, m : 2 * m]] = 0.5 * (corner + np.roll(corner, -1, axis=1))
+        if m == 4:
+            points[mesh.cells[:, 8]] = corner.mean(axis=1)
+    return points
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Displacement space on a mesh: nodes of every cell, gradients of the shape functions, weights and ln J samples.
+
+    `nodes` (E, n); `gradient` (E, Q, n, 2) with respect to the reference; `weight` (E, Q); `sample` (E, S, n, 2) gradients where
+    ln J is sampled; `projection` (E, Q, S), or None where theta is simply ln J of the quadrature point.
+    """
+
+    mesh: Mesh
+    element: str
+    nodes: Ints
+    gradient: Floats
+    weight: Floats
+    sample: Floats
+    projection: Floats | None
+
+    @property
+    def size(self) -> int:
+        """Number of nodes."""
+        return len(self.mesh.points)
+
+
+def make_space(mesh: Mesh, element: str) -> Space:
+    """Build the space of `element` on `mesh`, whose kind must fit; inverted cells are refused."""
+    import skfem
+
+    kind, intorder, sampling = ELEMENTS[element]
+    if mesh.kind != kind:
+        raise InputError("solver.element", element, f"cells of kind {kind}, the mesh has {mesh.kind}")
+    shape = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+    grid = scikit_mesh(mesh)
+    basis = skfem.Basis(grid, shape, intorder=intorder)
+    _, node_of_dof = cKDTree(mesh.points).query(basis.doflocs.T)
+    nodes = node_of_dof[basis.element_dofs].T
+    gradient = _gradients(basis)
+    check_orientation(mesh, basis)
+    projection = None
+    sample = gradient
+    if sampling == "centroid":
+        centre = skfem.Basis(grid, shape, quadrature=(np.array([[0.5], [0.5]]), np.array([1.0])))
+        sample = _gradients(centre)
+        projection = np.ones((len(nodes), gradient.shape[1], 1))
+    elif sampling == "linear":
+        projection = _linear_projection(basis.global_coordinates().value, basis.dx)
+    return Space(mesh, element, np.ascontiguousarray(nodes), gradient, np.ascontiguousarray(basis.dx), sample, projection)
+
+
+def _gradients(basis: Any) -> Floats:
+    """Shape gradients of a scalar basis as (E, Q, n, 2)."""
+    fields = [basis.basis[a][0].grad for a in range(basis.Nbfun)]
+    shape = np.broadcast_shapes(*(f.shape for f in fields))
+    return np.ascontiguousarray(np.stack([np.broadcast_to(f, shape) for f in fields]).transpose(2, 3, 0, 1))
+
+
+def check_orientation(mesh: Mesh, basis: Any) -> None:
+    """Refuse inverted cells: scikit-fem takes the absolute determinant, so they would pass silently."""
+    sign = np.sign(np.linalg.det(np.moveaxis(np.asarray(basis.mapping.DF(basis.X)), (0, 1), (2, 3))))
+    bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
+    if bad.size:
+        centre = mesh.points[mesh.cells[bad[0]]].mean(axis=0)
+        raise InputError(
+            "finger.mesh",
+            f"{bad.size} tangled cells, the first near ({centre[0]:.3g}, {centre[1]:.3g})",
+            "cells with a positive Jacobian at every quadrature point",
+        )
+
+
+def _linear_projection(x: Floats, weight: Floats) -> Floats:
+    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y}, at the same points."""
+    centred = x - x.mean(axis=2, keepdims=True)
+    centred = centred / np.abs(centred).max(axis=(0, 2), keepdims=True)
+    phi = np.stack([np.ones_like(weight), centred[0], centred[1]], axis=-1)
+    weighted = phi * weight[..., None]
+    mass = np.swapaxes(phi, 1, 2) @ weighted
+    return np.ascontiguousarray(phi @ np.linalg.solve(mass, np.swapaxes(weighted, 1, 2)))
+
+
+class Tissue:
+    """Internal forces, tangent and stored energy of the regions' laws on a space.
+
+    `laws` maps region names to laws (`evfem.materials`); built-in neo-Hookean tissue uses compiled kernels when numba is there.
+    """
+
+    def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
+        from evfem import materials
+
+        self.space = space
+        self.groups: list[tuple[Any, Ints]] = [
+            (materials.split(law), space.mesh.cells_of(name)) for name, law in laws.items()
+        ]
+        self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
+        self.kernels = _kernels() if self.mu is not None else None
+        self._rows: Floats | None = None
+
+    # -- kinematics -------------------------------------------------------------------------------------------------
+
+    def kinematics(self, u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """F (2, 2, E, Q), theta (E, Q), J at the samples (E, S) and F^-T there (E, S, 4) for u (N, 2)."""
+        space = self.space
+        ue = np.swapaxes(u[space.nodes], 1, 2)[:, None]
+        F = ue @ space.gradient
+        Fs = F if space.sample is space.gradient else ue @ space.sample
+        F[..., 0, 0] += 1.0
+        F[..., 1, 1] += 1.0
+        if Fs is not F:
+            Fs[..., 0, 0] += 1.0
+            Fs[..., 1, 1] += 1.0
+        J = Fs[..., 0, 0] * Fs[..., 1, 1] - Fs[..., 0, 1] * Fs[..., 1, 0]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            log_J = np.log(J)
+            cofactor = np.stack([Fs[..., 1, 1], -Fs[..., 1, 0], -Fs[..., 0, 1], Fs[..., 0, 0]], axis=-1)
+            inverse = cofactor / J[..., None]
+        theta = log_J if space.projection is None else (space.projection @ log_J[..., None])[..., 0]
+        return np.moveaxis(F, (2, 3), (0, 1)), theta, J, inverse
+
+    def smallest_J(self, u: Floats) -> float:
+        """Smallest volume ratio over all sample points."""
+        if self.kernels is not None:
+            return self.kernels.smallest_J(u, self.space.nodes, self.space.sample)
+        return float(self.kinematics(u)[2].min())
+
+    # -- residual, tangent, energy ----------------------------------------------------------------------------------
+
+    def forces(self, u: Floats) -> Floats:
+        """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
+        if self.kernels is not None:
+            return self.kernels.forces(u, self.mu, self.lmbda, *self._arrays())
+        F, theta, _, inverse = self.kinematics(u)
+        S, q = self._stress(F, theta)
+        space, w = self.space, self.space.weight
+        fe = np.einsum("ijeq,eqnj,eq->eni", S, space.gradient, w, optimize=True)
+        samples = self._to_samples(q * w)
+        fe += np.einsum("es,esij,esnj->eni", samples, inverse.reshape(*inverse.shape[:2], 2, 2), space.sample, optimize=True)
+        return self._scatter(fe)
+
+    def tangent(self, u: Floats) -> Floats:
+        """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
+        if self.kernels is not None:
+            return self.kernels.tangent(u, self.mu, self.lmbda, *self._arrays())
+        F, theta, _, inverse = self.kinematics(u)
+        _, q = self._stress(F, theta)
+        A, c, k = self._moduli(F, theta)
+        E, Q = theta.shape
+        D = np.empty((E, Q, 5, 5))
+        D[..., :4, :4] = np.moveaxis(A.reshape(4, 4, E, Q), (2, 3), (0, 1))
+        D[..., :4, 4] = D[..., 4, :4] = np.moveaxis(c.reshape(4, E, Q), 0, -1)
+        D[..., 4, 4] = k
+        D *= self.space.weight[..., None, None]
+        B = self._gradient_rows()
+        theta_rows = self._theta_rows(inverse)
+        rows = np.concatenate([B, theta_rows[:, :, None]], axis=2)
+        flat = rows.reshape(E, Q * 5, -1)
+        K = np.swapaxes(flat, 1, 2) @ (D @ rows).reshape(E, Q * 5, -1)
+        return K + self._log_curvature(self._to_samples(q * self.space.weight), inverse)
+
+    def energy(self, u: Floats) -> float:
+        """Stored energy in N mm per mm of depth."""
+        F, theta, _, _ = self.kinematics(u)
+        psi = np.empty_like(theta)
+        for law, cells in self.groups:
+            psi[cells] = law.split_energy(F[:, :, cells], theta[cells])
+        return float(np.sum(psi * self.space.weight))
+
+    def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
+        """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,), weighted by reference volume."""
+        F, theta, _, _ = self.kinematics(u)
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        S, q = self._stress(F, theta)
+        sigma = np.empty((*theta.shape, 4))
+        for i, (a, b) in enumerate([(0, 0), (1, 1), (None, None), (0, 1)]):
+            if a is not None and b is not None:
+                sigma[..., i] = (S[a, 0] * F[b, 0] + S[a, 1] * F[b, 1] + (q if a == b else 0.0)) / J
+        for law, cells in self.groups:
+            sigma[cells, :, 2] = law.split_sigma_zz(F[:, :, cells], theta[cells])
+        w = self.space.weight / self.space.weight.sum(axis=1, keepdims=True)
+        return np.einsum("eqs,eq->es", sigma, w), np.einsum("eq,eq->e", J, w)
+
+    # -- pieces -------------------------------------------------------------------------------------------------------
+
+    def _arrays(self) -> tuple[Any, ...]:
+        space = self.space
+        projection = np.zeros((0, 0, 0)) if space.projection is None else space.projection
+        return space.nodes, space.gradient, space.weight, space.sample, projection
+
+    def _stress(self, F: Floats, theta: Floats) -> tuple[Floats, Floats]:
+        S, q = np.empty_like(F), np.empty_like(theta)
+        for law, cells in self.groups:
+            S[:, :, cells], q[cells] = law.split_stress(F[:, :, cells], theta[cells])
+        return S, q
+
+    def _moduli(self, F: Floats, theta: Floats) -> tuple[Floats, Floats, Floats]:
+        A, c, k = np.zeros((2, 2, *F.shape)), np.zeros_like(F), np.empty_like(theta)
+        for law, cells in self.groups:
+            A[..., cells, :], c[..., cells, :], k[cells] = law.split_tangent(F[:, :, cells], theta[cells])
+        return A, c, k
+
+    def _to_samples(self, values: Floats) -> Floats:
+        """Transpose of the projection: what acts on theta (E, Q), gathered where ln J is sampled (E, S)."""
+        if self.space.projection is None:
+            return values
+        return (values[:, None] @ self.space.projection)[:, 0]
+
+    def _gradient_rows(self) -> Floats:
+        """(E, Q, 4, 2 n): nodal displacements to the components (i, J) of grad u; constant, so built once."""
+        if self._rows is None:
+            self._rows = gradient_rows(self.space.gradient)
+        return self._rows
+
+    def _theta_rows(self, inverse: Floats) -> Floats:
+        """(E, Q, 2 n): nodal displacements to the change of theta."""
+        space = self.space
+        B = self._rows if space.sample is space.gradient and self._rows is not None else gradient_rows(space.sample)
+        rows = (inverse[:, :, None] @ B)[:, :, 0]
+        return rows if space.projection is None else space.projection @ rows
+
+    def _log_curvature(self, q: Floats, inverse: Floats) -> Floats:
+        """Second derivative of ln J: -F^-T grad(du)^T F^-T : grad(v), weighted with q (E, S)."""
+        space = self.space
+        push = space.sample @ np.swapaxes(inverse.reshape(*inverse.shape[:2], 2, 2), -1, -2)
+        blocks = -np.einsum("es,esak,esbi->eaibk", q, push, push, optimize=True)
+        size = 2 * space.nodes.shape[1]
+        return blocks.reshape(len(space.nodes), size, size)
+
+    def _scatter(self, fe: Floats) -> Floats:
+        flat = self.space.nodes.ravel()
+        return np.stack([np.bincount(flat, fe[..., i].ravel(), self.space.size) for i in (0, 1)], axis=1)
+
+
+def gradient_rows(gradient: Floats) -> Floats:
+    """(E, Q, n, 2) shape gradients to the (E, Q, 4, 2 n) matrix from nodal displacements to grad u."""
+    E, Q, n, _ = gradient.shape
+    rows = np.zeros((E, Q, 2, 2, n, 2))
+    rows[:, :, 0, :, :, 0] = rows[:, :, 1, :, :, 1] = np.swapaxes(gradient, 2, 3)
+    return rows.reshape(E, Q, 4, 2 * n)
+
+
+def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any]:
+    """Lame moduli per cell if every region is neo-Hookean, else (None, None)."""
+    from evfem.materials import NeoHookean
+
+    if not all(type(law) is NeoHookean for law in laws.values()):
+        return None, None
+    mu, lmbda = np.empty(len(space.nodes)), np.empty(len(space.nodes))
+    for name, law in laws.items():
+        cells = space.mesh.cells_of(name)
+        mu[cells], lmbda[cells] = law.mu, law.lmbda
+    return mu, lmbda
+
+
+def _kernels() -> Any:
+    """The compiled kernels of evfem[fast], or None where numba is not installed."""
+    try:
+        from evfem import kernels
+    except ImportError:
+        return None
+    return kernels
+
+
+def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
+    """Every region needs a law and every law a region, or an `InputError` names the missing one."""
+    names: Sequence[str] = sorted(mesh.region_names)
+    for name in names:
+        if name not in laws:
+            raise InputError("finger.materials", f"no material for region {name}", f"one for each of {', '.join(names)}")
+    for name in laws:
+        if name not in mesh.region_names:
+            raise InputError(f"finger.materials.{name}", name, f"one of the mesh's regions: {', '.join(names)}")

@@ -1,0 +1,162 @@
+"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`, one cell after the other.
+
+psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are mu (per gradient
+component) and lmbda (for theta). Array shapes as in `evfem.assembly`; `projection` of size 0 means theta = ln J pointwise.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from evfem.mesh import Floats, Ints
+
+
+@njit(cache=True, error_model="numpy")
+def _jacobians(u: Any, nodes: Any, sample: Any, inverse: Any, log_J: Any) -> None:
+    """F^-T (S, 2, 2) and ln J (S,) of one cell; ln J is nan where the cell is inverted."""
+    for s in range(sample.shape[0]):
+        a, b, c, d = 1.0, 0.0, 0.0, 1.0
+        for k in range(nodes.size):
+            gx, gy = sample[s, k, 0], sample[s, k, 1]
+            ux, uy = u[nodes[k], 0], u[nodes[k], 1]
+            a += ux * gx
+            b += ux * gy
+            c += uy * gx
+            d += uy * gy
+        J = a * d - b * c
+        log_J[s] = np.log(J)
+        inverse[s, 0, 0] = d / J
+        inverse[s, 0, 1] = -c / J
+        inverse[s, 1, 0] = -b / J
+        inverse[s, 1, 1] = a / J
+
+
+@njit(cache=True, error_model="numpy")
+def _volume_force(log_J: Any, mu: float, lmbda: float, weight: Any, projection: Any, force: Any) -> None:
+    """Weighted q = lmbda theta - mu, gathered at the samples of ln J: force (S,)."""
+    if projection.size == 0:
+        for s in range(log_J.size):
+            force[s] = weight[s] * (lmbda * log_J[s] - mu)
+        return
+    force[:] = 0.0
+    for q in range(weight.size):
+        theta = 0.0
+        for s in range(log_J.size):
+            theta += projection[q, s] * log_J[s]
+        value = weight[q] * (lmbda * theta - mu)
+        for s in range(log_J.size):
+            force[s] += projection[q, s] * value
+
+
+@njit(cache=True, error_model="numpy")
+def forces(
+    u: Floats, mu: Floats, lmbda: Floats, nodes: Ints, gradient: Floats, weight: Floats, sample: Floats, projection: Floats
+) -> Floats:
+    """Internal nodal forces (N, 2); nan where a cell is inverted."""
+    E, Q, n = gradient.shape[:3]
+    S = sample.shape[1]
+    out = np.zeros_like(u)
+    inverse, log_J, volume = np.empty((S, 2, 2)), np.empty(S), np.empty(S)
+    fe = np.empty((n, 2))
+    none = projection.size == 0
+    for e in range(E):
+        fe[:] = 0.0
+        cell = nodes[e]
+        _jacobians(u, cell, sample[e], inverse, log_J)
+        P = projection.reshape(0, 0) if none else projection[e]
+        _volume_force(log_J, mu[e], lmbda[e], weight[e], P, volume)
+        for q in range(Q):
+            a, b, c, d = 1.0, 0.0, 0.0, 1.0
+            for k in range(n):
+                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
+                ux, uy = u[cell[k], 0], u[cell[k], 1]
+                a += ux * gx
+                b += ux * gy
+                c += uy * gx
+                d += uy * gy
+            w = weight[e, q] * mu[e]
+            for k in range(n):
+                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
+                fe[k, 0] += w * (a * gx + b * gy)
+                fe[k, 1] += w * (c * gx + d * gy)
+        for s in range(S):
+            for k in range(n):
+                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
+                fe[k, 0] += volume[s] * (inverse[s, 0, 0] * gx + inverse[s, 0, 1] * gy)
+                fe[k, 1] += volume[s] * (inverse[s, 1, 0] * gx + inverse[s, 1, 1] * gy)
+        for k in range(n):
+            out[cell[k], 0] += fe[k, 0]
+            out[cell[k], 1] += fe[k, 1]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def tangent(
+    u: Floats, mu: Floats, lmbda: Floats, nodes: Ints, gradient: Floats, weight: Floats, sample: Floats, projection: Floats
+) -> Floats:
+    """Cell tangents (E, 2 n, 2 n)."""
+    E, Q, n = gradient.shape[:3]
+    S = sample.shape[1]
+    out = np.zeros((E, 2 * n, 2 * n))
+    inverse, log_J, volume = np.empty((S, 2, 2)), np.empty(S), np.empty(S)
+    push = np.empty((S, n, 2))
+    rows = np.empty((Q, 2 * n))
+    none = projection.size == 0
+    for e in range(E):
+        K = out[e]
+        _jacobians(u, nodes[e], sample[e], inverse, log_J)
+        P = projection.reshape(0, 0) if none else projection[e]
+        _volume_force(log_J, mu[e], lmbda[e], weight[e], P, volume)
+        for s in range(S):
+            for k in range(n):
+                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
+                push[s, k, 0] = inverse[s, 0, 0] * gx + inverse[s, 0, 1] * gy
+                push[s, k, 1] = inverse[s, 1, 0] * gx + inverse[s, 1, 1] * gy
+        for q in range(Q):
+            for j in range(2 * n):
+                if none:
+                    rows[q, j] = push[q, j // 2, j % 2]
+                else:
+                    value = 0.0
+                    for s in range(S):
+                        value += P[q, s] * push[s, j // 2, j % 2]
+                    rows[q, j] = value
+        for k in range(n):
+            for m in range(k, n):
+                shear = 0.0
+                for q in range(Q):
+                    shear += weight[e, q] * (
+                        gradient[e, q, k, 0] * gradient[e, q, m, 0] + gradient[e, q, k, 1] * gradient[e, q, m, 1]
+                    )
+                shear *= mu[e]
+                for i in range(2):
+                    for j in range(2):
+                        value = shear if i == j else 0.0
+                        for q in range(Q):
+                            value += lmbda[e] * weight[e, q] * rows[q, 2 * k + i] * rows[q, 2 * m + j]
+                        for s in range(S):
+                            value -= volume[s] * push[s, k, j] * push[s, m, i]
+                        K[2 * k + i, 2 * m + j] = value
+                        K[2 * m + j, 2 * k + i] = value
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def smallest_J(u: Floats, nodes: Ints, sample: Floats) -> float:
+    """Smallest volume ratio over all cells and sample points."""
+    smallest = np.inf
+    for e in range(nodes.shape[0]):
+        for s in range(sample.shape[1]):
+            a, b, c, d = 1.0, 0.0, 0.0, 1.0
+            for k in range(nodes.shape[1]):
+                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
+                ux, uy = u[nodes[e, k], 0], u[nodes[e, k], 1]
+                a += ux * gx
+                b += ux * gy
+                c += uy * gx
+                d += uy * gy
+            smallest = min(smallest, a * d - b * c)
+    return smallest
