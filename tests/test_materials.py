@@ -1,0 +1,376 @@
+"""Laws against their definitions, each other and linear elasticity; derivatives against differences."""
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.materials import LAWS, LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, from_table, split
+from evfem.splitlaw import UserLaw, embed
+from evfem.tensor import complex_step, ddot, det, inv, mul, trace, transpose
+
+rng = np.random.default_rng(2)
+BUILT_IN = [
+    NeoHookean(E=0.8, nu=0.3),
+    Yeoh(c1=0.4, c2=0.15, c3=0.02, nu=0.4),
+    Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=3.0),
+    LinearElastic(E=0.8, nu=0.3),
+]
+LOG_LAWS = BUILT_IN[:3]
+names = {"ids": lambda law: type(law).__name__}
+
+
+class EnergyOnly:
+    """A user's law: the neo-Hookean energy again, nothing else."""
+
+    viscosity = 0.25
+
+    def psi(self, F):
+        lnJ = np.log(det(F))
+        return 0.5 * 1.3 * (ddot(F, F) - 3.0 - 2.0 * lnJ) + 0.5 * 2.1 * lnJ**2
+
+
+class StressOnly:
+    """A user's law: the stress of the same energy, nothing else."""
+
+    def P(self, F):
+        return 1.3 * F + (2.1 * np.log(det(F)) - 1.3) * transpose(inv(F))
+
+
+class BarredNeoHookean:
+    """The same energy written for the wrapper's split, psi(e^((theta - ln det F)/2) F), by hand.
+
+    Fbar : Fbar = e^theta (F : F) / J in the plane, so W = mu/2 (e^theta I1 / J - 2 - 2 theta) + lambda/2 theta^2
+    with I1 = F : F; dW/dF = mu e^theta (F/J - I1 F^-T / (2 J)), dW/dtheta = mu/2 e^theta I1/J - mu + lambda theta.
+    """
+
+    mu, lmbda = 1.3, 2.1
+
+    def split_energy(self, F, theta):
+        return (
+            0.5 * self.mu * (np.exp(theta) * ddot(F, F) / det(F) - 2 - 2 * theta)
+            + 0.5 * self.lmbda * theta**2
+        )
+
+    def split_stress(self, F, theta):
+        I1, J = ddot(F, F), det(F)
+        S = self.mu * np.exp(theta) * (F / J - 0.5 * I1 / J * transpose(inv(F)))
+        return S, 0.5 * self.mu * np.exp(theta) * I1 / J - self.mu + self.lmbda * theta
+
+
+def deformations(n=3, shape=(4, 3), size=0.25):
+    """Random gradients near the unit matrix with positive determinants."""
+    return np.eye(n).reshape(n, n, *[1] * len(shape)) + rng.uniform(-size, size, (n, n, *shape))
+
+
+def split_states(shape=(4, 3)):
+    """In-plane F and a theta that is not ln det F."""
+    F = deformations(2, shape)
+    return F, np.log(det(F)) + rng.uniform(-0.1, 0.1, shape)
+
+
+def difference(function, x, rank, h=1e-5):
+    """Central difference of function(x) by x (first `rank` axes), with the axes of `complex_step`."""
+    columns = []
+    for index in np.ndindex(x.shape[:rank]):
+        e = np.zeros_like(x)
+        e[index] = h
+        columns.append((function(x + e) - function(x - e)) / (2.0 * h))
+    axes = columns[0].ndim - (x.ndim - rank)
+    shape = columns[0].shape
+    return np.stack(columns, axis=axes).reshape(shape[:axes] + x.shape[:rank] + shape[axes:])
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+def test_stress_is_the_derivative_of_the_energy(law):
+    F = deformations()
+    np.testing.assert_allclose(law.P(F), complex_step(law.psi, F, rank=2), rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(law.P(F), difference(law.psi, F, 2), rtol=1e-7, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+def test_tangent_is_the_derivative_of_the_stress(law):
+    F = deformations()
+    A = law.tangent(F)
+    assert A.shape == (3, 3, 3, 3, 4, 3)
+    np.testing.assert_allclose(A, complex_step(law.P, F, rank=2), rtol=1e-11, atol=1e-12)
+    np.testing.assert_allclose(A, difference(law.P, F, 2), rtol=1e-6, atol=1e-8)
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+@pytest.mark.parametrize("shape", [(), (5,), (4, 3)])
+def test_split_form_is_the_full_form_where_theta_is_the_volume_change(law, shape):
+    F = deformations(2, shape)
+    full = embed(F)
+    if law.volume_measure == "log":
+        theta, volume = np.log(det(F)), transpose(inv(F))
+        J = det(F)
+    else:
+        theta, volume, J = trace(F) - 2.0, np.eye(2).reshape(2, 2, *[1] * len(shape)), 1.0
+    S, q = law.split_stress(F, theta)
+    P = law.P(full)
+    np.testing.assert_allclose(law.split_energy(F, theta), law.psi(full), rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(S + q * volume, P[:2, :2], rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(law.split_sigma_zz(F, theta), P[2, 2] / J, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize("law", [*BUILT_IN, split(EnergyOnly()), split(StressOnly())], **names)
+def test_split_derivatives_against_central_differences(law):
+    F, theta = split_states()
+    S, q = law.split_stress(F, theta)
+    A, c, k = law.split_tangent(F, theta)
+    np.testing.assert_allclose(
+        S, difference(lambda F: law.split_energy(F, theta), F, 2), rtol=1e-6, atol=1e-8
+    )
+    np.testing.assert_allclose(
+        q, difference(lambda t: law.split_energy(F, t), theta, 0), rtol=1e-6, atol=1e-8
+    )
+    np.testing.assert_allclose(
+        A, difference(lambda F: law.split_stress(F, theta)[0], F, 2), rtol=1e-6, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        c, difference(lambda F: law.split_stress(F, theta)[1], F, 2), rtol=1e-6, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        c, difference(lambda t: law.split_stress(F, t)[0], theta, 0), rtol=1e-6, atol=1e-7
+    )
+    by_theta = difference(lambda t: law.split_stress(F, t)[1], theta, 0)
+    np.testing.assert_allclose(np.broadcast_to(k, theta.shape), by_theta, rtol=1e-6, atol=1e-7)
+    assert S.shape == c.shape == F.shape
+    assert q.shape == theta.shape
+    assert A.shape == (2, 2, *F.shape)
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+def test_split_derivatives_against_the_complex_step(law):
+    F, theta = split_states()
+    A, c, k = law.split_tangent(F, theta)
+    stress = law.split_stress
+    np.testing.assert_allclose(
+        A, complex_step(lambda F: stress(F, theta)[0], F, rank=2), rtol=1e-11, atol=1e-12
+    )
+    np.testing.assert_allclose(c, complex_step(lambda t: stress(F, t)[0], theta), rtol=1e-11, atol=1e-12)
+    by_theta = complex_step(lambda t: stress(F, t)[1], theta)
+    np.testing.assert_allclose(np.broadcast_to(k, theta.shape), by_theta, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", LOG_LAWS, **names)
+def test_objectivity(law):
+    F = deformations()
+    Q, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+    Q = (Q * np.linalg.det(Q))[:, :, None, None] * np.ones((1, 1, 4, 3))
+    np.testing.assert_allclose(law.P(mul(Q, F)), mul(Q, law.P(F)), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(law.psi(mul(Q, F)), law.psi(F), rtol=1e-11)
+
+
+@pytest.mark.parametrize("law", LOG_LAWS, **names)
+def test_cauchy_stress_is_symmetric(law):
+    F = deformations()
+    tau = mul(law.P(F), transpose(F))
+    np.testing.assert_allclose(tau, transpose(tau), rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+def test_rest_is_free_of_stress_and_energy(law):
+    F = np.eye(3)
+    assert abs(law.psi(F)) < 1e-15
+    assert np.abs(law.P(F)).max() < 1e-15
+    S, q = law.split_stress(np.eye(2), np.zeros(()))
+    assert np.abs(S + q * np.eye(2)).max() < 1e-15
+    assert abs(law.split_sigma_zz(np.eye(2), np.zeros(()))) < 1e-15
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        NeoHookean(E=0.8, nu=0.3),
+        Yeoh(c1=0.5 * 0.8 / 2.6, c2=0.7, c3=0.3, nu=0.3),  # 2 c1 = mu = E / (2 (1 + nu))
+        Yeoh(c1=0.5 * 0.8 / 2.6, bulk=0.8 / 1.2),  # K = E / (3 (1 - 2 nu))
+        Ogden(mu=2.0 * (0.8 / 2.6) / 3.5, alpha=3.5, nu=0.3),  # mu_1 alpha_1 / 2 = mu
+        split(NeoHookean(E=0.8, nu=0.3)),
+    ],
+    **names,
+)
+def test_small_strain_limit_is_linear_elasticity(law):
+    linear = LinearElastic(E=0.8, nu=0.3)
+    np.testing.assert_allclose(law.tangent(np.eye(3)), linear.tangent(np.eye(3)), atol=1e-14)
+    assert law.shear_modulus == pytest.approx(linear.shear_modulus, rel=1e-14)
+
+
+def test_linear_elasticity_has_youngs_modulus_and_poissons_ratio():
+    # uniaxial stress: e = (s/E) diag(1, -nu, -nu) gives the stress s e_x e_x
+    F = np.eye(3) + 1e-3 * np.diag([1.0, -0.3, -0.3])
+    np.testing.assert_allclose(LinearElastic(E=2.0, nu=0.3).P(F), np.diag([2e-3, 0.0, 0.0]), atol=1e-17)
+
+
+def test_neo_hookean_stress_by_hand():
+    # F = diag(2, 1, 1), mu = lmbda = 1.2 (E = 3, nu = 1/4): P11 = mu (2 - 1/2) + lmbda ln 2 / 2, P22 = lmbda ln 2
+    P = NeoHookean(E=3.0, nu=0.25).P(np.diag([2.0, 1.0, 1.0]))
+    np.testing.assert_allclose(np.diag(P), [1.8 + 0.6 * np.log(2.0)] + [1.2 * np.log(2.0)] * 2, rtol=1e-14)
+
+
+def test_ogden_with_exponent_two_is_yeoh_with_one_term():
+    # sum of squared stretches = tr C: mu/2 (Ib - 3) = c1 (Ib - 3) for mu = 2 c1
+    F = deformations()
+    np.testing.assert_allclose(
+        Ogden(mu=0.8, alpha=2.0, nu=0.4).P(F), Yeoh(c1=0.4, nu=0.4).P(F), rtol=1e-11, atol=1e-13
+    )
+
+
+def test_ogden_stress_by_hand_at_two_equal_stretches():
+    # F = diag(a, a, 1): J = a^2; in the split form S = m e^(-al theta/3) a^(al - 1)
+    law, a = Ogden(mu=0.7, alpha=3.0, bulk=1.0), 1.2
+    S, _ = law.split_stress(a * np.eye(2), np.array(2.0 * np.log(a)))
+    np.testing.assert_allclose(S, 0.7 * a**-2 * a**2 * np.eye(2), rtol=1e-14)
+
+
+@pytest.mark.parametrize("user", [EnergyOnly(), StressOnly()], **names)
+def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
+    built_in = NeoHookean(
+        E=1.3 * (3 * 2.1 + 2 * 1.3) / (2.1 + 1.3), nu=2.1 / (2 * (2.1 + 1.3))
+    )  # mu 1.3, lmbda 2.1
+    F = deformations(2)
+    theta = np.log(det(F))
+    law = split(user)
+    S, q = law.split_stress(F, theta)
+    np.testing.assert_allclose(
+        S + q * transpose(inv(F)), built_in.P(embed(F))[:2, :2], rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(law.split_energy(F, theta), built_in.psi(embed(F)), rtol=1e-11, atol=1e-13)
+    np.testing.assert_allclose(
+        law.split_sigma_zz(F, theta), built_in.split_sigma_zz(F, theta), rtol=1e-12, atol=1e-13
+    )
+    assert law.shear_modulus == pytest.approx(1.3, rel=1e-10)
+
+
+@pytest.mark.parametrize(("user", "digits"), [(StressOnly(), 1e-12), (EnergyOnly(), 1e-9)])
+def test_wrapped_users_law_has_the_split_derivatives_written_by_hand(user, digits):
+    F, theta = split_states()
+    hand, law = BarredNeoHookean(), split(user)
+    np.testing.assert_allclose(
+        law.split_energy(F, theta), hand.split_energy(F, theta), rtol=1e-10, atol=1e-12
+    )
+    for wrapped, written in zip(law.split_stress(F, theta), hand.split_stress(F, theta), strict=True):
+        np.testing.assert_allclose(wrapped, written, rtol=1e-12, atol=1e-13)
+    A, c, k = law.split_tangent(F, theta)
+    stress = hand.split_stress
+    np.testing.assert_allclose(
+        A, complex_step(lambda F: stress(F, theta)[0], F, rank=2), rtol=digits, atol=digits
+    )
+    np.testing.assert_allclose(c, complex_step(lambda t: stress(F, t)[0], theta), rtol=digits, atol=digits)
+    np.testing.assert_allclose(k, complex_step(lambda t: stress(F, t)[1], theta), rtol=digits, atol=digits)
+
+
+def test_energy_of_a_stress_only_law_survives_large_turns():
+    # 150 degrees of turn and a stretch of 1.5: a straight path from rest would pass through det F < 0
+    s, c = np.sin(2.6), np.cos(2.6)
+    F = np.array([[c, -s], [s, c]]) @ np.array([[1.5, 0.2], [0.0, 0.8]])
+    theta = np.log(det(F))
+    energy = split(StressOnly()).split_energy(F, theta)
+    assert energy == pytest.approx(EnergyOnly().psi(embed(F)), rel=1e-10)
+
+
+def test_energy_of_a_stress_only_law_that_is_not_objective():
+    # linear elasticity given by its stress only; theta = ln det F, so that nothing is scaled
+    class Hooke:
+        def P(self, F):
+            return LinearElastic(E=1.0, nu=0.3).P(F)
+
+    F = deformations(2)
+    energy = split(Hooke()).split_energy(F, np.log(det(F)))
+    np.testing.assert_allclose(energy, LinearElastic(E=1.0, nu=0.3).psi(embed(F)), rtol=1e-9, atol=1e-12)
+
+
+def test_wrapper_keeps_the_laws_own_rates_and_is_not_applied_twice():
+    law = split(EnergyOnly())
+    assert isinstance(law, UserLaw)
+    assert law.viscosity == 0.25
+    assert law.density == 1e-9
+    assert split(law) is law
+    for built_in in BUILT_IN:
+        assert split(built_in) is built_in
+        assert isinstance(built_in, SplitLaw)
+
+
+def test_an_object_without_energy_or_stress_is_refused():
+    with pytest.raises(InputError, match=r"P\(F\) or psi\(F\)"):
+        split(object())
+
+
+@pytest.mark.parametrize("law", BUILT_IN, **names)
+def test_complex_arrays_pass_through_every_function(law):
+    # first order: f(x + i h d) = f(x) + i h df.d; the imaginary part of the energy is the stress's work
+    F, theta = split_states(())
+    d = rng.standard_normal((2, 2))
+    h = 1e-30
+    S, _ = law.split_stress(F, theta)
+    assert np.imag(law.split_energy(F + 1j * h * d, theta)) / h == pytest.approx(ddot(S, d), rel=1e-12)
+    F3, d3 = deformations(3, ()), rng.standard_normal((3, 3))
+    assert np.imag(law.psi(F3 + 1j * h * d3)) / h == pytest.approx(ddot(law.P(F3), d3), rel=1e-12)
+    assert np.iscomplexobj(law.split_sigma_zz(F + 1j * h * d, theta + 1j * h))
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: NeoHookean(E=-1.0, nu=0.3), "E"),
+        (lambda: NeoHookean(E=1.0, nu=0.5), "nu"),
+        (lambda: NeoHookean(E=float("nan"), nu=0.3), "E"),
+        (lambda: NeoHookean(E="1", nu=0.3), "E"),
+        (lambda: NeoHookean(E=1.0, nu=0.3, viscosity=-1e-3), "viscosity"),
+        (lambda: LinearElastic(E=1.0, nu=-1.0), "nu"),
+        (lambda: LinearElastic(E=1.0, nu=0.2, density=0.0), "density"),
+        (lambda: Yeoh(c1=0.0, nu=0.4), "c1"),
+        (lambda: Yeoh(c1=1.0, c2=float("inf"), nu=0.4), "c2"),
+        (lambda: Yeoh(c1=1.0), "nu, bulk"),
+        (lambda: Yeoh(c1=1.0, nu=0.4, bulk=2.0), "nu, bulk"),
+        (lambda: Yeoh(c1=1.0, bulk=-2.0), "bulk"),
+        (lambda: Ogden(mu=[1.0, 2.0], alpha=[2.0], nu=0.4), "alpha"),
+        (lambda: Ogden(mu=1.0, alpha=-2.0, nu=0.4), "mu"),
+        (lambda: Ogden(mu=1.0, alpha=0.0, nu=0.4), "alpha"),
+        (lambda: Ogden(mu="soft", alpha=2.0, nu=0.4), "mu"),
+    ],
+)
+def test_impossible_parameters_are_refused_by_name(make, key):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.key == key
+
+
+def test_tables_make_every_law():
+    assert from_table({"law": "neo_hookean", "E": 0.05, "nu": 0.48}) == NeoHookean(E=0.05, nu=0.48)
+    assert from_table({"law": "linear_elastic", "E": 1, "nu": 0.2, "density": 2e-9}) == LinearElastic(
+        1, 0.2, density=2e-9
+    )
+    assert from_table({"law": "yeoh", "c1": 0.5, "c3": 0.1, "bulk": 3.0}) == Yeoh(c1=0.5, c3=0.1, bulk=3.0)
+    ogden = from_table(
+        {"law": "ogden", "mu": [1.0, -0.2], "alpha": [2.0, -2.0], "nu": 0.45, "viscosity": 1e-3}
+    )
+    assert ogden == Ogden(mu=(1.0, -0.2), alpha=(2.0, -2.0), nu=0.45, viscosity=1e-3)
+    assert set(LAWS) == {"neo_hookean", "yeoh", "ogden", "linear_elastic"}
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "words"),
+    [
+        ({"E": 1.0, "nu": 0.3}, "skin.law", "neo_hookean"),
+        ({"law": "mooney"}, "skin.law", "ogden"),
+        ({"law": "neo_hookean", "E": 1.0, "nu": 0.3, "G": 2.0}, "skin.G", "E, nu, viscosity, density"),
+        ({"law": "neo_hookean", "E": 1.0}, "skin.nu", "a value"),
+        ({"law": "neo_hookean", "E": 1.0, "nu": 0.7}, "skin.nu", "below 0.5"),
+        (
+            {"law": "ogden", "mu": 1.0, "alpha": 2.0, "nu": 0.3, "volume_measure": "trace"},
+            "skin.volume_measure",
+            "mu, alpha",
+        ),
+    ],
+)
+def test_wrong_tables_are_refused_by_key(table, key, words):
+    with pytest.raises(InputError, match=words) as caught:
+        from_table(table, key="skin")
+    assert caught.value.key == key
+
+
+def test_constants_of_a_tangent_take_no_memory():
+    A, c, k = NeoHookean(E=1.0, nu=0.3).split_tangent(*split_states((1000, 9)))
+    assert A.strides[-2:] == c.strides[-2:] == k.strides[-2:] == (0, 0)
+    assert not A.flags.writeable
