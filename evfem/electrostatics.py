@@ -104,8 +104,8 @@ def _check_medium(gap_eps_r: float) -> None:
 class StrongTroxel:
     """Attraction of rigid layers over a movable gap, equations (3) and (6).
 
-    ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))`` with ``p = dPi/dg``.
-    A slightly negative gap (a penetrating trial state) continues the formula up to ``g + e s = 0``.
+    ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))`` with
+    ``p = dPi/dg``. A slightly negative gap (a penetrating trial state) continues the formula.
     `gap_eps_r` is ``e``, the permittivity of what fills the gap: 1 for air.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
@@ -154,8 +154,8 @@ class Kaczmarek:
     """Attraction of layers that stretch with the gap, equations (5) and (7).
 
     ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
-    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for ``D -> e s`` both become those
-    of `StrongTroxel`. `gap_eps_r` is ``e``, the permittivity of what fills the gap: 1 for air.
+    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for ``D -> e s``
+    both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap: 1 for air.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(1e3 * Kaczmarek().traction(0.0, 2000.0, layers), 2)         # kPa, touching skin

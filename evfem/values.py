@@ -21,7 +21,7 @@ def plain(value: Values) -> Values:
 
 
 def above(key: str, given: Values, lowest: float, allowed: str) -> Values:
-    """`given` as float or array of floats, all finite and > `lowest`; complex numbers are judged by their real part.
+    """`given` as float or array of floats, all finite and (by their real part) > `lowest`.
 
     >>> above("area", -1.0, 0.0, "an area in mm2 above zero")
     Traceback (most recent call last):

@@ -1,0 +1,172 @@
+"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make of it.
+
+The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from evfem.errors import InputError
+from evfem.storage import write_text
+from evfem.values import Values, above, finite, plain
+
+Floats = npt.NDArray[np.float64]
+#: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
+APPLIED_TO_EFFECTIVE = 2.0
+HEADER = ["position", "voltage"]
+
+
+@dataclass(frozen=True)
+class VoltageProfile:
+    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and the last.
+
+    Positions must not fall; at a repeated position the later row holds from that position on (a jump).
+    Calling the profile with positions gives voltages of the same shape.
+
+    >>> profile = VoltageProfile([0.0, 5.0, 5.0], [0.0, 100.0, 400.0])
+    >>> profile(2.5), profile(5.0), profile(9.0)
+    (50.0, 400.0, 400.0)
+    """
+
+    position: Any
+    voltage: Any
+
+    def __post_init__(self) -> None:
+        position = _column("position", self.position)
+        voltage = _column("voltage", self.voltage)
+        if position.size == 0 or position.size != voltage.size:
+            sizes = f"{position.size} positions and {voltage.size} voltages"
+            raise InputError("voltage profile", sizes, "equally many positions and voltages, at least one")
+        falls = np.flatnonzero(np.diff(position) < 0)
+        if falls.size:
+            row = int(falls[0])
+            given = f"{position[row]} followed by {position[row + 1]}"
+            raise InputError("position", given, "positions in mm that never fall")
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "voltage", voltage)
+
+    def __call__(self, position: Values) -> Values:
+        """Voltage in V at `position` in mm."""
+        return plain(np.interp(position, self.position, self.voltage))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> VoltageProfile:
+        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per point.
+
+        Raises InputError for a missing file, another header, or a row that is not two numbers.
+        """
+        return cls(*_read_columns(Path(path)))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the file that `from_csv` reads back to the last bit."""
+        rows = (f"{x!r},{u!r}\n" for x, u in zip(self.position.tolist(), self.voltage.tolist(), strict=True))
+        write_text(path, ",".join(HEADER) + "\n" + "".join(rows))
+
+    def rms(self, start: float, stop: float) -> float:
+        """Root mean square in V over start <= position <= stop: exact, since the profile is piecewise linear.
+
+        At constant speed this is the mean over time. The mean attraction follows rms(U)^2.
+        """
+        if not (np.isfinite([start, stop]).all() and start < stop):
+            raise InputError("start, stop", (start, stop), "two positions in mm, the second one larger")
+        inside = (self.position > start) & (self.position < stop)
+        x = np.concatenate([[start], self.position[inside], [stop]])
+        before = np.concatenate([self.voltage[inside], [self._just_before(stop)]])  # limit from the left
+        after = np.concatenate([[self(start)], self.voltage[inside]])
+        square = (after**2 + after * before + before**2) / 3.0
+        return float(np.sqrt(np.sum(np.diff(x) * square) / (stop - start)))
+
+    def _just_before(self, position: float) -> float:
+        """The limit from the left at `position`: the first of repeated rows counts."""
+        reverse = VoltageProfile(-self.position[::-1], self.voltage[::-1])
+        return float(reverse(-position))
+
+    def steepest(self) -> float:
+        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
+        rise, run = np.abs(np.diff(self.voltage)), np.diff(self.position)
+        rise, run = rise[rise > 0], run[rise > 0]
+        if rise.size == 0:
+            return 0.0
+        return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
+
+
+def _column(key: str, given: Values) -> Floats:
+    values = np.atleast_1d(finite(key, given, "a list of finite numbers"))
+    if values.ndim != 1 or np.iscomplexobj(values):
+        raise InputError(key, f"an array of shape {values.shape}", "a list of finite real numbers")
+    return np.array(values, dtype=float)
+
+
+def _read_columns(path: Path) -> tuple[list[float], list[float]]:
+    allowed = "a csv file with the header position,voltage"
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            rows = [row for row in csv.reader(file) if row]
+    except OSError as error:
+        raise InputError("voltage_file", f"{path} ({error.strerror})", allowed) from error
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError("voltage_file", f"{path}, which is no text table", allowed) from error
+    if not rows or [name.strip() for name in rows[0]] != HEADER:
+        found = ",".join(rows[0]) if rows else "nothing"
+        raise InputError("voltage_file", f"{path} that starts with {found}", allowed)
+    try:
+        pairs = [(float(x), float(u)) for x, u in rows[1:]]
+    except ValueError as error:
+        raise InputError("voltage_file", f"{path}: {error}", "two numbers in every row") from error
+    return [x for x, _ in pairs], [u for _, u in pairs]
+
+
+def carrier_amplitude(effective: Values) -> Values:
+    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage: sqrt(2) U.
+
+    >>> round(carrier_amplitude(1000.0), 3)
+    1414.214
+    """
+    return plain(np.sqrt(2.0) * np.asarray(effective))
+
+
+def applied_voltage(effective: Values) -> Values:
+    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
+
+    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is the
+    mean alone.
+    """
+    return plain(APPLIED_TO_EFFECTIVE * np.asarray(effective))
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """What a display's amplifier can do: `voltage_max` in V.
+
+    >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
+    [0.0, 200.0, 200.0]
+    """
+
+    voltage_max: float
+
+    def __post_init__(self) -> None:
+        above("voltage_max", self.voltage_max, 0.0, "a voltage in V above zero")
+
+    def limit(self, profile: VoltageProfile) -> VoltageProfile:
+        """The profile cut off at +-voltage_max, exactly: rows are added where it crosses the limit."""
+        x, u = profile.position, profile.voltage
+        parts_x, parts_u = [x[:1]], [u[:1]]
+        for i in range(x.size - 1):
+            levels = [
+                level
+                for level in (-self.voltage_max, self.voltage_max)
+                if (u[i] - level) * (u[i + 1] - level) < 0
+            ]
+            crossings = sorted((level - u[i]) / (u[i + 1] - u[i]) for level in levels)
+            share = np.array([*crossings, 1.0])
+            parts_x.append(x[i] + share * (x[i + 1] - x[i]))
+            parts_u.append(u[i] + share * (u[i + 1] - u[i]))
+        voltage = np.clip(np.concatenate(parts_u), -self.voltage_max, self.voltage_max)
+        return VoltageProfile(np.concatenate(parts_x), voltage)
