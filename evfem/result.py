@@ -231,10 +231,10 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
 
     `parameters` is the scene as TOML, or its representation where it holds a law or form of the user's own.
     """
-    from evfem import scenefile
+    from evfem.scenefile import dump
 
     try:
-        parameters = scenefile.dump(scene)
+        parameters = dump(scene)
     except InputError:
         parameters = repr(scene)
     return {

@@ -67,8 +67,8 @@ def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
     """
     allowed = f"a file of the format {form}"
     try:
-        with np.load(Path(path), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+        with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
+            arrays = {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}
     except FileNotFoundError as error:
         raise InputError(key, f"{path}, which does not exist", allowed) from error
     except DAMAGE as error:
@@ -78,6 +78,13 @@ def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
     if "format" not in arrays or str(arrays["format"]) != form:
         raise InputError(key, f"{path}, of another format", allowed)
     return arrays
+
+
+def _array(archive: zipfile.ZipFile, name: str) -> np.ndarray:
+    with archive.open(name) as member:
+        array = np.lib.format.read_array(member, allow_pickle=False)
+        member.read()  # to the end of the member, where its checksum is compared
+        return array
 
 
 def _remove(path: Path) -> None:
