@@ -1,0 +1,61 @@
+r"""The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
+
+The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free nodes' displacements, bone x, bone y);
+forces of the bone's nodes add up to the reaction. With time steps the internal forces contain the objective Kelvin-Voigt stress
+:math:`S_v = 2\eta\,\Delta E/\Delta t`, :math:`\eta = \tau\mu`, and inertia :math:`M(v - v_0)/\Delta t`, both by backward Euler.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from evfem.assembly import Space, Tissue
+from evfem.linear import Pattern
+from evfem.mesh import Floats, Ints
+
+
+class Body:
+    """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
+
+    def __init__(self, space: Space, laws: Mapping[str, Any], terms: Sequence[Any] = ()) -> None:
+        self.space = space
+        self.tissue = Tissue(space, laws)
+        self.terms = tuple(terms)
+        bone = space.mesh.node_sets["bone"]
+        free = np.setdiff1d(np.arange(space.size), bone)
+        self.size = 2 * free.size + 2
+        self.unknowns: Ints = np.empty((space.size, 2), dtype=np.int64)
+        self.unknowns[free] = np.arange(2 * free.size).reshape(-1, 2)
+        self.unknowns[bone] = [self.size - 2, self.size - 1]
+        self.bone: Ints = np.array([self.size - 2, self.size - 1])
+        self.pattern = Pattern(self.unknowns[space.nodes].reshape(len(space.nodes), -1), self.size)
+
+    def reduce(self, nodal: Floats) -> Floats:
+        """Nodal forces (N, 2) to reduced forces (n,): sums over the bone."""
+        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size)
+
+    def expand(self, reduced: Floats) -> Floats:
+        """Reduced displacements (n,) to nodal ones (N, 2)."""
+        return reduced[self.unknowns]
+
+    def forces(self, u: Floats) -> Floats:
+        """Internal nodal forces (N, 2)."""
+        total = self.tissue.forces(u)
+        for term in self.terms:
+            total = total + term.forces(u)
+        return total
+
+    def tangent(self, u: Floats) -> Floats:
+        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in laws are symmetric)."""
+        cells = self.tissue.tangent(u)
+        for term in self.terms:
+            term.add_tangent(u, cells)
+        return self.pattern.upper(cells)
+
+    def energy(self, u: Floats) -> float:
+        """Stored energy (N mm per mm of depth) of the tissue."""
+        return self.tissue.energy(u)
+
