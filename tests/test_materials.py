@@ -39,8 +39,8 @@ class StressOnly:
 class BarredNeoHookean:
     """The same energy written for the wrapper's split, psi(e^((theta - ln det F)/2) F), by hand.
 
-    Fbar : Fbar = e^theta (F : F) / J in the plane, so W = mu/2 (e^theta I1 / J - 2 - 2 theta) + lambda/2 theta^2
-    with I1 = F : F; dW/dF = mu e^theta (F/J - I1 F^-T / (2 J)), dW/dtheta = mu/2 e^theta I1/J - mu + lambda theta.
+    Fbar : Fbar = e^theta I / J in the plane, I = F : F, so W = mu/2 (e^theta I / J - 2 - 2 theta) + lambda/2
+    theta^2; dW/dF = mu e^theta (F/J - I F^-T / (2 J)), dW/dtheta = mu/2 e^theta I/J - mu + lambda theta.
     """
 
     mu, lmbda = 1.3, 2.1
@@ -203,7 +203,7 @@ def test_linear_elasticity_has_youngs_modulus_and_poissons_ratio():
 
 
 def test_neo_hookean_stress_by_hand():
-    # F = diag(2, 1, 1), mu = lmbda = 1.2 (E = 3, nu = 1/4): P11 = mu (2 - 1/2) + lmbda ln 2 / 2, P22 = lmbda ln 2
+    # F = diag(2, 1, 1), mu = lmbda = 1.2 by E and nu: P11 = mu (2 - 1/2) + lmbda ln 2 / 2, P22 = lmbda ln 2
     P = NeoHookean(E=3.0, nu=0.25).P(np.diag([2.0, 1.0, 1.0]))
     np.testing.assert_allclose(np.diag(P), [1.8 + 0.6 * np.log(2.0)] + [1.2 * np.log(2.0)] * 2, rtol=1e-14)
 

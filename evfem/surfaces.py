@@ -1,0 +1,274 @@
+"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient, insulator.
+
+A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED profile: the
+scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical gap of the undeformed
+finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear between its rows, constant beyond
+them; at a repeated x the later row holds from that x on. `insulator` is the layer between the surface and
+the electrode under it (None: no electrode). x may be any array, real or complex (for
+`tensor.complex_step`); the results have its shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from evfem.checks import put, real
+from evfem.electrostatics import Layer
+from evfem.errors import InputError
+from evfem.tables import numbers, piecewise_linear, read_columns
+from evfem.tensor import Array
+
+Rows = Sequence[Sequence[float]]
+
+FRICTION = "a number of at least 0, or a table [[x, mu], ...] with mu >= 0 and x not decreasing"
+#: Equation (25) of the paper, 0.025 (sin 6x + cos 12x - 1) in mm, as rows amplitude, wavenumber, phase.
+EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
+
+
+class _Surface:
+    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
+
+    friction: float | Rows
+    y: float | None
+    insulator: Layer | None
+    is_flat = False
+
+    def _check_common(self) -> None:
+        put(self, friction=_friction(self.friction))
+        if self.y is not None:
+            put(self, y=real("surface.y", self.y, "a height in mm, or None for first touch at the start"))
+        if not (self.insulator is None or isinstance(self.insulator, Layer)):
+            raise InputError("surface.insulator", self.insulator, "Layer(thickness, eps_r), or None")
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the friction coefficient is positive anywhere."""
+        return bool(np.max(np.atleast_2d(self.friction)[:, -1]) > 0.0)
+
+    def friction_coefficient(self, x: Array) -> Array:
+        """Friction coefficient at x (mm), real.
+
+        >>> step = Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]])
+        >>> step.friction_coefficient(np.array([-1.0, 1.9, 2.0, 9.0])).tolist()
+        [0.5, 0.5, 0.6, 0.6]
+        """
+        if isinstance(self.friction, float):
+            return np.full(np.shape(x), self.friction)
+        place, mu = np.array(self.friction).T
+        return piecewise_linear(place, mu, x)
+
+    def shifted(self, y: float) -> Self:
+        """The same surface with its height shifted by `y` (mm)."""
+        moved = copy(self)
+        put(moved, y=y)
+        return moved
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        raise NotImplementedError
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        raise NotImplementedError
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        raise NotImplementedError
+
+
+class _Level(_Surface):
+    """A level surface: height, slope and curvature are zero."""
+
+    is_flat = True
+
+    def height(self, x: Array) -> Array:
+        """Zero at every x."""
+        return np.zeros_like(x, dtype=np.result_type(x, float))
+
+    slope = curvature = height
+
+
+@dataclass(frozen=True)
+class Flat(_Level):
+    """A level rigid surface.
+
+    >>> Flat(friction=0.4).height(np.array([1.0, 2.0])).tolist()
+    [0.0, 0.0]
+    """
+
+    friction: float | Rows = 0.3
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+
+
+@dataclass(frozen=True)
+class Display(_Level):
+    """A level display: an insulator over an electrode, by default that of Table 2 (0.09 mm, eps_r 3.35).
+
+    >>> Display().insulator
+    Layer(thickness=0.09, eps_r=3.35)
+    """
+
+    insulator: Layer | None = field(default_factory=lambda: Layer(thickness=0.09, eps_r=3.35))
+    friction: float | Rows = 0.3
+    y: float | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+
+
+@dataclass(frozen=True)
+class Sinusoid(_Surface):
+    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
+
+    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the paper,
+    height(x) = 0.025 (sin 6x + cos 12x - 1).
+
+    >>> float(Sinusoid().height(0.0))
+    0.0
+    """
+
+    friction: float | Rows = 0.3
+    terms: Rows | None = None
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+        terms = EQUATION_25 if self.terms is None else self.terms
+        put(self, terms=_rows("surface.terms", terms, 3, "a list of rows [amplitude, wavenumber, phase]"))
+
+    def _sum(self, x: Array, order: int) -> Array:
+        """Derivative of the given order: each one is a factor k and a quarter of a turn."""
+        assert self.terms is not None
+        sines = [a * k**order * np.sin(k * x + phase + order * np.pi / 2) for a, k, phase in self.terms]
+        return np.sum(sines, axis=0)
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        return self._sum(x, 0)
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        return self._sum(x, 1)
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        return self._sum(x, 2)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Profile(_Surface):
+    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond the ends.
+
+    x must increase; at least two points (kept as `x` and `samples`). Between two samples the height stays
+    between their heights, its slope is continuous, its curvature jumps at samples. Source: Fritsch and
+    Carlson, SIAM J. Numer. Anal. 17 (1980) 238-246, doi:10.1137/0717021.
+
+    >>> Profile([0.0, 1.0, 2.0], [0.0, 0.5, 0.0]).height(np.array([-1.0, 1.0, 1.5])).tolist()
+    [0.0, 0.5, 0.375]
+    """
+
+    x: Array
+    samples: Array
+    friction: float | Rows = 0.3
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __init__(
+        self,
+        x: Any,
+        height: Any,
+        friction: float | Rows = 0.3,
+        y: float | None = None,
+        insulator: Layer | None = None,
+    ) -> None:
+        put(self, friction=friction, y=y, insulator=insulator)
+        self._check_common()
+        put(self, x=numbers("surface.x", x, "a list of positions in mm"))
+        put(self, samples=numbers("surface.height", height, "a list of heights in mm"))
+        _check_samples(self.x, self.samples)
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        friction: float | Rows = 0.3,
+        y: float | None = None,
+        insulator: Layer | None = None,
+    ) -> Profile:
+        """The profile in a file with the header `x,height` and one point (mm) in each further line."""
+        x, height = read_columns(Path(path), ["x", "height"], "surface.file")
+        return cls(x, height, friction, y, insulator)
+
+    @cached_property
+    def _cubics(self) -> Array:
+        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left end."""
+        from scipy.interpolate import PchipInterpolator
+
+        inner = PchipInterpolator(self.x, self.samples).c
+        ends = np.zeros((4, 2))
+        ends[3] = self.samples[0], self.samples[-1]
+        return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
+
+    def _piece(self, x: Array) -> tuple[Array, Array]:
+        """Cubic (4, ...) at x, and distance (...) from the left end of its piece."""
+        piece = np.searchsorted(self.x, np.real(x), side="right")
+        piece = np.where(np.real(x) == self.x[-1], len(self.x) - 1, piece)
+        return self._cubics[:, piece], x - self.x[np.maximum(piece - 1, 0)]
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        c, d = self._piece(x)
+        return c[3] + d * (c[2] + d * (c[1] + d * c[0]))
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        c, d = self._piece(x)
+        return c[2] + d * (2.0 * c[1] + d * 3.0 * c[0])
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        c, d = self._piece(x)
+        return 2.0 * c[1] + d * 6.0 * c[0]
+
+
+def _friction(given: Any) -> float | Rows:
+    """A number as float, a table as a tuple of rows."""
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
+        return real("surface.friction", given, FRICTION, lambda mu: mu >= 0.0)
+    rows = _rows("surface.friction", given, 2, FRICTION)
+    x, mu = np.array(rows).T
+    if np.any(mu < 0.0) or np.any(np.diff(x) < 0.0):
+        raise InputError("surface.friction", given, FRICTION)
+    return rows
+
+
+def _rows(key: str, given: Any, columns: int, allowed: str) -> tuple[tuple[float, ...], ...]:
+    """A table of numbers as a tuple of rows."""
+    table = numbers(key, given, allowed, axes=2)
+    if table.shape[1] != columns or not len(table):
+        raise InputError(key, given, allowed)
+    return tuple(map(tuple, table.tolist()))
+
+
+def _check_samples(x: Array, height: Array) -> None:
+    if len(x) < 2 or len(x) != len(height):
+        given = f"{len(x)} values of x, {len(height)} heights"
+        raise InputError("surface.x", given, "at least two points, and as many heights as x")
+    wrong = np.flatnonzero(np.diff(x) <= 0.0)
+    if len(wrong):
+        n = int(wrong[0])
+        raise InputError(
+            "surface.x", f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})", "increasing values"
+        )

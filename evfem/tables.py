@@ -1,0 +1,78 @@
+"""Tables of numbers: columns of a csv file, and piecewise linear functions that may jump."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evfem.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
+    """Value at x of rows (place, value): linear between them, constant beyond the ends; place must not
+    decrease.
+
+    At a repeated place the later row holds from that place on. Only the real part of x counts.
+
+    >>> piecewise_linear(np.array([0.0, 1.0, 1.0]), np.array([0.0, 4.0, 9.0]), [-1.0, 0.5, 1.0, 2.0]).tolist()
+    [0.0, 2.0, 9.0, 9.0]
+    """
+    x = np.real(x)
+    after = np.searchsorted(place, x, side="right")
+    left, right = np.maximum(after - 1, 0), np.minimum(after, len(place) - 1)
+    length = np.where(place[right] > place[left], place[right] - place[left], 1.0)
+    return value[left] + (value[right] - value[left]) * np.clip((x - place[left]) / length, 0.0, 1.0)
+
+
+def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
+    """`given` as a new array of finite floats with that many axes, or `InputError`.
+
+    >>> numbers("x", [1, float("nan")], "lengths")
+    Traceback (most recent call last):
+    evfem.errors.InputError: x: given a value that is not finite, number 2; allowed: lengths
+    """
+    try:
+        array = np.array(given)
+    except ValueError:  # rows of unequal length
+        raise InputError(key, given, allowed) from None
+    if array.dtype.kind not in "iuf" or array.ndim != axes:
+        raise InputError(key, given, allowed)
+    if not np.isfinite(array).all():
+        place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
+        raise InputError(key, f"a value that is not finite, number {place}", allowed)
+    return array.astype(float)
+
+
+def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
+    """Columns of a csv file whose first line is `header` and whose other lines hold one number per column.
+
+    Raises `InputError` with `key` for a file that cannot be read or has anything else in it.
+    """
+    allowed = f"a readable csv file with the header {','.join(header)}"
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
+            rows = [(n, [cell.strip() for cell in row]) for n, row in enumerate(csv.reader(lines), 1) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise InputError(key, f"{path} ({reason})", allowed) from None
+    if not rows or rows[0][1] != header:
+        start = ",".join(rows[0][1])[:60] if rows else ""
+        raise InputError(key, f"{path}, which starts with {start!r}", allowed)
+    table = [_row(row, f"{path}, line {number}", len(header), key) for number, row in rows[1:]]
+    return [np.array([row[i] for row in table], dtype=float) for i in range(len(header))]
+
+
+def _row(cells: list[str], place: str, columns: int, key: str) -> list[float]:
+    try:
+        row = [float(cell) for cell in cells]
+    except ValueError:
+        row = []
+    if len(row) != columns or not np.isfinite(row).all():
+        raise InputError(key, f"{place}: {','.join(cells)}", f"{columns} finite numbers on each line")
+    return row

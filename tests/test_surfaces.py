@@ -1,0 +1,198 @@
+"""Surfaces: heights against their formulas, derivatives by differences, friction tables, refused input."""
+
+import numpy as np
+import pytest
+
+from evfem.electrostatics import Layer
+from evfem.errors import InputError
+from evfem.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.tables import numbers, piecewise_linear, read_columns
+from evfem.tensor import complex_step
+
+X = np.linspace(-1.7137, 2.3071, 41)  # meets no sample, where curvatures jump
+SAMPLES = ([-1.0, -0.4, 0.1, 0.9, 1.3, 2.0], [0.0, 0.05, 0.02, 0.02, -0.1, 0.3])
+SURFACES = [Flat(), Display(), Sinusoid(), Sinusoid(terms=[[0.1, 3.0, 0.4]]), Profile(*SAMPLES)]
+names = {"ids": lambda surface: type(surface).__name__}
+
+
+def test_equation_25():
+    np.testing.assert_allclose(
+        Sinusoid().height(X), 0.025 * (np.sin(6.0 * X) + np.cos(12.0 * X) - 1.0), atol=1e-16
+    )
+
+
+def test_terms_are_amplitude_wavenumber_phase():
+    np.testing.assert_allclose(Sinusoid(terms=[[0.1, 3.0, 0.4]]).height(X), 0.1 * np.sin(3.0 * X + 0.4))
+
+
+@pytest.mark.parametrize("surface", SURFACES, **names)
+def test_slope_and_curvature_are_derivatives_of_the_height(surface):
+    h = 1e-5
+    slope = (surface.height(X + h) - surface.height(X - h)) / (2 * h)
+    np.testing.assert_allclose(surface.slope(X), slope, atol=1e-8)
+    np.testing.assert_allclose(surface.slope(X), complex_step(surface.height, X), atol=1e-14)
+    np.testing.assert_allclose(surface.curvature(X), complex_step(surface.slope, X), atol=1e-13)
+
+
+@pytest.mark.parametrize("surface", SURFACES, **names)
+@pytest.mark.parametrize("x", [0.3, np.array(0.3), np.full((2, 3), 0.3)])
+def test_results_have_the_shape_of_x(surface, x):
+    for method in (surface.height, surface.slope, surface.curvature, surface.friction_coefficient):
+        assert np.shape(method(x)) == np.shape(x)
+    assert np.iscomplexobj(surface.height(np.asarray(x) + 1e-30j))
+
+
+def test_profile_is_scipys_pchip_inside_and_level_outside():
+    from scipy.interpolate import PchipInterpolator
+
+    surface, inner = Profile(*SAMPLES), PchipInterpolator(*SAMPLES)
+    inside = (X >= -1.0) & (X <= 2.0)
+    np.testing.assert_allclose(surface.height(X)[inside], inner(X[inside]), atol=1e-16)
+    np.testing.assert_allclose(surface.slope(X)[inside], inner(X[inside], 1), atol=1e-15)
+    ends = surface.height(np.array([-9.0, -1.0, 2.0, 9.0]))
+    np.testing.assert_allclose(ends, [0.0, 0.0, 0.3, 0.3], atol=1e-15)
+    assert surface.slope(np.array([-9.0, 9.0])).tolist() == [0.0, 0.0]
+
+
+def test_profile_meets_its_samples_and_does_not_overshoot():
+    surface = Profile(*SAMPLES)
+    np.testing.assert_allclose(surface.height(np.array(SAMPLES[0])), SAMPLES[1], atol=1e-16)
+    between = surface.height(np.linspace(0.1, 0.9, 50))  # two equal samples: level in between
+    np.testing.assert_allclose(between, 0.02, atol=1e-16)
+
+
+def test_friction_is_linear_between_rows_and_jumps_at_a_repeated_x():
+    surface = Flat(friction=[[0.0, 0.2], [1.0, 0.4], [1.0, 0.6], [3.0, 0.0]])
+    x = np.array([-5.0, 0.0, 0.25, np.nextafter(1.0, 0.0), 1.0, 2.0, 3.0, 5.0])
+    np.testing.assert_allclose(
+        surface.friction_coefficient(x), [0.2, 0.2, 0.25, 0.4, 0.6, 0.3, 0.0, 0.0], atol=1e-15
+    )
+
+
+def test_friction_table_of_one_row_is_a_constant():
+    assert Flat(friction=[[2.0, 0.7]]).friction_coefficient(np.array([1.0, 2.0, 3.0])).tolist() == [0.7] * 3
+
+
+def test_friction_that_starts_and_ends_with_a_jump():
+    surface = Flat(friction=[[0.0, 0.1], [0.0, 0.3]])
+    assert surface.friction_coefficient(np.array([-1.0, 0.0, 1.0])).tolist() == [0.1, 0.3, 0.3]
+
+
+def test_has_friction_looks_at_the_whole_table():
+    assert Flat(friction=0.1).has_friction
+    assert not Flat(friction=0.0).has_friction
+    assert Sinusoid(friction=[[0.0, 0.0], [1.0, 0.2]]).has_friction
+    assert not Sinusoid(friction=[[0.0, 0.0], [1.0, 0.0]]).has_friction
+
+
+def test_only_level_surfaces_are_flat():
+    assert [s.is_flat for s in SURFACES] == [True, True, False, False, False]
+
+
+def test_display_is_flat_with_the_insulator_of_table_2():
+    display = Display()
+    assert display.insulator == Layer(thickness=0.09, eps_r=3.35)
+    assert display.friction == 0.3
+    assert Display(Layer(0.001, 5.0)).insulator.thickness == 0.001
+    assert Flat().insulator is None
+
+
+@pytest.mark.parametrize("surface", SURFACES, **names)
+def test_shifted_returns_a_copy_whose_profile_is_not_shifted(surface):
+    moved = surface.shifted(-6.4)
+    assert (surface.y, moved.y) == (None, -6.4)
+    assert type(moved) is type(surface)
+    np.testing.assert_array_equal(moved.height(X), surface.height(X))
+
+
+def test_profile_from_a_file(tmp_path):
+    path = tmp_path / "scan.csv"
+    path.write_text("x,height\n-1, 0.0\n0.5,0.25\n\n2.0,1e-1\n")
+    surface = Profile.from_csv(path, friction=0.2, y=1.0)
+    np.testing.assert_array_equal(surface.x, [-1.0, 0.5, 2.0])
+    np.testing.assert_array_equal(surface.samples, [0.0, 0.25, 0.1])
+    assert (surface.friction, surface.y) == (0.2, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("height,x\n0,1\n1,2\n", "header x,height"),
+        ("", "header x,height"),
+        ("x,height\n0,1\n1,two\n", "line 3"),
+        ("x,height\n0,1\n1,2,3\n", "line 3"),
+        ("x,height\n0,1\n1,nan\n", "line 3"),
+        ("x,height\n0,1\n", "at least two points"),
+        ("x,height\n0,1\n2,1\n1,1\n", "2, then 1 .points 2, 3"),
+        ("x,height\n0,1\n0,2\n", "increasing"),
+    ],
+)
+def test_wrong_files_are_refused_with_the_place(tmp_path, text, words):
+    path = tmp_path / "scan.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=words):
+        Profile.from_csv(path)
+
+
+def test_missing_and_binary_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match="No such file") as caught:
+        Profile.from_csv(tmp_path / "none.csv")
+    assert caught.value.key == "surface.file"
+    (tmp_path / "picture.csv").write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match="not a text file"):
+        Profile.from_csv(tmp_path / "picture.csv")
+
+
+@pytest.mark.parametrize(
+    ("make", "key"),
+    [
+        (lambda: Flat(friction=-0.1), "surface.friction"),
+        (lambda: Flat(friction=float("nan")), "surface.friction"),
+        (lambda: Flat(friction="rough"), "surface.friction"),
+        (lambda: Flat(friction=True), "surface.friction"),
+        (lambda: Flat(friction=[]), "surface.friction"),
+        (lambda: Flat(friction=[[0.0, 0.1, 0.2]]), "surface.friction"),
+        (lambda: Flat(friction=[[0.0, 0.1], [1.0]]), "surface.friction"),
+        (lambda: Flat(friction=[[0.0, 0.1], [1.0, -0.1]]), "surface.friction"),
+        (lambda: Flat(friction=[[1.0, 0.1], [0.0, 0.1]]), "surface.friction"),
+        (lambda: Flat(friction=[[0.0, float("inf")]]), "surface.friction"),
+        (lambda: Flat(y="low"), "surface.y"),
+        (lambda: Flat(y=float("nan")), "surface.y"),
+        (lambda: Display(insulator=0.09), "surface.insulator"),
+        (lambda: Sinusoid(terms=[[0.1, 3.0]]), "surface.terms"),
+        (lambda: Sinusoid(terms=[]), "surface.terms"),
+        (lambda: Profile([0.0, 1.0], [0.0, float("nan")]), "surface.height"),
+        (lambda: Profile([0.0, 1.0], [0.0, 1.0, 2.0]), "surface.x"),
+        (lambda: Profile([0.0], [0.0]), "surface.x"),
+        (lambda: Profile([0.0, 0.0], [0.0, 1.0]), "surface.x"),
+        (lambda: Profile([[0.0, 1.0]], [0.0, 1.0]), "surface.x"),
+        (lambda: Profile(["a", "b"], [0.0, 1.0]), "surface.x"),
+        (lambda: Profile([0.0, 1.0], [0.0, 1.0], friction=-1.0), "surface.friction"),
+    ],
+)
+def test_impossible_surfaces_are_refused_by_key(make, key):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.key == key
+
+
+def test_profile_does_not_change_with_the_arrays_it_was_made_from():
+    x, height = np.array([0.0, 1.0]), np.array([0.0, 1.0])
+    surface = Profile(x, height)
+    x += 5.0
+    assert surface.x.tolist() == [0.0, 1.0]
+
+
+def test_piecewise_linear_is_numpys_interp_without_jumps():
+    place, value = np.array([0.0, 1.0, 4.0]), np.array([2.0, -1.0, 0.5])
+    np.testing.assert_allclose(piecewise_linear(place, value, X), np.interp(X, place, value), atol=1e-15)
+
+
+def test_numbers_name_the_place_of_a_wrong_one():
+    with pytest.raises(InputError, match="number 2, 1"):
+        numbers("table", [[1.0, 2.0], [float("inf"), 0.0]], "rows", axes=2)
+
+
+def test_columns_accept_a_byte_order_mark(tmp_path):
+    (tmp_path / "t.csv").write_bytes(b"\xef\xbb\xbfx,height\n1,2\n")
+    assert [c.tolist() for c in read_columns(tmp_path / "t.csv", ["x", "height"], "t")] == [[1.0], [2.0]]
