@@ -224,7 +224,6 @@ class Profile(_Surface):
     def _piece(self, x: Array) -> tuple[Array, Array]:
         """Cubic (4, ...) at x, and distance (...) from the left end of its piece."""
         piece = np.searchsorted(self.x, np.real(x), side="right")
-        piece = np.where(np.real(x) == self.x[-1], len(self.x) - 1, piece)
         return self._cubics[:, piece], x - self.x[np.maximum(piece - 1, 0)]
 
     def height(self, x: Array) -> Array:

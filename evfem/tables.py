@@ -27,7 +27,7 @@ def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
     after = np.searchsorted(place, x, side="right")
     left, right = np.maximum(after - 1, 0), np.minimum(after, len(place) - 1)
     length = np.where(place[right] > place[left], place[right] - place[left], 1.0)
-    return value[left] + (value[right] - value[left]) * np.clip((x - place[left]) / length, 0.0, 1.0)
+    return value[left] + (value[right] - value[left]) * (x - place[left]) / length
 
 
 def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
