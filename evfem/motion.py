@@ -96,16 +96,20 @@ class Hover:
 
 @dataclass(frozen=True)
 class VoltageRamp:
-    """Take the voltage (V) from its present value to `voltage` in `steps` equal parts."""
+    """Take the voltage (V) from its present value to `voltage` in `steps` equal parts.
+
+    `hold` keeps the indentation or the applied force of the moment before.
+    """
 
     voltage: float
     steps: int = 10
+    hold: str = "indentation"
     kind = "voltage"
 
     def __post_init__(self) -> None:
         allowed = "a voltage in V between -1e6 and 1e6"
         voltage = real("voltage", self.voltage, allowed, lambda u: abs(u) <= 1e6)
-        put(self, voltage=voltage, steps=count("steps", self.steps))
+        put(self, voltage=voltage, steps=count("steps", self.steps), hold=choice("hold", self.hold, HOLDS))
 
 
 Motion = Press | Slide | Hover | VoltageRamp
