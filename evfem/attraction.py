@@ -2,6 +2,8 @@ r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their
 
 Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j.
 
+Trial states that penetrate count as touching, g = 0.
+
 - ``vertical`` (the paper): :math:`f_y = -p(g_j) A_j`. Not conservative: moving a neighbour sideways changes A_j without work.
 - ``normal``: minus the derivative of :math:`W = \sum_j \Pi(g_j) A_j`, the Maxwell traction on the deformed outline; its tangent is symmetric.
 
@@ -37,13 +39,13 @@ class Attraction:
         if voltage == 0.0:
             return np.zeros_like(position)
         frame = outline.frame(self.surface, position)
-        length = self.pad.length(position[:, 0])
+        gap = np.maximum(frame.gap, 0.0)
         on = 1.0 if self.air_layer else touching.astype(float)
-        weight = on * self.law.traction(frame.gap, voltage, self.layers) * length
+        weight = on * self.law.traction(gap, voltage, self.layers) * self.pad.length(position[:, 0])
         if self.direction == "vertical":
             return np.stack([np.zeros_like(weight), -weight], axis=1)
         of, moved, value = self.pad.length_gradient(position[:, 0])
-        potential = on * self.law.potential(frame.gap, voltage, self.layers)
+        potential = on * self.law.potential(gap, voltage, self.layers)
         sideways = -np.bincount(moved, potential[of] * value, weight.size)
         return np.stack([sideways + weight * frame.slope, -weight], axis=1)
 
@@ -53,8 +55,9 @@ class Attraction:
         frame = outline.frame(self.surface, position)
         length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
-        p = on * self.law.traction(frame.gap, voltage, self.layers)
-        dp = on * traction_derivative(self.law, frame.gap, voltage, self.layers) * length
+        gap = np.maximum(frame.gap, 0.0)
+        p = on * self.law.traction(gap, voltage, self.layers)
+        dp = on * traction_derivative(self.law, gap, voltage, self.layers) * length
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)
         rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]

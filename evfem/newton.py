@@ -72,6 +72,7 @@ class Record:
     iterations: int = 0
     factorisations: int = 0
     contact_solves: int = 0
+    backend: str = "none"
     residuals: list[float] = field(default_factory=list)
 
 
@@ -105,7 +106,8 @@ class Equilibrium:
         """The undeformed body, translated by `bone`."""
         zero = np.zeros((self.pad.nodes.size, 2))
         u = np.broadcast_to(bone, self.points.shape).copy()
-        return State(u, zero, np.zeros(len(zero), dtype=np.int64), np.array(bone, dtype=float), voltage, zero, np.zeros(2))
+        state = State(u, zero, np.zeros(len(zero), dtype=np.int64), np.array(bone, dtype=float), voltage, zero, np.zeros(2))
+        return replace(state, attraction=self.attraction_at(state, state, voltage))
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2)."""
@@ -120,15 +122,16 @@ class Equilibrium:
 
     # -- one step -------------------------------------------------------------------------------------------------------
 
-    def step(self, old: State, target: Target, frozen: Floats | None = None) -> State:
-        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the current one if given."""
+    def step(self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None) -> State:
+        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the current one if given;
+        iterations begin at `start` (default `old`). Raises `StepFailed`."""
         travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
         self._touching, self._frozen = old.status != OPEN, frozen is not None
         self.choose_candidates(old, 1.2 * travel)
-        state = replace(old, voltage=target.voltage)
+        state = replace(start or old, voltage=target.voltage)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
-            state, balance = self._balance(state, target, frozen)
+            state, balance = self._balance(old, state, target, frozen)
             arrived = target.bone[0] == state.bone[0] and (target.force is not None or target.bone[1] == state.bone[1])
             history.append(balance.residual)
             self.record.residuals = history
@@ -145,24 +148,30 @@ class Equilibrium:
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
 
-    def _balance(self, state: State, target: Target, frozen: Floats | None) -> tuple[State, Balance]:
+    def _balance(self, old: State, state: State, target: Target, frozen: Floats | None) -> tuple[State, Balance]:
         """Out-of-balance forces (n,) of the reduced unknowns, the forces that make them, and their relative size."""
-        attraction = self._attraction(state) if frozen is None else frozen
+        attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
         nodal = self.body.forces(state.u)
         nodal[self.pad.nodes] -= attraction + self.contact_forces(state)
         forces = self.body.reduce(nodal)
         reaction = forces[self.body.bone]
         load = -target.force if target.force is not None else None
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE)
-        free = np.abs(forces[:-2]).max()
+        sums = np.abs(forces[:-2].reshape(-1, 2).sum(axis=0)).max()
+        free = max(np.abs(forces[:-2]).max(), sums)
         if load is not None:
             free = max(free, abs(reaction[1] - load))
         return replace(state, attraction=attraction, reaction=reaction), Balance(forces, float(free / largest), load)
 
-    def _attraction(self, state: State) -> Floats:
+    def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
+        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from `old`, the last converged state."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return self.attraction.forces(self.positions(state.u), state.voltage, self._touching)
+        return self.attraction.forces(self.positions(state.u), voltage, old.status != OPEN)
+
+    def forget(self) -> None:
+        """Drop the factorisation, so that the next iteration starts from a fresh one."""
+        self._factor = None
 
     def _advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells would collapse."""
@@ -226,6 +235,7 @@ class Equilibrium:
         if self._factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             self._factor = make_condensation(self.body.pattern, np.concatenate([unknowns, self.body.bone]), self.threads)
+            self.record.backend = type(self._factor).__name__
         try:
             self._factor.factorise(self.body.tangent(state.u))
         except Singular as error:

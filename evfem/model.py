@@ -1,0 +1,95 @@
+"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction, equilibrium solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem import pad as outline
+from evfem.assembly import check_laws, make_space
+from evfem.attraction import Attraction
+from evfem.body import Body
+from evfem.electrostatics import Layer, Layers
+from evfem.errors import InputError
+from evfem.forms import make_term
+from evfem.mesh import Floats, Mesh
+from evfem.newton import Equilibrium
+from evfem.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical gap at the start."""
+
+    scene: Scene
+    mesh: Mesh
+    body: Body
+    pad: outline.Pad
+    surface: Any
+    attraction: Attraction | None
+    equilibrium: Equilibrium
+    first_gap: float
+
+    def bone(self, position: float, indentation: float) -> Floats:
+        """Translation of the bone (2,) in mm."""
+        return np.array([position, -(indentation + self.first_gap)])
+
+    def indentation(self, bone: Floats) -> float:
+        """Bone travel beyond first touch in mm, negative when hovering."""
+        return float(-bone[1] - self.first_gap)
+
+
+def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
+    """The finger's mesh and the element to use on it."""
+    linear = scene.solver.element in ("q1", "q1_fbar")
+    mesh = scene.finger.mesh(1 if linear else 2)
+    return mesh, scene.solver.element_on(mesh.corners)
+
+
+def make_model(scene: Scene) -> Model:
+    """Build the parts of a scene; raises `InputError` where mesh, names and scene do not fit."""
+    mesh, element = scene_mesh(scene)
+    check_laws(mesh, scene.finger.materials)
+    if "bone" not in mesh.node_sets or not len(mesh.node_sets["bone"]):
+        raise InputError("finger.mesh", "no nodes on `bone`", "point data or a physical group `bone` that holds the finger")
+    space = make_space(mesh, element)
+    pad = outline.make_pad(mesh)
+    surface, first_gap = placed(scene.surface, mesh.points[pad.nodes])
+    attraction = make_attraction(scene, mesh, pad, surface)
+    terms = [make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary") for term in scene.forms]
+    body = Body(space, scene.finger.materials, terms)
+    solver = scene.solver
+    equilibrium = Equilibrium(body, pad, surface, attraction, solver.tolerance, solver.threads)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
+
+
+def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
+    """The surface with its height set (first touch where the scene leaves it open), and g0 in mm."""
+    x, y = outline_points.T
+    gap = float(np.min(y - surface.height(x)))
+    if surface.y is None:
+        return surface.shifted(gap), 0.0
+    g0 = gap - surface.y
+    if g0 < -1e-12 * np.ptp(outline_points, axis=0).max():
+        raise InputError("surface.y", surface.y, f"at most {gap:.9g} mm, where the surface touches the undeformed outline")
+    return surface, max(g0, 0.0)
+
+
+def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) -> Attraction | None:
+    """The attraction, or None without a voltage; the skin's layer is a given number or the local thickness of the mesh."""
+    if scene.law is None:
+        return None
+    electrical = scene.finger.electrical
+    thickness = None if electrical is None else electrical.stratum_corneum_thickness
+    if thickness is None:
+        if electrical is None or "stratum_corneum" not in mesh.region_names:
+            allowed = "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+            raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
+        from evfem.mesh import layer_thickness
+
+        thickness = layer_thickness(mesh, "stratum_corneum", pad.nodes)
+    skin = Layer(np.broadcast_to(thickness, pad.nodes.shape).astype(float), electrical.stratum_corneum_eps_r)
+    layers = Layers.of(skin, surface.insulator)
+    return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer)

@@ -1,0 +1,232 @@
+"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged step out."""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.errors import InputError, NotConverged
+from evfem.ledger import SUMS, Ledger, frame_of
+from evfem.mesh import Floats
+from evfem.model import Model, make_model
+from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.newton import State, StepFailed, Target
+from evfem.result import Frame, Result, Saved, provenance
+from evfem.scene import Scene
+from evfem.signals import VoltageProfile
+from evfem.stepping import Path, Stepper
+
+ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
+
+
+@dataclass(frozen=True)
+class Request:
+    """One requested step: its number in the run, its motion, and the path from the state before to its exact target."""
+
+    step: int
+    motion_index: int
+    kind: str
+    path: Path
+    duration: float
+
+
+def simulate(scene: Scene, *, progress: bool = False, observers: Sequence[Any] = (), resume: Saved | None = None) -> Result:
+    """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how they came about.
+
+    `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)` after every converged step
+    (`frame` is None on steps without fields, `checkpoint()` gives the arrays to resume from) and `finished(result)`. `resume` continues from such
+    arrays and rows. Raises `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
+    """
+    run = Run(scene, resume)
+    total = scene.total_steps
+    _tell(observers, "started", run.model.mesh, scene, total)
+    bar = _progress_bar(progress, total, len(run.rows))
+    try:
+        for request in run.requests():
+            frame = run.advance(request)
+            _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+            bar.update(1)
+    finally:
+        bar.close()
+    result = run.result()
+    _tell(observers, "finished", result)
+    return result
+
+
+class Run:
+    """A scene on its way: the model, the present state, the rows and frames so far."""
+
+    def __init__(self, scene: Scene, resume: Saved | None) -> None:
+        self.scene = scene
+        self.model: Model = make_model(scene)
+        self.ledger = Ledger(self.model)
+        self.stepper = Stepper(self.model.equilibrium, scene.coupling)
+        self.rows: list[dict[str, Any]] = []
+        self.frames: list[Frame] = []
+        self.time = 0.0
+        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0))
+        if resume is not None:
+            self._restore(resume)
+
+    def voltage_at(self, position: float) -> float:
+        """The scene's own voltage when the bone is at `position` (mm)."""
+        voltage = self.scene.voltage
+        return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
+
+    # -- from motions to targets -------------------------------------------------------------------------------------
+
+    def requests(self) -> Iterator[Request]:
+        """The steps still to do; paths start from the state at the time they are asked for."""
+        done, step = len(self.rows), 0
+        for index, motion in enumerate(self.scene.motion):
+            first = step
+            step += motion.steps
+            if step <= done:
+                continue
+            start = self._start_of(first)
+            for k in range(max(done - first, 0) + 1, motion.steps + 1):
+                ends = [self._target(motion, start, (k - 1 + s) / motion.steps) for s in (0.0, 1.0)]
+                yield Request(first + k, index, motion.kind, self._path(*ends), _duration(motion, start, k))
+
+    def _start_of(self, rows_before: int) -> dict[str, float]:
+        """Bone position, indentation, force and voltage at which a motion starts."""
+        if rows_before == 0:
+            return {"position": 0.0, "indentation": 0.0, "applied_force": 0.0, "voltage": self.voltage_at(0.0)}
+        row = self.rows[rows_before - 1]
+        return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+
+    def _target(self, motion: Motion, start: dict[str, float], share: float) -> Target:
+        """The target at `share` (0 to 1) of a motion."""
+
+        def towards(name: str, end: float) -> float:
+            return end if share == 1.0 else start[name] + share * (end - start[name])
+
+        position, indentation, force = start["position"], start["indentation"], None
+        voltage = start["voltage"]
+        if isinstance(motion, Press) and motion.force is not None:
+            force = towards("applied_force", motion.force)
+        elif isinstance(motion, Press) and motion.indentation is not None:
+            indentation = towards("indentation", motion.indentation)
+        elif isinstance(motion, Hover):
+            indentation = towards("indentation", -motion.gap)
+        elif isinstance(motion, Slide):
+            position = towards("position", start["position"] + motion.distance)
+            force = start["applied_force"] if motion.hold == "force" else None
+        elif isinstance(motion, VoltageRamp):
+            voltage = towards("voltage", motion.voltage)
+            force = start["applied_force"] if motion.hold == "force" else None
+        if isinstance(self.scene.voltage, VoltageProfile):
+            voltage = self.voltage_at(position)
+        return Target(self.model.bone(position, indentation), force, voltage)
+
+    def _path(self, start: Target, end: Target) -> Path:
+        """Straight from one target to the next; a voltage profile is followed on the way."""
+
+        def target(share: float) -> Target:
+            if share == 1.0:
+                return end
+            bone = start.bone + share * (end.bone - start.bone)
+            force = None
+            if start.force is not None and end.force is not None:
+                force = start.force + share * (end.force - start.force)
+            voltage = start.voltage + share * (end.voltage - start.voltage)
+            if isinstance(self.scene.voltage, VoltageProfile):
+                voltage = self.voltage_at(float(bone[0]))
+            return Target(bone, force, voltage)
+
+        return target
+
+    # -- one requested step -----------------------------------------------------------------------------------------------
+
+    def advance(self, request: Request) -> Frame | None:
+        """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
+        begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
+        try:
+            self.state, parts = self.stepper.follow(self.state, request.path, self.ledger.accept)
+        except StepFailed as error:
+            advice = f"{error.reason}; {ADVICE}"
+            raise NotConverged(request.step, error.residuals, advice, self.result()) from error
+        self.time += request.duration
+        row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
+        row["substeps"] = parts
+        row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
+        row["seconds"] = clock.perf_counter() - begin
+        self.rows.append(row)
+        if request.step % self.scene.output.every and request.step != self.scene.total_steps:
+            return None
+        self.frames.append(frame_of(self.model, self.state, row))
+        return self.frames[-1]
+
+    def result(self) -> Result:
+        """Everything up to the last converged step."""
+        record = self.model.equilibrium.record
+        solver = {
+            "element": self.model.body.space.element,
+            "unknowns": self.model.body.size,
+            "iterations": record.iterations,
+            "factorisations": record.factorisations,
+            "contact_solves": record.contact_solves,
+            "cuts": self.stepper.cuts,
+            "candidates": int(self.model.equilibrium.candidates.size),
+            "backend": record.backend,
+        }
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver))
+
+    # -- checkpoints --------------------------------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Arrays from which the run can go on after its last converged step."""
+        state = self.state
+        return {
+            "u": state.u,
+            "contact_force": state.contact_force,
+            "status": state.status,
+            "bone": state.bone,
+            "voltage": np.array(state.voltage),
+            "attraction": state.attraction,
+            "reaction": state.reaction,
+            "candidates": self.model.equilibrium.candidates,
+            "part": np.array(self.stepper.part),
+            "time": np.array(self.time),
+            "sums": np.array([self.ledger.sums[name] for name in SUMS]),
+        }
+
+    def _restore(self, saved: Saved) -> None:
+        arrays: dict[str, Floats] = saved.arrays
+        for name, array in self.checkpoint().items():
+            if name not in arrays or (name != "candidates" and arrays[name].shape != np.shape(array)):
+                raise InputError("checkpoint", f"no usable {name}", "a checkpoint of the same scene and version")
+        names = ("u", "contact_force", "status", "bone", "attraction", "reaction")
+        self.state = State(**{name: arrays[name] for name in names}, voltage=float(arrays["voltage"]))
+        self.model.equilibrium.candidates = arrays["candidates"]
+        self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])
+        self.ledger.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+        self.rows = list(saved.rows)
+
+
+def _duration(motion: Motion, start: dict[str, float], k: int) -> float:
+    """Seconds that one step of a motion takes: 0 without a speed."""
+    speed = getattr(motion, "speed", None)
+    if speed is None:
+        return 0.0
+    if isinstance(motion, Slide):
+        return abs(motion.distance) / motion.steps / speed
+    end = motion.indentation if isinstance(motion, Press) and motion.indentation is not None else start["indentation"]
+    return abs(end - start["indentation"]) / motion.steps / speed
+
+
+def _tell(observers: Sequence[Any], event: str, *arguments: Any) -> None:
+    for observer in observers:
+        method: Callable[..., None] | None = getattr(observer, event, None)
+        if method is not None:
+            method(*arguments)
+
+
+def _progress_bar(progress: bool, total: int, done: int) -> Any:
+    from tqdm.auto import tqdm
+
+    return tqdm(total=total, initial=done, unit="step", disable=not progress)
