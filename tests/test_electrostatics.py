@@ -1,0 +1,155 @@
+"""Force laws: the printed formulas, their limits, the potential behind them, and what they refuse."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.constants import epsilon_0
+
+from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0, traction_derivative
+from evfem.errors import InputError
+
+LAWS = [StrongTroxel(), Kaczmarek(), StrongTroxel(gap_eps_r=2.5), Kaczmarek(gap_eps_r=2.5)]
+TABLE_2 = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+GAPS = np.array([0.0, 1e-6, 1e-3, 0.25, 0.5, 10.0])
+
+
+def printed(law, gap, voltage, skin, film):
+    """Equations (6) and (7) per area, written as they are printed."""
+    ea = law.gap_eps_r
+    series = skin.thickness / skin.eps_r + gap / ea + film.thickness / film.eps_r
+    if isinstance(law, StrongTroxel):
+        return epsilon_0 * voltage**2 / (2 * ea * series**2)
+    return epsilon_0 * voltage**2 / (2 * series * (skin.thickness + gap + film.thickness))
+
+
+def test_stack_adds_up_layers():
+    assert TABLE_2.thickness == pytest.approx(0.47, rel=1e-15, abs=0)
+    assert TABLE_2.reduced == pytest.approx(0.38 / 1650.0 + 0.09 / 3.35, rel=1e-15, abs=0)
+    local = Layers.of(Layer(np.array([0.3, 0.4]), 1650.0), Layer(0.09, 3.35))
+    np.testing.assert_allclose(local.thickness, [0.39, 0.49], rtol=1e-15)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_traction_is_the_printed_equation(law):
+    skin, film = Layer(0.38, 1650.0), Layer(0.09, 3.35)
+    expected = printed(law, GAPS, 1414.0, skin, film)
+    np.testing.assert_allclose(law.traction(GAPS, 1414.0, TABLE_2), expected, rtol=1e-14)
+
+
+def test_contact_pressures_at_2000_volts():
+    # DESIGN and issue text: 24.1 kPa against 1.39 kPa
+    assert StrongTroxel().traction(0.0, 2000.0, TABLE_2) == pytest.approx(24.12e-3, abs=0.005e-3)
+    assert Kaczmarek().traction(0.0, 2000.0, TABLE_2) == pytest.approx(1.391e-3, abs=0.0005e-3)
+
+
+def test_both_laws_are_one_where_only_the_gap_insulates():
+    # no solid layers: (6) = (7) = (2) with d = gap, eps = that of the gap
+    for e in (1.0, 2.5):
+        expected = eps_0 * e * 100.0**2 / (2 * 0.2**2)
+        for law in (StrongTroxel(e), Kaczmarek(e)):
+            assert law.traction(0.2, 100.0, Layers.of()) == pytest.approx(expected, rel=1e-14, abs=0)
+
+
+def test_kaczmarek_of_equal_dielectrics_is_one_dielectric():
+    # what Kaczmarek et al. ask for: equal permittivities give (2) with d = total thickness; (3) gives (4)
+    layers = Layers.of(Layer(0.1, 4.0), Layer(0.2, 4.0))
+    single = eps_0 * 4.0 * 100.0**2 / (2 * 0.3**2)
+    assert Kaczmarek().traction(0.0, 100.0, layers) == pytest.approx(single, rel=1e-14, abs=0)
+    assert StrongTroxel().traction(0.0, 100.0, layers) == pytest.approx(4.0 * single, rel=1e-14, abs=0)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_attraction_is_the_derivative_of_the_potential(law):
+    step = 1e-30
+    for layers in (TABLE_2, Layers(0.3, 0.3), Layers(0.3, 0.3 + 1e-9), Layers(0.3, 0.2), Layers(1e-6, 2.0)):
+        slope = law.potential(GAPS + 1j * step, 700.0, layers).imag / step
+        np.testing.assert_allclose(slope, law.traction(GAPS, 700.0, layers), rtol=1e-13)
+        # an independent check without complex numbers: sixth-order central difference
+        h = 1e-3 * (GAPS + law.gap_eps_r * layers.reduced)
+        weights = {1: 45.0, 2: -9.0, 3: 1.0}
+        pairs = (
+            w * (law.potential(GAPS + k * h, 700.0, layers) - law.potential(GAPS - k * h, 700.0, layers))
+            for k, w in weights.items()
+        )
+        np.testing.assert_allclose(sum(pairs) / (60 * h), law.traction(GAPS, 700.0, layers), rtol=1e-8)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_hand_written_derivative_is_the_complex_step(law):
+    class Bare:
+        traction = staticmethod(law.traction)
+
+    by_hand = traction_derivative(law, GAPS, 1e3, TABLE_2)
+    np.testing.assert_allclose(by_hand, traction_derivative(Bare(), GAPS, 1e3, TABLE_2), rtol=1e-14)
+    assert (by_hand < 0).all()
+
+
+def test_potential_is_smooth_where_thickness_meets_reduced_thickness():
+    # series and logarithm meet at D - s = 1e-3 (g + s); ln(1 + r) / r in 40 decimal digits
+    reference = {
+        1e-12: 0.9999999999995,
+        1e-3: 0.9995003330835332,
+        1e-2: 0.9950330853168083,
+        -0.5: 1.3862943611198906,
+    }
+    for ratio, expected in reference.items():
+        layers = Layers(1.0, 1.0 + ratio)
+        value = Kaczmarek().potential(0.0, 1.0, layers) / (-0.5 * eps_0)
+        assert value == pytest.approx(expected, rel=1e-14, abs=0)
+    same = Layers(0.3, 0.3)
+    assert Kaczmarek().potential(0.1, 50.0, same) == pytest.approx(
+        StrongTroxel().potential(0.1, 50.0, same), rel=1e-15
+    )
+
+
+def test_law_without_complex_numbers_is_differenced():
+    class Blunt:
+        def traction(self, gap, voltage, layers):
+            return StrongTroxel().traction(np.abs(gap), voltage, layers)
+
+    gap = np.array([0.1, 0.3])
+    expected = StrongTroxel().traction_derivative(gap, 500.0, TABLE_2)
+    np.testing.assert_allclose(traction_derivative(Blunt(), gap, 500.0, TABLE_2), expected, rtol=1e-7)
+
+    class Constant:
+        def traction(self, gap, voltage, layers):
+            return 2e-3
+
+    assert traction_derivative(Constant(), 0.1, 500.0, TABLE_2) == 0.0
+
+
+def test_scalars_give_floats_and_arrays_broadcast():
+    for law in LAWS:
+        for method in (law.traction, law.traction_derivative, law.potential):
+            assert type(method(0.1, 100.0, TABLE_2)) is float
+            assert method(GAPS[:, None], np.array([1.0, 2.0]), TABLE_2).shape == (6, 2)
+
+
+def test_impossible_input_is_refused_with_a_sentence():
+    with pytest.raises(InputError, match=r"layer thickness: given -0\.1"):
+        Layer(-0.1, 3.0)
+    with pytest.raises(InputError, match="permittivity of at least 1"):
+        Layer(0.1, 0.0)
+    with pytest.raises(InputError, match="finite length"):
+        Layer(np.array([0.1, np.nan]), 3.0)
+    with pytest.raises(InputError, match="finite length"):
+        Layer("thin", 3.0)
+    for law in LAWS:
+        with pytest.raises(InputError, match="pressure would be infinite"):
+            law.traction(0.0, 100.0, Layers.of())
+        with pytest.raises(InputError, match="pressure would be infinite"):
+            law.traction(np.array([0.1, -1.0]), 100.0, TABLE_2)
+    with pytest.raises(InputError, match="gap_eps_r"):
+        StrongTroxel(gap_eps_r=0.5)
+
+
+def test_importing_the_formulas_stays_light():
+    heavy = ("skfem", "matplotlib", "scipy.integrate", "scipy.optimize", "meshio", "numba")
+    code = (
+        "import sys, evfem.electrostatics, evfem.forces, evfem.encoding, evfem.signals, evfem.data; "
+        f"print([m for m in {heavy!r} if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -1,0 +1,175 @@
+"""Rendering in closed form: the paper's voltages, areas and ranges as recomputed, and the fits."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evfem import data
+from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.encoding import (
+    AreaLaw,
+    Encoding,
+    fit_area_to_friction,
+    fit_power,
+    required_attraction,
+    share_not_renderable,
+)
+from evfem.errors import InputError
+from evfem.forces import plate_force
+
+FILM = Layer(0.09, 3.35)
+LAWS = [StrongTroxel(), Kaczmarek()]
+
+
+def display(d_sc=0.20, law=None, friction=0.5):
+    return Encoding(law or Kaczmarek(), Layers.of(Layer(d_sc, 1650.0), FILM), AreaLaw(112.0), friction)
+
+
+def test_voltage_of_the_friction_step():
+    # notes, 3.3.1: 1776.73 V with 0.20 mm of stratum corneum, 2266.5 V with Table 2's 0.38 mm
+    assert round(display().voltage_for_friction(0.6), 2) == 1776.73
+    assert round(display(0.38).voltage_for_friction(0.6), 1) == 2266.5
+
+
+def test_voltage_of_the_captured_instant():
+    # notes, 3.3.2: 1911.12 V is mu_rs / mu_hd = 1.2314, that is 0.0887 over 0.072
+    ratio = 1.0 + display().attraction(1.0, 1911.12)
+    assert round(ratio, 4) == 1.2314
+    assert round(0.072 * ratio, 4) == 0.0887
+    assert display(friction=0.072).voltage_for_friction(0.072 * ratio) == pytest.approx(1911.12, rel=1e-12)
+
+
+def test_normal_force_cancels_only_with_a_linear_area_law():
+    forces = np.array([0.01, 0.2, 1.0])
+    linear = display().voltage_for_friction(0.6, forces)
+    np.testing.assert_allclose(linear, linear[0], rtol=1e-14)
+    curved = Encoding(Kaczmarek(), display().layers, AreaLaw(63.0, 0.68), 0.5).voltage_for_friction(
+        0.6, forces
+    )
+    # (19): U ~ F^((1 - m)/2)
+    np.testing.assert_allclose(curved / curved[2], forces**0.16, rtol=1e-13)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_rendering_and_encoding_are_inverse(law):
+    wanted = np.linspace(0.5, 1.4, 7)
+    for area in (AreaLaw(112.0), AreaLaw(107.626, 0.52)):
+        device = Encoding(law, display().layers, area, friction=0.5)
+        voltage = device.voltage_for_friction(wanted, normal_force=0.3)
+        np.testing.assert_allclose(device.tangential_force(0.3, voltage), wanted * 0.3, rtol=1e-13)
+
+
+def test_attraction_reaches_a_quarter_newton():
+    # notes, Fig. 6: with (16a)'s k and m, F_e = 0.25 N at F_n = 0.69 N and 140 V
+    fit = data.load("area_laws")
+    layers = Layers.of(Layer(0.1, 1650.0), Layer(0.001, 3.35))
+    k, m = fit.value("kaczmarek", "k"), fit.value("kaczmarek", "m")
+    force = np.linspace(0.6, 0.8, 2001)
+    reached = force[
+        np.argmax(Encoding(Kaczmarek(), layers, AreaLaw(k, m), 0.3).attraction(force, 140.0) >= 0.25)
+    ]
+    assert round(reached, 2) == 0.69
+    # the two k are in the inverse ratio of the contact pressures, 0.003556
+    ratio = StrongTroxel().traction(0.0, 1.0, layers) / Kaczmarek().traction(0.0, 1.0, layers)
+    assert round(1.0 / ratio, 6) == 0.003556
+    assert k / fit.value("strong_troxel", "k") == pytest.approx(ratio, rel=1e-3)  # three printed digits
+
+
+def test_ranges_of_figures_7_and_8():
+    # notes: (5) 0.036-0.360 N, (3) 6.0-602 N; Fig. 8 by (5) 0.24 ... 0.029 N at 140 V
+    sc, film = np.meshgrid(np.logspace(3, 4, 11), np.linspace(1.0, 10.0, 11))
+    layers = Layers.of(Layer(0.2, sc), Layer(0.001, film))
+    kaczmarek, troxel = (plate_force(law, 100.0, 0.0, 140.0, layers) for law in (Kaczmarek(), StrongTroxel()))
+    assert (round(kaczmarek.min(), 3), round(kaczmarek.max(), 3)) == (0.036, 0.360)
+    assert (round(troxel.min(), 1), int(troxel.max())) == (6.0, 602)  # 602.6
+    skin = Layers.of(Layer(np.array([0.1, 0.5]), 1650.0), Layer(0.001, 3.35))
+    force = plate_force(Kaczmarek(), 100.0, 0.0, 140.0, skin)
+    assert [round(force[0], 2), round(force[1], 3)] == [0.24, 0.029]
+    # Table 2's insulator instead: about 1 mN
+    thick = plate_force(Kaczmarek(), 100.0, 0.0, 140.0, Layers.of(Layer(0.1, 1650.0), FILM))
+    assert thick == pytest.approx(1.7e-3, rel=0.05)
+
+
+def test_slippery_surfaces_cannot_be_rendered():
+    assert required_attraction(0.4, 0.5, 1.0) == 0.0
+    assert display().voltage_for_friction(np.array([0.4, 0.5, 0.6]))[:2].tolist() == [0.0, 0.0]
+    # below 0.5 from 0 to 1 mm (rising through it at 1) and at the constant 0.4 from 3 to 4
+    share = share_not_renderable([0.0, 2.0, 3.0, 3.0, 4.0], [0.4, 0.6, 0.6, 0.4, 0.4], 0.5)
+    assert share == pytest.approx(2.0 / 4.0, rel=1e-14)
+    assert share_not_renderable([0.0, 1.0], [0.5, 0.5], 0.5) == 0.0
+    with pytest.raises(InputError, match="do not fall"):
+        share_not_renderable([1.0, 0.0], [0.5, 0.5], 0.5)
+
+
+@settings(max_examples=25, deadline=None)
+@given(k=st.floats(0.1, 500.0), m=st.floats(-1.5, 1.5))
+def test_fits_recover_exact_power_laws(k, m):
+    x = np.linspace(0.1, 1.0, 10)
+    for relative in (True, False):
+        fit = fit_power(x, k * x**m, relative=relative)
+        assert fit.k == pytest.approx(k, rel=1e-7)
+        assert fit.m == pytest.approx(m, abs=1e-7)
+        assert fit.k_error < 1e-6 * k
+
+
+@pytest.mark.parametrize("relative", [True, False])
+def test_standard_errors_are_the_scatter_of_repeated_fits(relative):
+    random = np.random.default_rng(7)
+    x = np.linspace(0.1, 1.0, 20)
+    exact = 63.0 * x**0.68
+    fits = []
+    for _ in range(300):
+        noise = random.normal(size=x.size)
+        fits.append(
+            fit_power(x, exact * np.exp(0.05 * noise) if relative else exact + noise, relative=relative)
+        )
+    for name, true in (("k", 63.0), ("m", 0.68)):
+        found = np.array([getattr(f, name) for f in fits])
+        stated = np.array([getattr(f, f"{name}_error") for f in fits])
+        # 300 repetitions know a deviation to 1 / sqrt(600) = 4 %: three of these
+        assert np.std(found) == pytest.approx(np.sqrt(np.mean(stated**2)), rel=0.13)
+        assert abs(found.mean() - true) < 4.0 * stated.mean() / np.sqrt(300)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_area_law_behind_measured_friction(law):
+    layers = Layers.of(Layer(0.1, 1650.0), Layer(0.001, 3.35))
+    device = Encoding(law, layers, AreaLaw(80.0, 0.489), friction=0.3)
+    force = np.linspace(0.1, 1.0, 9)
+    fit = fit_area_to_friction(force, device.tangential_force(force, 140.0), 140.0, device)
+    assert (fit.k, fit.m) == (pytest.approx(80.0, rel=1e-7), pytest.approx(0.489, rel=1e-7))
+    assert fit_power([1.0, 2.0], [3.0, 5.0]).k_error == np.inf
+
+
+def test_line_closest_to_an_area_law():
+    # design notes: Adams' ridge law up to 0.2 N gives 111-118 mm2/N, the paper's k' = 112
+    law = AreaLaw(63.0, 0.68)
+    force = np.linspace(0.0, 0.2, 100_001)
+    expected = np.sum(force * law(force)) / np.sum(force**2)
+    assert law.linearised(0.2).k == pytest.approx(expected, rel=1e-4)
+    assert law.linearised(0.2).m == 1.0
+
+
+def test_scalars_give_floats_and_impossible_input_is_refused():
+    assert type(display().voltage_for_friction(0.6)) is float
+    assert type(display().tangential_force(0.6, 100.0)) is float
+    assert display().tangential_force(np.ones(3), 100.0).shape == (3,)
+    for wrong, says in (
+        (lambda: AreaLaw(-1.0), "k: given"),
+        (lambda: display(friction=0.0), "friction: given"),
+        (lambda: display().voltage_for_friction(-0.1), "not negative"),
+        (lambda: display().voltage_for_attraction(1.0, 0.0), "above zero"),
+        (lambda: fit_power([1.0, 1.0], [1.0, 2.0]), "two different x"),
+        (lambda: fit_power([1.0, 2.0], [1.0, -2.0]), "above zero"),
+        (lambda: Encoding(Kaczmarek(), Layers.of(), AreaLaw(1.0), 0.5), "infinite"),
+    ):
+        with pytest.raises(InputError, match=says):
+            wrong()
+
+    class Linear:
+        def traction(self, gap, voltage, layers):
+            return 1e-3 * voltage
+
+    with pytest.raises(InputError, match="square of the voltage"):
+        display(law=Linear())
