@@ -193,11 +193,13 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
     edges = mesh.cells[:, np.array(columns).T].reshape(-1, len(columns))
     owner = np.repeat(mesh.region, m)
     ends = np.sort(edges[:, :2], axis=1)
-    _, number, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    _, first, number, count = np.unique(
+        ends, axis=0, return_index=True, return_inverse=True, return_counts=True
+    )
     number = number.ravel()
     low, high = np.full(len(count), np.inf), np.full(len(count), -np.inf)
     np.minimum.at(low, number, owner)
     np.maximum.at(high, number, owner)
-    border = edges[((count == 1) | (low < high))[number]]
+    border = edges[first[(count == 1) | (low < high)]]
     order = [0, 2, 1] if mesh.order == 2 else [0, 1]
     ax.add_collection(LineCollection(list(points[border[:, order]]), colors="0.2", linewidths=0.4))

@@ -1,0 +1,278 @@
+"""Scenes hold what they were given, refuse what does not fit together, and have a stable fingerprint."""
+
+import subprocess
+import sys
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+
+from evfem.digest import digest
+from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
+from evfem.errors import InputError
+from evfem.fingerpad import FingerPad
+from evfem.scene import (
+    Boundary,
+    Hover,
+    Output,
+    Press,
+    Region,
+    Scene,
+    Slide,
+    Solver,
+    VoltageRamp,
+    default_scene,
+    form,
+)
+from evfem.signals import VoltageProfile
+from evfem.surfaces import Display, Flat
+
+FINGER = FingerPad()
+PRESS = Press(force=0.05)
+PROFILE = VoltageProfile([0.0, 1.0], [0.0, 100.0])
+
+
+def plain(**changes):
+    """A scene without voltage."""
+    return Scene(FINGER, **({"surface": Flat(), "motion": [PRESS]} | changes))
+
+
+def charged(**changes):
+    """A scene with a law and a voltage."""
+    parts = {"surface": Display(), "law": Kaczmarek(), "voltage": 1000.0, "motion": [PRESS]}
+    return Scene(FINGER, **(parts | changes))
+
+
+class Bent:
+    """A user's law."""
+
+    def traction(self, gap, voltage, layers):
+        return 1e-12 * voltage**2 / (gap + layers.reduced)
+
+
+@form
+def spring(u, v, w):
+    return 2.0e-2 * u * v
+
+
+def test_the_default_scene_is_that_of_the_ten_lines():
+    scene = default_scene()
+    assert scene.motion == (Press(force=0.05, steps=10), Slide(distance=5.0, steps=100))
+    assert (scene.voltage, scene.surface.insulator, scene.surface.friction) == (
+        1000.0,
+        Layer(0.09, 3.35),
+        0.3,
+    )
+    assert (scene.air_layer, scene.direction, scene.coupling) == (True, "vertical", "monolithic")
+    assert scene.solver == Solver()
+    assert scene.total_steps == 110
+    assert scene.finger.resolution == "medium"
+
+
+def test_scenes_and_their_parts_are_frozen():
+    for part in (plain(), PRESS, Slide(1.0), Solver(), Output(), Hover(1.0), VoltageRamp(1.0)):
+        with pytest.raises(FrozenInstanceError):
+            part.steps = 3
+
+
+def test_motion_may_be_one_motion_or_any_iterable():
+    assert plain(motion=PRESS).motion == plain(motion=iter([PRESS])).motion == (PRESS,)
+
+
+def test_numbers_of_numpy_are_taken_and_become_plain():
+    press = Press(indentation=np.float64(1.5), steps=np.int64(4))
+    assert (press.indentation, type(press.indentation), type(press.steps)) == (1.5, float, int)
+
+
+def test_whole_numbers_become_floats():
+    assert repr(Press(force=1).force) == "1.0"
+
+
+WRONG_PARTS = [
+    (lambda: Press(), "force"),
+    (lambda: Press(force=0.1, indentation=1.0), "force"),
+    (lambda: Press(force=-0.1), "force"),
+    (lambda: Press(force=float("nan")), "force"),
+    (lambda: Press(force="0.1"), "force"),
+    (lambda: Press(force=True), "force"),
+    (lambda: Press(force=0.1, speed=1.0), "speed"),
+    (lambda: Press(indentation=float("inf")), "indentation"),
+    (lambda: Press(indentation=1.0, steps=0), "steps"),
+    (lambda: Press(indentation=1.0, steps=2.0), "steps"),
+    (lambda: Press(indentation=1.0, steps=True), "steps"),
+    (lambda: Press(indentation=1.0, speed=0.0), "speed"),
+    (lambda: Slide(distance=0.0), "distance"),
+    (lambda: Slide(distance=1.0, hold="Force"), "hold"),
+    (lambda: Slide(distance=1.0, speed=-1.0), "speed"),
+    (lambda: Hover(gap=-0.1), "gap"),
+    (lambda: VoltageRamp(voltage=float("inf")), "voltage"),
+    (lambda: Solver(element="q3"), "element"),
+    (lambda: Solver(dynamics="dynamic"), "dynamics"),
+    (lambda: Solver(contact="soft"), "contact"),
+    (lambda: Solver(penalty_normal=10.0), "penalty_normal"),
+    (lambda: Solver(contact="penalty"), "penalty_normal"),
+    (lambda: Solver(contact="penalty", penalty_normal=0.0), "penalty_normal"),
+    (lambda: Solver(tolerance=0.0), "tolerance"),
+    (lambda: Solver(tolerance=0.1), "tolerance"),
+    (lambda: Solver(threads=0), "threads"),
+    (lambda: Output(every=0), "every"),
+]
+
+
+@pytest.mark.parametrize(("make", "key"), WRONG_PARTS)
+def test_parts_refuse_what_is_out_of_range(make, key):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.key == key
+
+
+INERTIAL = Solver(dynamics="inertial")
+PENALTY = Solver(contact="penalty", penalty_normal=10.0)
+WRONG_SCENES = [
+    (lambda: Scene(None, Flat(), motion=[PRESS]), "finger"),
+    (lambda: plain(surface=Kaczmarek()), "surface"),
+    (lambda: plain(motion=[]), "motion"),
+    (lambda: plain(motion=[PRESS, "slide"]), "motion[1]"),
+    (lambda: plain(voltage=100.0), "electrostatics.law"),
+    (lambda: plain(voltage=PROFILE), "electrostatics.law"),
+    (lambda: plain(law=Kaczmarek()), "surface.insulator"),
+    (lambda: plain(motion=[PRESS, VoltageRamp(10.0)]), "motion[1]"),
+    (lambda: plain(motion=[Press(force=0.0)]), "motion[0].force"),
+    (lambda: charged(law=Kaczmarek), "electrostatics.law"),
+    (lambda: charged(law="kaczmarek"), "electrostatics.law"),
+    (lambda: charged(voltage=float("nan")), "electrostatics.voltage"),
+    (lambda: charged(voltage=PROFILE, motion=[PRESS, VoltageRamp(10.0)]), "motion[1]"),
+    (lambda: charged(direction="up"), "electrostatics.direction"),
+    (lambda: charged(coupling="weak"), "electrostatics.coupling"),
+    (lambda: charged(air_layer=1), "electrostatics.air_layer"),
+    (lambda: plain(motion=[Slide(1.0, hold="force")]), "motion[0].hold"),
+    (lambda: plain(motion=[PRESS, Hover(1.0), Slide(1.0, hold="force")]), "motion[2].hold"),
+    (lambda: plain(solver=INERTIAL, motion=[PRESS, Slide(1.0)]), "motion[1].speed"),
+    (lambda: plain(solver=Solver(dynamics="viscous")), "finger.viscosity"),
+    (lambda: plain(solver=PENALTY), "solver.penalty_tangential"),
+    (lambda: plain(solver={"element": "q1"}), "solver"),
+    (lambda: plain(output=3), "output"),
+    (lambda: plain(name="a/b"), "name"),
+    (lambda: plain(forms=(spring,)), "forms"),
+]
+
+
+@pytest.mark.parametrize(("make", "key"), WRONG_SCENES)
+def test_scenes_refuse_what_does_not_fit_together(make, key):
+    with pytest.raises(InputError) as caught:
+        make()
+    assert caught.value.key == key
+
+
+def test_scenes_take_what_fits_together():
+    charged(motion=[PRESS, VoltageRamp(10.0), Slide(1.0, hold="force"), Hover(1.0)])
+    charged(motion=[Press(force=0.0)], law=Bent())
+    charged(voltage=PROFILE, motion=[PRESS, Slide(1.0)])
+    plain(solver=INERTIAL, motion=[PRESS, Slide(1.0, speed=10.0)])
+    Scene(FingerPad(viscosity=1e-3), Flat(), motion=[PRESS], solver=Solver(dynamics="viscous"))
+    plain(solver=PENALTY, surface=Flat(friction=0.0))
+    plain(solver=replace(PENALTY, penalty_tangential=1.0))
+
+
+def test_elements_follow_the_cells_of_the_mesh():
+    assert Solver().element_on(4) == "q2p1"
+    assert Solver().element_on(3) == Solver(element="p2").element_on(3) == "p2"
+    assert [Solver(element=e).element_on(4) for e in ("q1", "q1_fbar", "q2", "q2p1")] == [
+        "q1",
+        "q1_fbar",
+        "q2",
+        "q2p1",
+    ]
+    for element, corners in (("p2", 4), ("q1", 3), ("q2p1", 3)):
+        with pytest.raises(InputError, match=r"solver\.element"):
+            Solver(element=element).element_on(corners)
+
+
+def test_a_term_is_added_to_a_copy():
+    scene = plain()
+    more = scene.with_term(spring, on=Boundary("nail")).with_term(spring, on=Region("dermis"))
+    assert scene.forms == ()
+    assert [(term.form.name, term.on) for term in more.forms] == [
+        ("spring", Boundary("nail")),
+        ("spring", Region("dermis")),
+    ]
+    assert spring(2.0, 3.0, None) == pytest.approx(0.12)
+    with pytest.raises(InputError, match=r"@evfem\.form"):
+        scene.with_term(lambda u, v, w: u, on=Boundary("nail"))
+    with pytest.raises(InputError, match="Boundary"):
+        scene.with_term(spring, on="nail")
+
+
+def test_the_fingerprint_follows_the_content_and_not_the_name():
+    assert plain().digest() == plain(name="other").digest() == plain(motion=(PRESS,)).digest()
+    scenes = [
+        plain(),
+        plain(motion=[Press(force=0.06)]),
+        plain(motion=[Press(force=0.05, steps=11)]),
+        plain(motion=[PRESS, PRESS]),
+        plain(surface=Flat(friction=0.2)),
+        plain(surface=Flat(friction=[[0.0, 0.3], [1.0, 0.2]])),
+        plain(solver=Solver(tolerance=1e-9)),
+        plain(output=Output(every=2)),
+        plain().with_term(spring, on=Boundary("nail")),
+        plain().with_term(spring, on=Boundary("bone")),
+        charged(),
+        charged(law=StrongTroxel()),
+        charged(law=Bent()),
+        charged(voltage=PROFILE),
+        charged(voltage=VoltageProfile([0.0, 1.0], [0.0, 101.0])),
+        Scene(FingerPad(width=16.0), Flat(), motion=[PRESS]),
+    ]
+    assert len({scene.digest() for scene in scenes}) == len(scenes)
+
+
+def test_the_fingerprint_of_user_code_follows_the_code():
+    def make(factor):
+        def traction(gap, voltage, layers):
+            return factor * voltage**2
+
+        return traction
+
+    def other(gap, voltage, layers):
+        return 2.0 * voltage**3
+
+    assert digest(make(2.0)) == digest(make(2.0)) != digest(make(3.0))
+    assert digest(other) != digest(make(2.0))
+
+
+def test_the_fingerprint_is_the_same_in_another_process():
+    code = (
+        f"import sys; sys.path[:0] = {sys.path!r}\nfrom evfem.scene import *\nprint(default_scene().digest())"
+    )
+    seeds = [
+        subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={"PYTHONHASHSEED": s},
+        )
+        for s in "12"
+    ]
+    assert {done.stdout.strip() for done in seeds} == {default_scene().digest()}
+
+
+def test_the_fingerprint_of_a_path_is_that_of_the_file(tmp_path):
+    (tmp_path / "a").write_text("one")
+    (tmp_path / "b").write_text("one")
+    assert digest(tmp_path / "a") == digest(tmp_path / "b")
+    (tmp_path / "b").write_text("two")
+    assert digest(tmp_path / "a") != digest(tmp_path / "b")
+
+
+def test_arrays_count_by_content_shape_and_kind():
+    a = np.arange(6.0)
+    assert digest(a) == digest(np.arange(6.0)) == digest(np.arange(12.0)[::2] / 2)
+    assert len({digest(x) for x in (a, a.reshape(2, 3), a.astype(int), a + 1e-15)}) == 4
+    assert digest(np.bool_(True)) == digest(True) != digest(1.0)
+
+
+def test_an_object_that_contains_itself_has_a_fingerprint():
+    law = Bent()
+    law.me = law
+    assert len(digest(law)) == 64
