@@ -5,19 +5,17 @@ The laws need the effective voltage across skin and insulator. Units: V, mm (of 
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from evfem.errors import InputError
 from evfem.storage import write_text
-from evfem.values import Values, above, finite, plain
+from evfem.tables import numbers, piecewise_linear, read_columns
+from evfem.values import Values, above, plain
 
-Floats = npt.NDArray[np.float64]
 #: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
 APPLIED_TO_EFFECTIVE = 2.0
 HEADER = ["position", "voltage"]
@@ -39,8 +37,8 @@ class VoltageProfile:
     voltage: Any
 
     def __post_init__(self) -> None:
-        position = _column("position", self.position)
-        voltage = _column("voltage", self.voltage)
+        position = numbers("position", self.position, "a list of positions in mm")
+        voltage = numbers("voltage", self.voltage, "a list of voltages in V")
         if position.size == 0 or position.size != voltage.size:
             sizes = f"{position.size} positions and {voltage.size} voltages"
             raise InputError("voltage profile", sizes, "equally many positions and voltages, at least one")
@@ -54,7 +52,7 @@ class VoltageProfile:
 
     def __call__(self, position: Values) -> Values:
         """Voltage in V at `position` in mm."""
-        return plain(np.interp(position, self.position, self.voltage))
+        return plain(piecewise_linear(self.position, self.voltage, position))
 
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
@@ -62,7 +60,7 @@ class VoltageProfile:
 
         Raises InputError for a missing file, another header, or a row that is not two numbers.
         """
-        return cls(*_read_columns(Path(path)))
+        return cls(*read_columns(Path(path), HEADER, "voltage_file"))
 
     def to_csv(self, path: str | Path) -> None:
         """Write the file that `from_csv` reads back to the last bit."""
@@ -95,32 +93,6 @@ class VoltageProfile:
         if rise.size == 0:
             return 0.0
         return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
-
-
-def _column(key: str, given: Values) -> Floats:
-    values = np.atleast_1d(finite(key, given, "a list of finite numbers"))
-    if values.ndim != 1 or np.iscomplexobj(values):
-        raise InputError(key, f"an array of shape {values.shape}", "a list of finite real numbers")
-    return np.array(values, dtype=float)
-
-
-def _read_columns(path: Path) -> tuple[list[float], list[float]]:
-    allowed = "a csv file with the header position,voltage"
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            rows = [row for row in csv.reader(file) if row]
-    except OSError as error:
-        raise InputError("voltage_file", f"{path} ({error.strerror})", allowed) from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise InputError("voltage_file", f"{path}, which is no text table", allowed) from error
-    if not rows or [name.strip() for name in rows[0]] != HEADER:
-        found = ",".join(rows[0]) if rows else "nothing"
-        raise InputError("voltage_file", f"{path} that starts with {found}", allowed)
-    try:
-        pairs = [(float(x), float(u)) for x, u in rows[1:]]
-    except ValueError as error:
-        raise InputError("voltage_file", f"{path}: {error}", "two numbers in every row") from error
-    return [x for x, _ in pairs], [u for _, u in pairs]
 
 
 def carrier_amplitude(effective: Values) -> Values:
