@@ -260,6 +260,7 @@ class Scene:
 def _check_parts(scene: Scene) -> None:
     if not isinstance(scene.finger, Finger):
         raise InputError("finger", scene.finger, "a FingerPad or a MeshedFinger")
+    real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
     if not isinstance(scene.surface, Surface):
         raise InputError("surface", scene.surface, "Flat, Display, Sinusoid or Profile")
     if not isinstance(scene.solver, Solver):

@@ -72,7 +72,8 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     except (ValueError, RecursionError) as error:
         raise InputError("scene", f"no valid TOML: {error}", "a scene in TOML") from error
     if tables.get("version") != VERSION or isinstance(tables["version"], bool):
-        raise InputError("version", tables.get("version", "nothing"), f"version = {VERSION}")
+        given = shown(tables["version"]) if "version" in tables else "nothing"
+        raise InputError("version", given, f"version = {VERSION}")
     top = parse(SceneTable, tables, "")
     folder = Path(folder)
     table = top.electrostatics
@@ -136,7 +137,7 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
     with at("surface"):
         if kind == "flat":
-            return Flat(**common)
+            return Flat(**common) if insulator is None else Display(**common)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
         if (parsed.file is None) == (parsed.points is None):
@@ -229,7 +230,8 @@ def _materials(tables: object) -> dict[str, Any]:
 def dump(scene: Scene) -> str:
     """The scene as TOML; `loads` makes an equal scene of it.
 
-    Raises InputError for what a file cannot hold: a mesh object, a law or a weak form of the user's own.
+    An insulator without a law has no effect and no place in a file. Raises InputError for what a file cannot
+    hold: a mesh object, a law or a weak form of the user's own.
     """
     if scene.forms:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
