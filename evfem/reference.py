@@ -116,8 +116,8 @@ class BondedLayer:
     """A rigid cylinder of `radius` on an elastic layer of `thickness` (mm), bonded to a rigid base below.
 
     No friction between cylinder and layer, small strain. The contact is 2 `half_width` (mm) wide; E (MPa) and
-    nu are the layer's. A pressure of wave number k on the layer moves its surface by 2 M(kh) / (E* k) times its
-    amplitude, with kappa = 3 - 4 nu and
+    nu are the layer's. A pressure of wave number k on the layer moves its surface by 2 M(kh) / (E* k) times
+    its amplitude, with kappa = 3 - 4 nu and
 
         M(s) = (2 kappa sinh 2s - 4 s) / (2 kappa cosh 2s + 1 + kappa^2 + 4 s^2).
 
