@@ -1,8 +1,7 @@
 r"""The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
 
 The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free nodes' displacements, bone x, bone y);
-forces of the bone's nodes add up to the reaction. With time steps the internal forces contain the objective Kelvin-Voigt stress
-:math:`S_v = 2\eta\,\Delta E/\Delta t`, :math:`\eta = \tau\mu`, and inertia :math:`M(v - v_0)/\Delta t`, both by backward Euler.
+forces of the bone's nodes add up to the reaction. User forms (`evfem.forms`) and time (`evfem.dynamics`) are further terms of the internal forces.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from evfem.assembly import Space, Tissue
+from evfem.dynamics import Dynamics
 from evfem.linear import Pattern
 from evfem.mesh import Floats, Ints
 
@@ -20,10 +20,11 @@ from evfem.mesh import Floats, Ints
 class Body:
     """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
 
-    def __init__(self, space: Space, laws: Mapping[str, Any], terms: Sequence[Any] = ()) -> None:
+    def __init__(self, space: Space, laws: Mapping[str, Any], terms: Sequence[Any] = (), dynamics: Dynamics | None = None) -> None:
         self.space = space
         self.tissue = Tissue(space, laws)
-        self.terms = tuple(terms)
+        self.dynamics = dynamics
+        self.terms = tuple(terms) if dynamics is None else (*terms, dynamics)
         bone = space.mesh.node_sets["bone"]
         free = np.setdiff1d(np.arange(space.size), bone)
         self.size = 2 * free.size + 2
@@ -54,6 +55,10 @@ class Body:
         for term in self.terms:
             term.add_tangent(u, cells)
         return self.pattern.upper(cells)
+
+    def velocity(self, u: Floats) -> Floats:
+        """Nodal velocities (N, 2) at the end of a step that ends at u."""
+        return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
 
     def energy(self, u: Floats) -> float:
         """Stored energy (N mm per mm of depth) of the tissue."""

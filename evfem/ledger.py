@@ -39,10 +39,12 @@ class Ledger:
         slip[(new.status == STICK) | (new.status == OPEN)] = 0.0
         shear = 0.5 * (old.contact_force[:, 1] + new.contact_force[:, 1])
         self.sums["friction_dissipation"] -= float(np.sum(shear * slip))
+        if model.body.dynamics is not None:
+            self.sums["viscous_dissipation"] += model.body.dynamics.dissipation(new.u)
 
     def row(self, state: State, step: int, motion_index: int, motion: str, time: float) -> dict[str, Any]:
         """The forces, widths and energies of a state; costs are added by the caller."""
-        model = self.model
+        model, dynamics = self.model, self.model.body.dynamics
         position = model.equilibrium.positions(state.u)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
@@ -66,7 +68,7 @@ class Ledger:
             "min_gap": float(outline.frame(model.surface, position).gap.min()),
             **self.sums,
             "stored_energy": model.body.energy(state.u),
-            "kinetic_energy": 0.0,
+            "kinetic_energy": 0.0 if dynamics is None else dynamics.kinetic_energy(state.velocity),
         }
 
 

@@ -11,6 +11,7 @@ from evfem import pad as outline
 from evfem.assembly import check_laws, make_space
 from evfem.attraction import Attraction
 from evfem.body import Body
+from evfem.dynamics import make_dynamics
 from evfem.electrostatics import Layer, Layers
 from evfem.errors import InputError
 from evfem.forms import make_term
@@ -59,8 +60,11 @@ def make_model(scene: Scene) -> Model:
     surface, first_gap = placed(scene.surface, mesh.points[pad.nodes])
     attraction = make_attraction(scene, mesh, pad, surface)
     terms = [make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary") for term in scene.forms]
-    body = Body(space, scene.finger.materials, terms)
-    solver = scene.solver
+    solver, laws = scene.solver, scene.finger.materials
+    dynamics = None
+    if solver.dynamics != "quasistatic":
+        dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
+    body = Body(space, laws, terms, dynamics)
     equilibrium = Equilibrium(body, pad, surface, attraction, solver.tolerance, solver.threads)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 

@@ -45,7 +45,8 @@ class StepFailed(ArithmeticError):
 @dataclass(frozen=True, eq=False)
 class State:
     """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's normal and tangent (P, 2), their
-    statuses (P,), the bone's translation (2,), voltage, attraction on the pad nodes (P, 2), forces on the bone (2,)."""
+    statuses (P,), the bone's translation (2,), voltage, attraction on the pad nodes (P, 2), forces on the bone (2,), nodal
+    velocities (N, 2) in mm/s."""
 
     u: Floats
     contact_force: Floats
@@ -54,15 +55,17 @@ class State:
     voltage: float
     attraction: Floats
     reaction: Floats
+    velocity: Floats
 
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm); voltage (V)."""
+    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm); voltage (V); seconds it takes."""
 
     bone: Floats
     force: float | None
     voltage: float
+    duration: float = 0.0
 
 
 @dataclass
@@ -99,6 +102,7 @@ class Equilibrium:
         self._condensed: Any = None
         self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
         self._frozen = False
+        self._outdated = False
 
     # -- what a state is ----------------------------------------------------------------------------------------------
 
@@ -106,7 +110,7 @@ class Equilibrium:
         """The undeformed body, translated by `bone`."""
         zero = np.zeros((self.pad.nodes.size, 2))
         u = np.broadcast_to(bone, self.points.shape).copy()
-        state = State(u, zero, np.zeros(len(zero), dtype=np.int64), np.array(bone, dtype=float), voltage, zero, np.zeros(2))
+        state = State(u, zero, np.zeros(len(zero), dtype=np.int64), np.array(bone, dtype=float), voltage, zero, np.zeros(2), np.zeros_like(u))
         return replace(state, attraction=self.attraction_at(state, state, voltage))
 
     def positions(self, u: Floats) -> Floats:
@@ -128,6 +132,7 @@ class Equilibrium:
         travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
         self._touching, self._frozen = old.status != OPEN, frozen is not None
         self.choose_candidates(old, 1.2 * travel)
+        self._begin(old, target.duration)
         state = replace(start or old, voltage=target.voltage)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
@@ -138,7 +143,7 @@ class Equilibrium:
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
             if arrived and balance.residual <= self.tolerance and self.obeys_contact(old, state):
-                return state
+                return replace(state, velocity=self.body.velocity(state.u))
             if not arrived:
                 history[-1] = max(history[-1], 1.0)
             if len(history) > 8 and history[-1] > 1e3 * min(history):
@@ -147,6 +152,14 @@ class Equilibrium:
             state = self._advance(old, state, target, balance)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
+
+    def _begin(self, old: State, duration: float) -> None:
+        """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
+        dynamics = self.body.dynamics
+        if dynamics is None:
+            return
+        self._outdated = not 0.67 * dynamics.step <= duration <= 1.5 * dynamics.step
+        dynamics.begin(old.u, old.velocity, duration)
 
     def _balance(self, old: State, state: State, target: Target, frozen: Floats | None) -> tuple[State, Balance]:
         """Out-of-balance forces (n,) of the reduced unknowns, the forces that make them, and their relative size."""
@@ -230,8 +243,9 @@ class Equilibrium:
 
     def _renew(self, state: State, history: list[float]) -> None:
         """Factorise at the present state where there is no factorisation, the old one stalls, or a new one saves iterations."""
-        if self._factor is not None and not self._stale(history):
+        if self._factor is not None and not self._outdated and not self._stale(history):
             return
+        self._outdated = False
         if self._factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             self._factor = make_condensation(self.body.pattern, np.concatenate([unknowns, self.body.bone]), self.threads)

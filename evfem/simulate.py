@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -90,7 +90,8 @@ class Run:
             start = self._start_of(first)
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
                 ends = [self._target(motion, start, (k - 1 + s) / motion.steps) for s in (0.0, 1.0)]
-                yield Request(first + k, index, motion.kind, self._path(*ends), _duration(motion, start, k))
+                seconds = _duration(motion, start)
+                yield Request(first + k, index, motion.kind, self._path(*ends, seconds), seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
         """Bone position, indentation, force and voltage at which a motion starts."""
@@ -123,12 +124,13 @@ class Run:
             voltage = self.voltage_at(position)
         return Target(self.model.bone(position, indentation), force, voltage)
 
-    def _path(self, start: Target, end: Target) -> Path:
+    def _path(self, start: Target, end: Target, seconds: float) -> Path:
         """Straight from one target to the next; a voltage profile is followed on the way."""
 
-        def target(share: float) -> Target:
+        def target(done: float, share: float) -> Target:
+            duration = (share - done) * seconds
             if share == 1.0:
-                return end
+                return replace(end, duration=duration)
             bone = start.bone + share * (end.bone - start.bone)
             force = None
             if start.force is not None and end.force is not None:
@@ -136,7 +138,7 @@ class Run:
             voltage = start.voltage + share * (end.voltage - start.voltage)
             if isinstance(self.scene.voltage, VoltageProfile):
                 voltage = self.voltage_at(float(bone[0]))
-            return Target(bone, force, voltage)
+            return Target(bone, force, voltage, duration)
 
         return target
 
@@ -189,6 +191,7 @@ class Run:
             "voltage": np.array(state.voltage),
             "attraction": state.attraction,
             "reaction": state.reaction,
+            "velocity": state.velocity,
             "candidates": self.model.equilibrium.candidates,
             "part": np.array(self.stepper.part),
             "time": np.array(self.time),
@@ -200,7 +203,7 @@ class Run:
         for name, array in self.checkpoint().items():
             if name not in arrays or (name != "candidates" and arrays[name].shape != np.shape(array)):
                 raise InputError("checkpoint", f"no usable {name}", "a checkpoint of the same scene and version")
-        names = ("u", "contact_force", "status", "bone", "attraction", "reaction")
+        names = ("u", "contact_force", "status", "bone", "attraction", "reaction", "velocity")
         self.state = State(**{name: arrays[name] for name in names}, voltage=float(arrays["voltage"]))
         self.model.equilibrium.candidates = arrays["candidates"]
         self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])
@@ -208,7 +211,7 @@ class Run:
         self.rows = list(saved.rows)
 
 
-def _duration(motion: Motion, start: dict[str, float], k: int) -> float:
+def _duration(motion: Motion, start: dict[str, float]) -> float:
     """Seconds that one step of a motion takes: 0 without a speed."""
     speed = getattr(motion, "speed", None)
     if speed is None:

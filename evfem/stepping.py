@@ -16,8 +16,8 @@ SMALLEST_PART = 1.0 / 1024.0
 EASY = 6
 GROWTH = 1.25
 
-#: from a share of the way (0 to 1) to the target there
-Path = Callable[[float], Target]
+#: from the share of the way that is done (0 to 1) and the next one to the target there
+Path = Callable[[float, float], Target]
 
 
 @dataclass
@@ -39,7 +39,7 @@ class Stepper:
             share = 1.0 if self.part >= 1.0 - done - 1e-12 else done + self.part
             before = self.equilibrium.record.iterations
             try:
-                new = self.solve(state, path(share))
+                new = self.solve(state, path(done, share))
             except StepFailed:
                 self.cuts += 1
                 self.equilibrium.forget()
