@@ -81,10 +81,10 @@ class Mesh:
 
 
 def raised(mesh: Mesh) -> Mesh:
-    """The quadratic mesh on the same cells: straight edges, new nodes halfway, a quad's last one in its middle.
+    """The quadratic mesh on the same cells: straight edges, new nodes halfway.
 
-    New nodes are numbered after the old ones. The new node of an outer edge belongs to every set that holds both
-    ends of that edge; other new nodes belong to none.
+    New nodes are numbered after the old ones. The new node of an outer edge belongs to every set that holds
+    both ends of that edge; other new nodes belong to none.
 
     >>> square = Mesh(np.array([[0., 0.], [1., 0.], [1., 1.], [0., 1.]]), np.array([[0, 1, 2, 3]]), "quad",
     ...               np.zeros(1, int), {"skin": 0}, {"pad": np.array([0, 1])})

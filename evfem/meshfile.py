@@ -1,8 +1,8 @@
 """A user's mesh in, any finger mesh out: names, encoding and checks.
 
-Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero = belongs).
-Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no table is
-needed to read them back.
+Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero: belongs).
+Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no
+table is needed to read them back.
 Encoding of `.msh` files: physical groups of surfaces (regions) and of lines or points (sets of nodes).
 """
 
@@ -35,11 +35,12 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh of a file (`.vtu`, `.msh` or what else meshio reads with the same data); lengths in mm.
+    """The checked mesh of a file (`.vtu`, `.msh`, or another that meshio reads with the same data), in mm.
 
-    `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of gmsh or
-    for files that `write` made. Nodes keep the numbers of the file, cells are turned counter-clockwise.
-    Raises `InputError` naming `finger.mesh` or `finger.regions` for everything that cannot be a finger.
+    `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of
+    gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are turned
+    counter-clockwise. Raises `InputError` naming `finger.mesh` or `finger.regions` for everything that
+    cannot be a finger.
     """
     path = Path(path)
     raw = _quietly(path)
@@ -136,19 +137,26 @@ def _group_sets(raw: meshio.Mesh, blocks: list[tuple[str, np.ndarray]], names: _
     return sets
 
 
-def _numbers(path: Path, raw: meshio.Mesh, solid: list[int],
-             regions: Mapping[str, int] | None) -> tuple[Ints, dict[str, int]]:
+def _numbers(
+    path: Path, raw: meshio.Mesh, solid: list[int], regions: Mapping[str, int] | None
+) -> tuple[Ints, dict[str, int]]:
     if "region" not in raw.cell_data:
-        raise InputError("finger.mesh", f"{path} without region numbers",
-                         "integer cell data `region`, or a .msh file with named physical groups")
+        raise InputError(
+            "finger.mesh",
+            f"{path} without region numbers",
+            "integer cell data `region`, or a .msh file with named physical groups",
+        )
     region = np.concatenate([np.asarray(raw.cell_data["region"][k]).reshape(-1) for k in solid])
     if not np.isfinite(region).all() or (region != np.round(region)).any():
         given = f"{path} with cell data `region` that are no integers"
         raise InputError("finger.mesh", given, "one integer per cell")
     region = region.astype(np.int64)
     if regions is None:
-        regions = {name.removeprefix(PREFIX): int(np.ravel(number)[0])
-                   for name, number in raw.field_data.items() if name.startswith(PREFIX)}
+        regions = {
+            name.removeprefix(PREFIX): int(np.ravel(number)[0])
+            for name, number in raw.field_data.items()
+            if name.startswith(PREFIX)
+        }
     return region, _checked_names(path, region, regions)
 
 
@@ -156,12 +164,18 @@ def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict
     present = np.unique(region).tolist()
     nameless = [n for n in present if n not in regions.values()]
     if nameless:
-        raise InputError("finger.regions", f"no name for {', '.join(map(str, nameless))} of {path}",
-                         "name = number for every number in the cell data `region`")
+        raise InputError(
+            "finger.regions",
+            f"no name for {', '.join(map(str, nameless))} of {path}",
+            "name = number for every number in the cell data `region`",
+        )
     absent = [name for name, number in regions.items() if number not in present]
     if absent:
-        raise InputError("finger.regions", f"{absent[0]} = {regions[absent[0]]}",
-                         f"numbers that occur in {path}: {', '.join(map(str, present))}")
+        raise InputError(
+            "finger.regions",
+            f"{absent[0]} = {regions[absent[0]]}",
+            f"numbers that occur in {path}: {', '.join(map(str, present))}",
+        )
     double = sorted(name for name, number in regions.items() if list(regions.values()).count(number) > 1)
     if double:
         given = f"{' and '.join(double)} with the same number"
@@ -195,8 +209,13 @@ def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError("--out", path.name, "a file that ends with " + " or ".join(WRITERS)
-                         + " (other formats cannot carry the names of regions and boundaries)")
+        raise InputError(
+            "--out",
+            path.name,
+            "a file that ends with "
+            + " or ".join(WRITERS)
+            + " (other formats cannot carry the names of regions and boundaries)",
+        )
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as folder:
             part = Path(folder) / path.name
@@ -218,8 +237,9 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
     for name, nodes in mesh.node_sets.items():
         point_data[name] = np.zeros(len(mesh.points), dtype=np.uint8)
         point_data[name][nodes] = 1
-    out = meshio.Mesh(_three(mesh.points), [(mesh.kind, mesh.cells)], point_data,
-                      {"region": [mesh.region.astype(np.int32)]})
+    out = meshio.Mesh(
+        _three(mesh.points), [(mesh.kind, mesh.cells)], point_data, {"region": [mesh.region.astype(np.int32)]}
+    )
     out.write(path, file_format="vtu", compression=None)
     form = '<DataArray type="Int32" Name="{}{}" NumberOfTuples="1" format="ascii">{}</DataArray>'
     arrays = "".join(form.format(PREFIX, name, number) for name, number in mesh.region_names.items())
@@ -253,8 +273,8 @@ def _all_edges(mesh: Mesh, name: str) -> Ints:
     edges = mesh.edges_of(name)
     lost = np.setdiff1d(mesh.node_sets[name], edges)
     if len(lost):
-        given = f"a .msh file of a mesh whose set {name} holds node {lost[0]}, which no outer edge of the set has"
-        raise InputError("--out", given, ".vtu, which carries sets of nodes; .msh carries sets of outer edges")
+        given = f"a .msh file for the set {name} with node {lost[0]}, which no outer edge of the set has"
+        raise InputError("--out", given, ".vtu, which carries sets of nodes (.msh: sets of outer edges)")
     return edges
 
 
