@@ -313,7 +313,7 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
         if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, VoltageProfile):
             raise InputError(key, "a voltage ramp beside a voltage profile", "one of the two")
-        if isinstance(motion, Slide) and motion.hold == "force" and not pressed:
+        if isinstance(motion, (Slide, VoltageRamp)) and motion.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )

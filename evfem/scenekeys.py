@@ -140,6 +140,7 @@ class VoltageTable(Table):
     kind: Literal["voltage"]
     voltage: float = _required("a voltage in V")
     steps: int = _optional(_STEPS, 10)
+    hold: Literal[HOLDS] = _optional(" | ".join(HOLDS), HOLDS[0])  # type: ignore[valid-type]
 
 
 SURFACES: Mapping[str, type[Table]] = {

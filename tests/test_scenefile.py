@@ -159,11 +159,11 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
     text = (
         "version = 1\n[surface]\nkind='sinusoid'\nfriction=[[0, 0.3], [1, 0.5]]\nterms=[[0.1, 2, 0]]\n"
         "[electrostatics]\nlaw='kaczmarek'\ninsulator_thickness=0.1\ninsulator_eps_r=3\nair_layer=false\n"
-        "[[motion]]\nkind='press'\nindentation=1\nspeed=2\n[[motion]]\nkind='voltage'\nvoltage=100\nsteps=3\n"
+        "[[motion]]\nkind='press'\nindentation=1\nspeed=2\n[[motion]]\nkind='voltage'\nvoltage=100\nsteps=3\nhold='force'\n"
         "[[motion]]\nkind='slide'\ndistance=-1\nhold='force'\n"
     )
     scene = loads(text)
-    press, ramp = Press(indentation=1.0, speed=2.0), VoltageRamp(voltage=100.0, steps=3)
+    press, ramp = Press(indentation=1.0, speed=2.0), VoltageRamp(100.0, steps=3, hold="force")
     assert scene.motion == (press, ramp, Slide(distance=-1.0, hold="force"))
     assert scene.voltage == 0.0
     assert scene.surface.friction_coefficient(np.array([0.5])).tolist() == [0.4]
