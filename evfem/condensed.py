@@ -23,13 +23,16 @@ from evfem.pad import Frame
 @dataclass(frozen=True, eq=False)
 class Candidates:
     """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,), contact forces
-    (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,)."""
+    (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the interface's own compliance (c, 2) in
+    mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby needs no other solver.
+    """
 
     frame: Frame
     slip: Floats
     force: Floats
     status: Ints
     friction: Floats
+    softness: Floats
 
     @property
     def axes(self) -> Floats:
@@ -137,7 +140,8 @@ class Step:
         border = None
         if e is not None:
             border = self._border(free, effect, columns, (C, w, e), turning, to_local)
-        problem = ContactProblem(start, to_local @ C @ to_local.T, known.friction[near], border)
+        softness = np.diag(known.softness[near].T.ravel())
+        problem = ContactProblem(start, to_local @ C @ to_local.T + softness, known.friction[near], border)
         found = solve_contact(problem, status)
         lab = to_local.T @ found.force
         if turning is not None:

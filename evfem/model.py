@@ -66,6 +66,8 @@ def make_model(scene: Scene) -> Model:
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
     equilibrium = Equilibrium(body, pad, surface, attraction, solver.tolerance, solver.threads)
+    if solver.contact == "penalty":
+        equilibrium.penalties = (solver.penalty_normal, solver.penalty_tangential or solver.penalty_normal)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 

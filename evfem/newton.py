@@ -94,6 +94,7 @@ class Equilibrium:
     def __init__(self, body: Body, pad: outline.Pad, surface: Any, attraction: Attraction | None, tolerance: float, threads: int = 1) -> None:
         self.body, self.pad, self.surface, self.attraction = body, pad, surface, attraction
         self.tolerance, self.threads = tolerance, threads
+        self.penalties: tuple[float, float] | None = None
         self.record = Record()
         self.points = body.space.mesh.points
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
@@ -213,9 +214,17 @@ class Equilibrium:
         c = self.candidates
         position = self.positions(state.u)[c]
         frame = outline.frame(self.surface, position)
-        slip = frame.stretch * (position[:, 0] - self.positions(old.u)[c, 0])
+        softness = self._softness(old)[c]
+        slip = frame.stretch * (position[:, 0] - self.positions(old.u)[c, 0]) - softness[:, 1] * old.contact_force[c, 1]
         friction = self._friction(position[:, 0])
-        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction)
+        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness)
+
+    def _softness(self, old: State) -> Floats:
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is exact."""
+        if self.penalties is None:
+            return np.zeros_like(old.contact_force)
+        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
+        return 1.0 / np.outer(length, self.penalties)
 
     def _friction(self, x: Floats) -> Floats:
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
@@ -286,11 +295,14 @@ class Equilibrium:
         active = state.status != OPEN
         normal, shear = state.contact_force[active].T
         slip = (frame.stretch * (position[:, 0] - self.positions(old.u)[:, 0]))[active]
+        softness = self._softness(old)[active]
+        slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
         limit = self._friction(position[active, 0]) * normal
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
         status = state.status[active]
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
         slips = (status == STICK) | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak)) | (limit == 0.0)
-        closed = (np.abs(frame.normal_gap[active]) <= short) & (normal >= -weak)
+        gap = frame.normal_gap[active] + softness[:, 0] * normal
+        closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())
