@@ -12,6 +12,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from evfem.errors import InputError
+
 Ints = NDArray[np.int64]
 Floats = NDArray[np.float64]
 
@@ -56,22 +58,24 @@ class Mesh:
     @cached_property
     def outer_edges(self) -> Ints:
         """Edges of one cell only, (K, 2) or (K, 3): start, end[, middle], the body on the left."""
+        _, of_cell = self.edges
+        alone = np.bincount(of_cell.ravel())[of_cell] == 1
+        return self.cell_edges[alone]
+
+    @property
+    def cell_edges(self) -> Ints:
+        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle], counter-clockwise."""
         m = self.corners
         i = np.arange(m)
         columns = [i, (i + 1) % m] + ([m + i] if self.order == 2 else [])
-        edges = self.cells[:, np.array(columns).T].reshape(-1, len(columns))
-        ends = np.sort(edges[:, :2], axis=1)
-        _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-        return edges[np.sort(first[count == 1])]
+        return self.cells[:, np.array(columns).T]
 
     @cached_property
     def edges(self) -> tuple[Ints, Ints]:
         """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E, corners)."""
-        m = self.corners
-        i = np.arange(m)
-        ends = np.sort(self.cells[:, np.array([i, (i + 1) % m]).T], axis=2).reshape(-1, 2)
-        unique, inverse = np.unique(ends, axis=0, return_inverse=True)
-        return unique, inverse.reshape(-1, m)
+        ends = np.sort(self.cell_edges[..., :2], axis=2).reshape(-1, 2)
+        code, inverse = np.unique(ends[:, 0] * len(self.points) + ends[:, 1], return_inverse=True)
+        return np.column_stack(np.divmod(code, len(self.points))), inverse.reshape(-1, self.corners)
 
     def edges_of(self, name: str) -> Ints:
         """Outer edges all of whose nodes are in the set `name`, same columns as `outer_edges`."""
@@ -109,3 +113,50 @@ def raised(mesh: Mesh) -> Mesh:
 def _with_middles(nodes: Ints, edges: Ints, outer: NDArray[np.bool_], first: int) -> Ints:
     both = np.isin(edges, nodes).all(axis=1) & outer
     return np.union1d(nodes, first + np.flatnonzero(both))
+
+
+def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
+    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that layer there.
+
+    The interface is every edge that a cell of `region` shares with a cell of another region; on quadratic cells
+    it is the parabola through the edge's nodes. Raises `InputError` if there is no such region or interface.
+    """
+    if region not in mesh.region_names:
+        raise InputError("region", region, " | ".join(mesh.region_names))
+    inside = mesh.region == mesh.region_names[region]
+    edges, of_cell = mesh.edges
+    own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(edges)) for cells in (inside, ~inside))
+    shared = (own > 0) & (other > 0)
+    interface = mesh.cell_edges[inside][shared[of_cell[inside]]]
+    if not len(interface):
+        raise InputError("region", region, "a region that has another one below it")
+    curves = _parabolas(mesh.points[interface])
+    points = mesh.points[nodes]
+    chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)
+    return np.concatenate([_distance(points[chunk], curves) for chunk in chunks])
+
+
+def _parabolas(ends: Floats) -> Floats:
+    """Coefficients (3, K, 2) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle] (K, 2 or 3, 2)."""
+    middle = 0.5 * (ends[:, 0] + ends[:, 1])
+    centre = ends[:, 2] if ends.shape[1] == 3 else middle
+    return np.array([centre, 0.5 * (ends[:, 1] - ends[:, 0]), middle - centre])
+
+
+def _distance(points: Floats, curves: Floats) -> Floats:
+    """Smallest distance of points (P, 2) from the curves: Newton's method on the six nearest of each."""
+    places = np.array([-1.0, 0.0, 1.0])
+    samples = curves[0] + places[:, None, None] * curves[1] + (places**2)[:, None, None] * curves[2]
+    away = np.linalg.norm(points[:, None, None] - samples, axis=-1)
+    nearest = away.min(axis=1)
+    near = np.argpartition(nearest, min(6, nearest.shape[1]) - 1, axis=1)[:, :6]
+    s = places[np.take_along_axis(away.argmin(axis=1), near, axis=1)]
+    c0, c1, c2 = curves[0][near] - points[:, None], curves[1][near], curves[2][near]
+    for _ in range(12):
+        t = s[..., None]
+        place, slope = c0 + t * c1 + t * t * c2, c1 + 2.0 * t * c2
+        speed = (slope**2).sum(-1)
+        bend = speed + 2.0 * (place * c2).sum(-1)
+        s = np.clip(s - (place * slope).sum(-1) / np.where(bend > 0.1 * speed, bend, speed), -1.0, 1.0)
+    t = s[..., None]
+    return np.linalg.norm(c0 + t * c1 + t * t * c2, axis=-1).min(axis=1)
