@@ -41,6 +41,7 @@ __all__ = [
     "VoltageRamp",
     "default_scene",
     "form",
+    "grad",
 ]
 
 ELEMENTS = ("q1", "q1_fbar", "q2", "q2p1", "p2")
@@ -135,6 +136,11 @@ def form(function: Callable[[Any, Any, Any], Any]) -> Form:
     if not callable(function):
         raise InputError("form", function, "a function (u, v, w) that returns the integrand of a residual")
     return Form(function)
+
+
+def grad(field: Any) -> Any:
+    """Gradient (i, j, ...) = d u_i / d X_j of the displacement or test function in a weak form."""
+    return field.grad
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,207 @@
+"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command that needs it.
+
+Exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk or folder failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, NoReturn
+
+import evfem
+from evfem.errors import InputError, NotConverged
+
+if TYPE_CHECKING:
+    from evfem.runfolder import RunFolder
+    from evfem.scene import Scene
+
+DONE, BAD_INPUT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports a mistake in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands and options."""
+    top = _Parser(
+        prog="evfem", description="A finger pad on an electrovibration display, by finite elements."
+    )
+    top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    scene = _Parser(add_help=False)
+    scene.add_argument(
+        "scene", nargs="?", type=Path, metavar="SCENE.toml", help="default: the built-in scene"
+    )
+
+    run = commands.add_parser(
+        "run", parents=[scene], help="run a scene and write history, fields, summary and picture"
+    )
+    run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out")
+    run.add_argument("--resume", action="store_true", help="go on with the interrupted run in the folder")
+    run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
+    run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
+    run.set_defaults(function=_run)
+
+    plan = commands.add_parser(
+        "plan", parents=[scene], help="print terms, unknowns and solver of a scene; compute nothing"
+    )
+    plan.set_defaults(function=_plan)
+
+    study = commands.add_parser("study", help="run studies and write their numbers, series and pictures")
+    study.add_argument("names", nargs="+", metavar="NAME", help="name of a study, or all")
+    study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
+    study.add_argument("--quick", action="store_true", help="coarser and shorter")
+    study.set_defaults(function=_study)
+
+    mesh = commands.add_parser("mesh", parents=[scene], help="write the finger's mesh as .vtu or .msh")
+    mesh.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh")
+    mesh.set_defaults(function=_mesh)
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line; returns the exit status."""
+    try:
+        given = parser().parse_args(arguments)
+    except SystemExit as done:
+        return int(done.code or 0)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
+    try:
+        return given.function(given)
+    except InputError as error:
+        return _say(error, BAD_INPUT)
+    except NotConverged as error:
+        return _say(error, NOT_CONVERGED)
+    except BrokenPipeError:  # the reader of our output has gone
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
+    except OSError as error:
+        return _say(error, DISK_FAILED)
+    except KeyboardInterrupt:
+        return _say("interrupted", INTERRUPTED)
+
+
+def _say(message: object, status: int) -> int:
+    print(f"evfem: {message}", file=sys.stderr)
+    return status
+
+
+def _scene(path: Path | None) -> Scene:
+    if path is None:
+        from evfem.scene import default_scene
+
+        return default_scene()
+    from evfem.scenefile import load
+
+    return load(path)
+
+
+def _run(given: argparse.Namespace) -> int:
+    scene = _scene(given.scene)
+    from evfem.runfolder import RunFolder, saved
+    from evfem.simulate import simulate
+
+    path = given.out or Path(f"{scene.name}-out")
+    resume = saved(path, scene) if given.resume else None
+    folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
+    progress = sys.stderr.isatty()
+    observers = [folder] if progress else [folder, _Milestones()]
+    try:
+        result = simulate(scene, progress=progress, observers=observers, resume=resume)
+    except NotConverged as error:
+        _finish(folder, error.result)
+        raise
+    except KeyboardInterrupt:
+        if not folder.opened:
+            raise
+        _finish(folder, None)
+        return _say(f"interrupted; {len(folder.rows)} steps are in {path}, go on with --resume", INTERRUPTED)
+    _finish(folder, result)
+    return DONE
+
+
+def _finish(folder: RunFolder, result: object) -> None:
+    """Write what is left to write and print the table; a second Ctrl-C does not tear the files."""
+    from evfem.report import table
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    summary = folder.close(result)  # type: ignore[arg-type]
+    if folder.rows:
+        print(table(folder.rows))
+    done = f"{summary['steps']} of {summary['requested_steps']} steps in {summary['seconds']:.1f} s"
+    print(f"{done}; results in {folder.path}")
+    sys.stdout.flush()
+
+
+class _Milestones:
+    """Progress where a bar has no place: a line for every tenth of the steps."""
+
+    def started(self, mesh: object, scene: object, total_steps: int) -> None:
+        self.total = total_steps
+
+    def step(self, row: dict[str, object], frame: object, checkpoint: object) -> None:
+        step = int(str(row["step"]))
+        if step * 10 // self.total > (step - 1) * 10 // self.total:
+            print(f"step {step} of {self.total}", file=sys.stderr, flush=True)
+
+
+def _plan(given: argparse.Namespace) -> int:
+    from evfem.plan import plan
+
+    print(plan(_scene(given.scene)), flush=True)
+    return DONE
+
+
+def _study(given: argparse.Namespace) -> int:
+    studies = _studies()
+    names: list[str] = []
+    for name in given.names:
+        names += [n for n in studies.NAMES if n != "peers"] if name == "all" else [name]
+    for name in names:
+        if name not in studies.NAMES:
+            raise InputError("study", name, f"{', '.join(studies.NAMES)}, all")
+    for name in dict.fromkeys(names):
+        print(f"study {name}", file=sys.stderr, flush=True)
+        studies.run(name, quick=given.quick, out=given.out)
+        print(given.out / f"{name}.json", flush=True)
+    return DONE
+
+
+def _studies() -> ModuleType:
+    try:
+        return importlib.import_module("evfem.studies")
+    except ModuleNotFoundError as error:
+        if error.name != "evfem.studies":
+            raise
+        raise InputError("study", "a checkout", "an installed evfem: pip install .") from error
+
+
+def _mesh(given: argparse.Namespace) -> int:
+    scene = _scene(given.scene)
+    from evfem.meshfile import write
+
+    order = 1 if scene.solver.element in ("q1", "q1_fbar") else 2
+    mesh = scene.finger.mesh(order)
+    write(mesh, given.out)
+    regions = ", ".join(mesh.region_names)
+    print(
+        f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",
+        flush=True,
+    )
+    return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,156 @@
+"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
+
+Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from evfem.errors import InputError, StorageError
+from evfem.export import ParaViewSeries
+from evfem.mesh import Mesh
+from evfem.result import (
+    Checkpoint,
+    Frame,
+    Result,
+    Row,
+    Saved,
+    csv_line,
+    provenance,
+    write_history,
+)
+from evfem.scene import Scene
+from evfem.storage import replacing, write_text
+
+MANIFEST = ".evfem-files"
+HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
+    "history.csv",
+    "summary.json",
+    "fields.pvd",
+    "forces.png",
+    "checkpoint.npz",
+)
+OURS = re.compile(r"history\.csv|summary\.json|fields\.pvd|fields_\d+\.vtu|forces\.png|checkpoint\.npz")
+
+
+@dataclass
+class RunFolder:
+    """An observer of `evfem.simulate` that keeps a folder up to date; it writes from the first step on.
+
+    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved` returned.
+    """
+
+    path: Path
+    scene: Scene
+    fields: bool = True
+    plots: bool = True
+    resume: Saved | None = None
+    rows: list[Row] = field(default_factory=list, init=False)
+    mesh: Mesh | None = field(default=None, init=False)
+    opened: bool = field(default=False, init=False)
+    _series: ParaViewSeries | None = field(default=None, init=False)
+    _digest: str = field(default="", init=False)
+
+    def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
+        """The mesh is known: refuse a folder in which files of others are in the way."""
+        self.mesh = mesh
+        self.rows = list(self.resume.rows) if self.resume else []
+        self._digest = self.scene.digest()
+        listed = _listed(self.path)
+        foreign = [name for name in _present(self.path) if name not in listed]
+        if foreign:
+            given = f"{self.path}, where {foreign[0]} was not written by evfem"
+            raise InputError("--out", given, "another folder, for files of others are never touched")
+
+    def step(self, row: Row, frame: Frame | None, checkpoint: Callable[[], dict[str, Any]]) -> None:
+        """A step has converged: fields, history and checkpoint go to disk, in this order."""
+        if not self.opened:
+            self._open()
+        if frame is not None and self._series is not None and self.mesh is not None:
+            self._series.add(row, frame, self.mesh)
+            self._series.write_index()
+        self.rows.append(row)
+        with _storing(self.path), open(self.path / HISTORY, "a", encoding="utf-8", newline="") as history:
+            history.write(csv_line(row))
+        Checkpoint(self.path / STATE).write(self._digest, checkpoint(), self.rows)
+
+    def close(self, result: Result | None) -> dict[str, Any]:
+        """Write history, summary and picture of what has converged; returns the summary.
+
+        `result` None means interrupted: it is made of the rows so far.
+        """
+        if not self.opened:
+            self._open()
+        write_history(self.rows, self.path / HISTORY)
+        if result is None:
+            assert self.mesh is not None
+            result = Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
+        summary = result.summary()
+        write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        if self.plots and self.rows:
+            _picture(result, self.path / PICTURE)
+        return summary
+
+    def _open(self) -> None:
+        """Make the folder, remove an earlier run's files (or go on from them), start the history."""
+        with _storing(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+            if self.resume is None:
+                for name in _present(self.path):
+                    (self.path / name).unlink()
+        steps = range(1, self.scene.total_steps + 1)
+        self._series = ParaViewSeries(self.path / FIELDS, self.rows) if self.fields else None
+        series = [self._series.frame_path(n).name for n in steps] if self._series else []
+        names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
+        names = sorted({*names, *(_listed(self.path) if self.resume else ())})
+        write_text(self.path / MANIFEST, "".join(f"{name}\n" for name in names))
+        write_history(self.rows, self.path / HISTORY)
+        self.opened = True
+
+
+def saved(path: Path, scene: Scene) -> Saved:
+    """The checkpoint of an interrupted run of `scene` in the folder `path`.
+
+    Raises InputError when there is none, or one of another scene.
+    """
+    if not (path / STATE).is_file():
+        raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
+    return Checkpoint(path / STATE).read(scene.digest())
+
+
+def _present(path: Path) -> list[str]:
+    """Names in the folder that a run writes."""
+    with _storing(path):
+        return sorted(p.name for p in path.iterdir() if OURS.fullmatch(p.name)) if path.exists() else []
+
+
+def _listed(path: Path) -> Sequence[str]:
+    """Names that an earlier run listed as its own."""
+    with suppress(OSError, UnicodeDecodeError):
+        return (path / MANIFEST).read_text(encoding="utf-8").split("\n")
+    return ()
+
+
+@contextmanager
+def _storing(path: Path) -> Iterator[None]:
+    """Disk errors inside the block become StorageError with the path."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageError(f"cannot use {path}: {error.strerror or error}") from error
+
+
+def _picture(result: Result, path: Path) -> None:
+    from evfem.plotting import forces
+
+    with replacing(path) as temporary:
+        figure = forces(result).get_figure(root=True)
+        assert figure is not None
+        figure.savefig(temporary, format="png", dpi=150)
