@@ -11,6 +11,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -254,7 +255,8 @@ class MeshedFinger:
     """A finger on a mesh of the user's own: a file or a `Mesh`, one material law per region.
 
     `regions` maps names to numbers as in `meshfile.read`; `viscosity` is the relaxation time in s of every
-    material that has none of its own. Raises `InputError` when the mesh and the materials do not fit.
+    material that has none of its own. The mesh is read and checked at once: raises `InputError` when it is
+    faulty or does not fit the materials.
     """
 
     source: str | os.PathLike[str] | Mesh
@@ -262,6 +264,21 @@ class MeshedFinger:
     electrical: Electrical = field(default_factory=Electrical)
     viscosity: float = 0.0
     regions: Mapping[str, int] | None = None
+
+    def __post_init__(self) -> None:
+        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", _between(0.0, 1e3))
+        put(self, viscosity=viscosity, materials=dict(self.materials))
+        if not isinstance(self.source, Mesh):
+            put(self, source=Path(self.source))
+        names = self._own.region_names
+        for name in names:
+            if name not in self.materials:
+                raise InputError(
+                    f"finger.materials.{name}", "nothing", "a material for every region of the mesh"
+                )
+        for name in self.materials:
+            if name not in names:
+                raise InputError(f"finger.materials.{name}", "no such region", " | ".join(names))
 
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh with cells of `order` 1 or 2; a linear mesh is raised with straight edges."""

@@ -64,7 +64,9 @@ class Mesh:
 
     @property
     def cell_edges(self) -> Ints:
-        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle], counter-clockwise."""
+        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle], counter-
+        clockwise.
+        """
         m = self.corners
         i = np.arange(m)
         columns = [i, (i + 1) % m] + ([m + i] if self.order == 2 else [])
@@ -116,10 +118,12 @@ def _with_middles(nodes: Ints, edges: Ints, outer: NDArray[np.bool_], first: int
 
 
 def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
-    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that layer there.
+    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that layer
+    there.
 
-    The interface is every edge that a cell of `region` shares with a cell of another region; on quadratic cells
-    it is the parabola through the edge's nodes. Raises `InputError` if there is no such region or interface.
+    The interface is every edge that a cell of `region` shares with a cell of another region; on quadratic
+    cells it is the parabola through the edge's nodes. Raises `InputError` if there is no such region or
+    interface.
     """
     if region not in mesh.region_names:
         raise InputError("region", region, " | ".join(mesh.region_names))
@@ -137,7 +141,9 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
 
 
 def _parabolas(ends: Floats) -> Floats:
-    """Coefficients (3, K, 2) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle] (K, 2 or 3, 2)."""
+    """Coefficients (3, K, 2) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle] (K, 2 or
+    3, 2).
+    """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     centre = ends[:, 2] if ends.shape[1] == 3 else middle
     return np.array([centre, 0.5 * (ends[:, 1] - ends[:, 0]), middle - centre])
