@@ -1,10 +1,12 @@
 r"""Weak form of the tissue: internal forces and tangent of plane-strain hyperelasticity.
 
-For the energy density :math:`\psi(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law uses the volume change,
+For the energy density :math:`\psi(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law
+uses the volume change,
 
-.. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad S = \partial_F\psi,\; q = \partial_\theta\psi .
+.. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad
+          S = \partial_F\psi,\; q = \partial_\theta\psi .
 
-The elements differ only in the volume measure they use:
+Laws of small strain take the trace of the strain for ln J. The elements differ only in the volume measure:
 
 =========  ==================================================  =============================
 element    theta at a quadrature point                         locking at nu -> 1/2
@@ -15,10 +17,10 @@ q1_fbar    ln J at the centroid, which is F-bar with           no
 q2p1       L2 projection of ln J onto {1, X, Y} of the cell    no
 =========  ==================================================  =============================
 
-`theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent
-is symmetric and the forces have a potential. With rows B = (grad u, theta) per quadrature point and the law's second
-derivatives D the tangent reads K = B^T D B + (curvature of ln J). Arrays: E cells, n nodes per cell, Q quadrature
-points, S sample points of ln J; N nodes.
+`theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no
+unknown is added, the tangent is symmetric and the forces have a potential. With rows B = (grad u, theta) per
+quadrature point and the law's second derivatives D the tangent reads K = B^T D B + (curvature of ln J).
+Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes.
 """
 
 from __future__ import annotations
@@ -44,11 +46,15 @@ ELEMENTS: Mapping[str, tuple[str, int, str]] = {
 
 
 def element_for(mesh: Mesh, element: str | None) -> str:
-    """Name of the element to use on `mesh`: the given one if it fits the cells, else the recommended default."""
+    """Name of the element to use on `mesh`: the given one if it fits the cells, else the recommended
+    default.
+    """
     if element is None:
         return "q2p1" if mesh.corners == 4 else "p2"
     if element not in ELEMENTS or (ELEMENTS[element][0].startswith("quad") != (mesh.corners == 4)):
-        allowed = [name for name, (kind, *_) in ELEMENTS.items() if kind.startswith("quad") == (mesh.corners == 4)]
+        allowed = [
+            name for name, (kind, *_) in ELEMENTS.items() if kind.startswith("quad") == (mesh.corners == 4)
+        ]
         raise InputError("solver.element", element, f"on {mesh.kind} cells: {', '.join(allowed)}")
     return element
 
@@ -59,7 +65,9 @@ def scikit_mesh(mesh: Mesh) -> Any:
 
     linear = {4: skfem.MeshQuad, 3: skfem.MeshTri}[mesh.corners]
     vertices, t = np.unique(mesh.cells[:, : mesh.corners], return_inverse=True)
-    base = linear(np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t.reshape(-1, mesh.corners).T))
+    base = linear(
+        np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t.reshape(-1, mesh.corners).T)
+    )
     if mesh.order == 1:
         return base
     quadratic = {4: skfem.MeshQuad2, 3: skfem.MeshTri2}[mesh.corners].from_mesh(base)
@@ -68,7 +76,9 @@ def scikit_mesh(mesh: Mesh) -> Any:
 
 
 def straight_points(mesh: Mesh) -> Floats:
-    """Where the nodes would be if every edge were straight, (N, 2); tells nodes apart whatever the curvature."""
+    """Where the nodes would be if every edge were straight, (N, 2); tells nodes apart whatever the
+    curvature.
+    """
     points = mesh.points.copy()
     if mesh.order == 2:
         m = mesh.corners
@@ -81,10 +91,12 @@ def straight_points(mesh: Mesh) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Displacement space on a mesh: nodes of every cell, gradients of the shape functions, weights and ln J samples.
+    """Displacement space on a mesh: nodes of every cell, gradients of the shape functions, weights and ln J
+    samples.
 
-    `nodes` (E, n); `gradient` (E, Q, n, 2) with respect to the reference; `weight` (E, Q); `sample` (E, S, n, 2) gradients where
-    ln J is sampled; `projection` (E, Q, S), or None where theta is simply ln J of the quadrature point.
+    `nodes` (E, n); `gradient` (E, Q, n, 2) with respect to the reference; `weight` (E, Q); `sample` (E, S, n,
+    2) gradients where ln J is sampled; `projection` (E, Q, S), or None where theta is simply ln J of the
+    quadrature point.
     """
 
     mesh: Mesh
@@ -123,7 +135,15 @@ def make_space(mesh: Mesh, element: str) -> Space:
         projection = np.ones((len(nodes), gradient.shape[1], 1))
     elif sampling == "linear":
         projection = _linear_projection(basis.global_coordinates().value, basis.dx)
-    return Space(mesh, element, np.ascontiguousarray(nodes), gradient, np.ascontiguousarray(basis.dx), sample, projection)
+    return Space(
+        mesh,
+        element,
+        np.ascontiguousarray(nodes),
+        gradient,
+        np.ascontiguousarray(basis.dx),
+        sample,
+        projection,
+    )
 
 
 def _gradients(basis: Any) -> Floats:
@@ -147,7 +167,9 @@ def check_orientation(mesh: Mesh, basis: Any) -> None:
 
 
 def _linear_projection(x: Floats, weight: Floats) -> Floats:
-    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y}, at the same points."""
+    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y}, at the
+    same points.
+    """
     centred = x - x.mean(axis=2, keepdims=True)
     centred = centred / np.abs(centred).max(axis=(0, 2), keepdims=True)
     phi = np.stack([np.ones_like(weight), centred[0], centred[1]], axis=-1)
@@ -159,7 +181,8 @@ def _linear_projection(x: Floats, weight: Floats) -> Floats:
 class Tissue:
     """Internal forces, tangent and stored energy of the regions' laws on a space.
 
-    `laws` maps region names to laws (`evfem.materials`); built-in neo-Hookean tissue uses compiled kernels when numba is there.
+    `laws` maps region names to laws (`evfem.materials`); built-in neo-Hookean tissue uses compiled kernels
+    when numba is there.
     """
 
     def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
@@ -169,11 +192,16 @@ class Tissue:
         self.groups: list[tuple[Any, Ints]] = [
             (materials.split(law), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
+        measures = [(law.volume_measure, cells) for law, cells in self.groups]
+        self._small_strain = np.concatenate(
+            [c for m, c in measures if m == "trace"] or [np.zeros(0, np.int64)]
+        )
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
         self.kernels = _kernels() if self.mu is not None else None
         self._rows: Floats | None = None
 
-    # -- kinematics -------------------------------------------------------------------------------------------------
+    # -- kinematics
+    # -------------------------------------------------------------------------------------------------
 
     def kinematics(self, u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """F (2, 2, E, Q), theta (E, Q), J at the samples (E, S) and F^-T there (E, S, 4) for u (N, 2)."""
@@ -191,6 +219,9 @@ class Tissue:
             log_J = np.log(J)
             cofactor = np.stack([Fs[..., 1, 1], -Fs[..., 1, 0], -Fs[..., 0, 1], Fs[..., 0, 0]], axis=-1)
             inverse = cofactor / J[..., None]
+        small = self._small_strain
+        log_J[small] = Fs[small, :, 0, 0] + Fs[small, :, 1, 1] - 2.0
+        inverse[small] = np.array([1.0, 0.0, 0.0, 1.0])
         theta = log_J if space.projection is None else (space.projection @ log_J[..., None])[..., 0]
         return np.moveaxis(F, (2, 3), (0, 1)), theta, J, inverse
 
@@ -200,7 +231,8 @@ class Tissue:
             return self.kernels.smallest_J(u, self.space.nodes, self.space.sample)
         return float(self.kinematics(u)[2].min())
 
-    # -- residual, tangent, energy ----------------------------------------------------------------------------------
+    # -- residual, tangent, energy
+    # ----------------------------------------------------------------------------------
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
@@ -211,7 +243,13 @@ class Tissue:
         space, w = self.space, self.space.weight
         fe = np.einsum("ijeq,eqnj,eq->eni", S, space.gradient, w, optimize=True)
         samples = self._to_samples(q * w)
-        fe += np.einsum("es,esij,esnj->eni", samples, inverse.reshape(*inverse.shape[:2], 2, 2), space.sample, optimize=True)
+        fe += np.einsum(
+            "es,esij,esnj->eni",
+            samples,
+            inverse.reshape(*inverse.shape[:2], 2, 2),
+            space.sample,
+            optimize=True,
+        )
         return self._scatter(fe)
 
     def tangent(self, u: Floats) -> Floats:
@@ -243,7 +281,9 @@ class Tissue:
         return float(np.sum(psi * self.space.weight))
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,), weighted by reference volume."""
+        """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,), weighted by reference
+        volume.
+        """
         F, theta, _, _ = self.kinematics(u)
         J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         S, q = self._stress(F, theta)
@@ -256,7 +296,8 @@ class Tissue:
         w = self.space.weight / self.space.weight.sum(axis=1, keepdims=True)
         return np.einsum("eqs,eq->es", sigma, w), np.einsum("eq,eq->e", J, w)
 
-    # -- pieces -------------------------------------------------------------------------------------------------------
+    # -- pieces
+    # -------------------------------------------------------------------------------------------------------
 
     def _arrays(self) -> tuple[Any, ...]:
         space = self.space
@@ -290,13 +331,19 @@ class Tissue:
     def _theta_rows(self, inverse: Floats) -> Floats:
         """(E, Q, 2 n): nodal displacements to the change of theta."""
         space = self.space
-        B = self._rows if space.sample is space.gradient and self._rows is not None else gradient_rows(space.sample)
+        B = (
+            self._rows
+            if space.sample is space.gradient and self._rows is not None
+            else gradient_rows(space.sample)
+        )
         rows = (inverse[:, :, None] @ B)[:, :, 0]
         return rows if space.projection is None else space.projection @ rows
 
     def _log_curvature(self, q: Floats, inverse: Floats) -> Floats:
         """Second derivative of ln J: -F^-T grad(du)^T F^-T : grad(v), weighted with q (E, S)."""
         space = self.space
+        q = q.copy()
+        q[self._small_strain] = 0.0
         push = space.sample @ np.swapaxes(inverse.reshape(*inverse.shape[:2], 2, 2), -1, -2)
         blocks = -np.einsum("es,esak,esbi->eaibk", q, push, push, optimize=True)
         size = 2 * space.nodes.shape[1]
@@ -342,7 +389,11 @@ def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
     names: Sequence[str] = sorted(mesh.region_names)
     for name in names:
         if name not in laws:
-            raise InputError("finger.materials", f"no material for region {name}", f"one for each of {', '.join(names)}")
+            raise InputError(
+                "finger.materials", f"no material for region {name}", f"one for each of {', '.join(names)}"
+            )
     for name in laws:
         if name not in mesh.region_names:
-            raise InputError(f"finger.materials.{name}", name, f"one of the mesh's regions: {', '.join(names)}")
+            raise InputError(
+                f"finger.materials.{name}", name, f"one of the mesh's regions: {', '.join(names)}"
+            )

@@ -4,8 +4,10 @@ Each pad node j carries the pressure p(g_j) of its current gap on its current pr
 
 Trial states that penetrate count as touching, g = 0.
 
-- ``vertical`` (the paper): :math:`f_y = -p(g_j) A_j`. Not conservative: moving a neighbour sideways changes A_j without work.
-- ``normal``: minus the derivative of :math:`W = \sum_j \Pi(g_j) A_j`, the Maxwell traction on the deformed outline; its tangent is symmetric.
+- ``vertical`` (the paper): :math:`f_y = -p(g_j) A_j`. Not conservative: moving a neighbour sideways changes
+  A_j without work.
+- ``normal``: minus the derivative of :math:`W = \sum_j \Pi(g_j) A_j`, the Maxwell traction on the deformed
+  outline; its tangent is symmetric.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
 """
@@ -25,7 +27,9 @@ from evfem.mesh import Floats
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface` the electrode's outline."""
+    """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface` the
+    electrode's outline.
+    """
 
     law: Any
     layers: Any
@@ -50,7 +54,9 @@ class Attraction:
         return np.stack([sideways + weight * frame.slope, -weight], axis=1)
 
     def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node, component)."""
+        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
+        component).
+        """
         size = position.shape[0]
         frame = outline.frame(self.surface, position)
         length = self.pad.length(position[:, 0])

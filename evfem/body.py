@@ -1,7 +1,8 @@
 r"""The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
 
-The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free nodes' displacements, bone x, bone y);
-forces of the bone's nodes add up to the reaction. User forms (`evfem.forms`) and time (`evfem.dynamics`) are further terms of the internal forces.
+The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free
+nodes' displacements, bone x, bone y); forces of the bone's nodes add up to the reaction. User forms
+(`evfem.forms`) and time (`evfem.dynamics`) are further terms of the internal forces.
 """
 
 from __future__ import annotations
@@ -20,7 +21,13 @@ from evfem.mesh import Floats, Ints
 class Body:
     """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
 
-    def __init__(self, space: Space, laws: Mapping[str, Any], terms: Sequence[Any] = (), dynamics: Dynamics | None = None) -> None:
+    def __init__(
+        self,
+        space: Space,
+        laws: Mapping[str, Any],
+        terms: Sequence[Any] = (),
+        dynamics: Dynamics | None = None,
+    ) -> None:
         self.space = space
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics
@@ -36,7 +43,7 @@ class Body:
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, 2) to reduced forces (n,): sums over the bone."""
-        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size)
+        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
 
     def expand(self, reduced: Floats) -> Floats:
         """Reduced displacements (n,) to nodal ones (N, 2)."""
@@ -50,7 +57,9 @@ class Body:
         return total
 
     def tangent(self, u: Floats) -> Floats:
-        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in laws are symmetric)."""
+        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in laws
+        are symmetric).
+        """
         cells = self.tissue.tangent(u)
         for term in self.terms:
             term.add_tangent(u, cells)
@@ -63,4 +72,3 @@ class Body:
     def energy(self, u: Floats) -> float:
         """Stored energy (N mm per mm of depth) of the tissue."""
         return self.tissue.energy(u)
-

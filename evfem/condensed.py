@@ -1,12 +1,15 @@
-r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on it.
+r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
+it.
 
-With the condensed tangent S, the attraction's stiffness G and the bone's step b (x known; y known, or the unknown d under a prescribed force),
+With the condensed tangent S, the attraction's stiffness G and the bone's step b (x known; y known, or the
+unknown d under a prescribed force),
 
-.. math:: (S_{cc} - G)\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b, \qquad S_{yc}\Delta u_c + S_{yx} b_x + S_{yy} b_y = g_y + F_y .
+.. math:: (S_{cc} - G)\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b, \qquad
+          S_{yc}\Delta u_c + S_{yx} b_x + S_{yy} b_y = g_y + F_y .
 
-:math:`C = (S_{cc} - G)^{-1}` is kept with the factorisation. On a curved profile the contact force turns with the node:
-:math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only
-the nodes near contact, so it is put into their small block alone.
+:math:`C = (S_{cc} - G)^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
+the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness
+changes in every iteration but touches only the nodes near contact, so it is put into their small block alone.
 """
 
 from __future__ import annotations
@@ -22,9 +25,10 @@ from evfem.pad import Frame
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,), contact forces
-    (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the interface's own compliance (c, 2) in
-    mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby needs no other solver.
+    """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,),
+    contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
+    interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
+    for the penalty variant, which thereby needs no other solver.
     """
 
     frame: Frame
@@ -51,7 +55,9 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, attraction included."""
+    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, attraction
+    included.
+    """
 
     schur: Floats
     compliance: Floats
@@ -60,14 +66,16 @@ class Condensed:
     def make(cls, schur: Floats, attraction: Floats | None) -> Condensed:
         """From S (m, m) and the attraction's stiffness on the candidates (m - 2, m - 2), or None."""
         inner = schur[:-2, :-2] if attraction is None else schur[:-2, :-2] - attraction
-        return cls(schur, np.linalg.inv(inner))
+        return cls(schur, np.asarray(np.linalg.inv(inner), dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes back.
+    """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes
+    back.
 
-    `residual` g (m,) of the forward solve, `bone` (2,) the bone's step (y ignored if `load` is given), `load` the force on the bone along y.
+    `residual` g (m,) of the forward solve, `bone` (2,) the bone's step (y ignored if `load` is given), `load`
+    the force on the bone along y.
     """
 
     body: Condensed
@@ -77,7 +85,9 @@ class Step:
     load: float | None
 
     def solve(self) -> tuple[Floats, Floats, Ints, Floats, int]:
-        """(displacement (c, 2), contact force (c, 2) along n and t, statuses (c,), bone step (2,), number of dense solves)."""
+        """(displacement (c, 2), contact force (c, 2) along n and t, statuses (c,), bone step (2,), number
+        of dense solves).
+        """
         free, effect = self._free_motion()
         axes = self.candidates.axes
         gap = self.candidates.frame.normal_gap + np.einsum("ck,ck->c", axes[:, 0], free.reshape(-1, 2))
@@ -106,7 +116,9 @@ class Step:
         return moved, force, status, bone, solves
 
     def _free_motion(self) -> tuple[Floats, Floats | None]:
-        """Candidates' motion without contact forces (2 c,), and per unit of the bone's unknown travel (2 c,)."""
+        """Candidates' motion without contact forces (2 c,), and per unit of the bone's unknown travel (2
+        c,).
+        """
         S, C = self.body.schur, self.body.compliance
         axes, force = self.candidates.axes, self.candidates.force
         present = np.einsum("ca,cak->ck", force, axes).ravel()
@@ -120,19 +132,23 @@ class Step:
         c = self.candidates.status.size
         return self.body.compliance.reshape(2 * c, c, 2)[:, near].reshape(2 * c, -1)
 
-    def _solve_near(self, near: Ints, free: Floats, effect: Floats | None, status: Ints) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and forces (k, 2) in the laboratory frame, turning included."""
+    def _solve_near(
+        self, near: Ints, free: Floats, effect: Floats | None, status: Ints
+    ) -> tuple[ContactSolution, Floats]:
+        """Contact among the `near` nodes: solution in their frames, and forces (k, 2) in the laboratory
+        frame, turning included.
+        """
         k, known = near.size, self.candidates
         rows = (2 * near[:, None] + np.array([0, 1])).ravel()
         columns = self._columns(near)
         C, w = columns[rows], free[rows]
-        turning = None
+        turning: Floats | None = None
         e = None if effect is None else effect[rows]
         if known.frame.curvature[near].any():
-            turning = np.zeros((k, 2, k, 2))
-            turning[np.arange(k), :, np.arange(k)] = known.turning[near]
-            turning = turning.reshape(2 * k, 2 * k)
-            solved = np.linalg.solve(np.eye(2 * k) - C @ turning, np.column_stack([C, w] + ([] if e is None else [e])))
+            turning = _blocks(known.turning[near])
+            solved = np.linalg.solve(
+                np.eye(2 * k) - C @ turning, np.column_stack([C, w] + ([] if e is None else [e]))
+            )
             C, w = solved[:, : 2 * k], solved[:, 2 * k]
             e = None if e is None else solved[:, 2 * k + 1]
         to_local = _rotation(known.axes[near])
@@ -149,7 +165,13 @@ class Step:
         return found, lab.reshape(-1, 2)
 
     def _border(
-        self, free: Floats, effect: Floats | None, columns: Floats, near: tuple[Floats, Floats, Floats], turning: Floats | None, to_local: Floats
+        self,
+        free: Floats,
+        effect: Floats | None,
+        columns: Floats,
+        near: tuple[Floats, Floats, Floats],
+        turning: Floats | None,
+        to_local: Floats,
     ) -> Border:
         """Balance of the bone along y as the extra equation for its travel."""
         assert effect is not None
@@ -171,3 +193,11 @@ def _rotation(axes: Floats) -> Floats:
     rotation = np.zeros((2, k, k, 2))
     rotation[:, np.arange(k), np.arange(k)] = np.swapaxes(axes, 0, 1)
     return rotation.reshape(2 * k, 2 * k)
+
+
+def _blocks(blocks: Floats) -> Floats:
+    """Block-diagonal (2 k, 2 k) matrix of (k, 2, 2) blocks."""
+    k = len(blocks)
+    matrix = np.zeros((k, 2, k, 2))
+    matrix[np.arange(k), :, np.arange(k)] = blocks
+    return matrix.reshape(2 * k, 2 * k)

@@ -1,8 +1,10 @@
-r"""Unilateral contact with Coulomb friction, solved exactly on the dense compliance of the contact candidates.
+r"""Unilateral contact with Coulomb friction, solved exactly on the dense compliance of the contact
+candidates.
 
-For k candidates in their local frames (n normal, t tangential), with the contact forces :math:`\lambda` the new gaps and slips are
-:math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d is an optional extra unknown (the bone's travel under a prescribed force) with the
-equation :math:`r\cdot\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
+For k candidates in their local frames (n normal, t tangential), with the contact forces :math:`\lambda` the
+new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d is an optional extra unknown (the
+bone's travel under a prescribed force) with the equation :math:`r\cdot\lambda + \rho\,d = b`. Signorini and
+Coulomb ask, per node, for exactly one of
 
 ========  ==========================  =================================================
 status    equations                   stays if
@@ -13,10 +15,12 @@ FORWARD   g = 0, lam_t = -mu lam_n    lam_n >= 0 and s >= 0
 BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 ========  ==========================  =================================================
 
-A warm-started active set changes all violated nodes at once: open -> slip the way it is moving when the gap closes, slip -> open when it
-pulls, stick -> slip with the sign of its force when it leaves the cone, slip -> stick (never straight to the other slip) when it moves along
-its own friction. A node passes through slip between open and stick: one that sticks beside a pulling shear force would seem to open. If a set of
-statuses comes back, only the worst violated node changes per solve. No constant has to be chosen. What has not converged is never used.
+A warm-started active set changes all violated nodes at once: open -> slip the way it is moving when the gap
+closes, slip -> open when it pulls, stick -> slip with the sign of its force when it leaves the cone, slip ->
+stick (never straight to the other slip) when it moves along its own friction. A node passes through slip
+between open and stick: one that sticks beside a pulling shear force would seem to open. If a set of statuses
+comes back, only the worst violated node changes per solve. No constant has to be chosen. What has not
+converged is never used.
 """
 
 from __future__ import annotations
@@ -46,7 +50,8 @@ class Border:
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients (k,), optional border.
+    """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients (k,),
+    optional border.
 
     The first k entries are normal (gap, pressing force), the last k tangential (slip, shear force).
     """
@@ -64,7 +69,9 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), statuses (k,), the extra unknown, new gaps and slips (2 k,), and the number of dense solves."""
+    """Contact forces (2 k,), statuses (k,), the extra unknown, new gaps and slips (2 k,), and the number
+    of dense solves.
+    """
 
     force: Floats
     status: Ints
@@ -74,7 +81,9 @@ class ContactSolution:
 
 
 def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> ContactSolution:
-    """Signorini-Coulomb on the candidates, started from `status` (k,); raises `ContactNotSolved` after `limit` solves."""
+    """Signorini-Coulomb on the candidates, started from `status` (k,); raises `ContactNotSolved` after
+    `limit` solves.
+    """
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
     seen: set[bytes] = set()
     for solves in range(1, limit + problem.size + 1):
@@ -121,8 +130,12 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, floa
     return force, float(x[-1]) if border is not None else 0.0
 
 
-def _next_statuses(problem: ContactProblem, status: Ints, force: Floats, state: Floats) -> tuple[Ints, Floats]:
-    """Statuses that the solution asks for, and by how much each node violates its own, in comparable units."""
+def _next_statuses(
+    problem: ContactProblem, status: Ints, force: Floats, state: Floats
+) -> tuple[Ints, Floats]:
+    """Statuses that the solution asks for, and by how much each node violates its own, in comparable
+    units.
+    """
     k, mu = problem.size, problem.friction
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
     softness = np.maximum(np.abs(np.diagonal(problem.compliance)[:k]), 1e-300)

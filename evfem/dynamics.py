@@ -1,10 +1,14 @@
-r"""Time: objective Kelvin-Voigt stress and inertia over one step of backward Euler, as further internal forces.
+r"""Time: objective Kelvin-Voigt stress and inertia over one step of backward Euler, as further internal
+forces.
 
-With the time step :math:`\Delta t`, the strain :math:`E = (F^T F - 1)/2` and the state (u_0, v_0) before the step,
+With the time step :math:`\Delta t`, the strain :math:`E = (F^T F - 1)/2` and the state (u_0, v_0) before the
+step,
 
-.. math:: P_v = F S_v, \quad S_v = 2\eta\,(E - E_0)/\Delta t, \quad \eta = \tau\mu; \qquad f = M\,(v - v_0)/\Delta t, \quad v = (u - u_0)/\Delta t .
+.. math:: P_v = F S_v, \quad S_v = 2\eta\,(E - E_0)/\Delta t, \quad \eta = \tau\mu; \qquad
+          f = M\,(v - v_0)/\Delta t, \quad v = (u - u_0)/\Delta t .
 
-Only the shear modulus enters the viscosity, so nothing locks. The step dissipates :math:`\int S_v : (E - E_0)`. A step that takes no time has neither term.
+Only the shear modulus enters the viscosity, so nothing locks. The step dissipates :math:`\int S_v : (E -
+E_0)`. A step that takes no time has neither term.
 """
 
 from __future__ import annotations
@@ -20,10 +24,14 @@ from evfem.mesh import Floats
 
 
 class Dynamics:
-    """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other term of the internal forces."""
+    """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other term of
+    the internal forces.
+    """
 
     def __init__(self, space: Space, viscosity: Floats | None, density: Floats | None) -> None:
-        """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves the term out."""
+        """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves the term
+        out.
+        """
         self.space = space
         self.viscosity = viscosity
         self.mass = None if density is None else mass_matrices(space) * density[:, None, None]
@@ -61,7 +69,10 @@ class Dynamics:
             S, rate = self._stress(F), (self.viscosity / self.step)[:, None, None, None, None, None]
             unit = np.eye(2)
             D = np.einsum("ik,eqjl->eqijkl", unit, S)
-            D += rate * (np.einsum("eqil,eqkj->eqijkl", F, F) + np.einsum("eqim,eqkm,jl->eqijkl", F, F, unit, optimize=True))
+            D += rate * (
+                np.einsum("eqil,eqkj->eqijkl", F, F)
+                + np.einsum("eqim,eqkm,jl->eqijkl", F, F, unit, optimize=True)
+            )
             D *= self.space.weight[..., None, None, None, None]
             rows = gradient_rows(self.space.gradient)
             flat = rows.reshape(E, Q * 4, 2 * n)
@@ -80,7 +91,9 @@ class Dynamics:
             return 0.0
         F = self._gradient(u)
         S = self._stress(F)
-        return float(np.einsum("eqij,eqij,eq->", S, strain(F) - self._strain0, self.space.weight, optimize=True))
+        return float(
+            np.einsum("eqij,eqij,eq->", S, strain(F) - self._strain0, self.space.weight, optimize=True)
+        )
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """Kinetic energy of nodal velocities (N, 2), N mm per mm of depth."""
@@ -122,7 +135,9 @@ def mass_matrices(space: Space) -> Floats:
 
 
 def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, inertia: bool) -> Dynamics | None:
-    """The time-dependent terms that the laws ask for, or None if there are none; `viscosity` is the laws' default relaxation time (s)."""
+    """The time-dependent terms that the laws ask for, or None if there are none; `viscosity` is the laws'
+    default relaxation time (s).
+    """
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
     for name, law in laws.items():
         cells = space.mesh.cells_of(name)

@@ -1,8 +1,9 @@
 r"""A user's weak form as part of the internal forces: residual integrand only, exact tangent by complex step.
 
-The integrand f(u, v, w) is linear in (v, grad v), so unit test values give its six fluxes :math:`s = \partial f/\partial(v, \nabla v)`; a complex step on
-each of (u, grad u) gives their derivatives D (6 x 6). With rows B from nodal displacements to (u, grad u) the cell forces and tangents are
-:math:`\sum_q w B^T s` and :math:`\sum_q w B^T D B`, over a region or over a named boundary, in the reference configuration.
+The integrand f(u, v, w) is linear in (v, grad v), so unit test values give its six fluxes :math:`s = \partial
+f/\partial(v, \nabla v)`; a complex step on each of (u, grad u) gives their derivatives D (6 x 6). With rows B
+from nodal displacements to (u, grad u) the cell forces and tangents are :math:`\sum_q w B^T s` and
+:math:`\sum_q w B^T D B`, over a region or over a named boundary, in the reference configuration.
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ STEP = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class FormTerm:
-    """A form on a space: `cells` (C,) it touches, `rows` (C, Q, 6, 2 n) to (u_x, u_y, du_x/dX, du_x/dY, du_y/dX, du_y/dY), `weight` (C, Q)."""
+    """A form on a space: `cells` (C,) it touches, `rows` (C, Q, 6, 2 n) to (u_x, u_y, du_x/dX, du_x/dY,
+    du_y/dX, du_y/dY), `weight` (C, Q).
+    """
 
     function: Callable[[Any, Any, Any], Any]
     cells: Ints
@@ -36,7 +39,9 @@ class FormTerm:
         """Internal nodal forces (N, 2) of the form."""
         values = self._values(u)
         flux = np.stack([self._flux(values, k) for k in range(6)], axis=-1)
-        fe = np.einsum("cq,cqk,cqkd->cd", self.weight, flux, self.rows, optimize=True).reshape(*self.nodes.shape, 2)
+        fe = np.einsum("cq,cqk,cqkd->cd", self.weight, flux, self.rows, optimize=True).reshape(
+            *self.nodes.shape, 2
+        )
         return np.stack([np.bincount(self.nodes.ravel(), fe[..., i].ravel(), len(u)) for i in (0, 1)], axis=1)
 
     def add_tangent(self, u: Floats, cells: Floats) -> None:
@@ -79,16 +84,22 @@ def make_term(space: Space, function: Callable[[Any, Any, Any], Any], on: str, b
     mesh, grid = space.mesh, scikit_mesh(space.mesh)
     if boundary:
         if on not in mesh.node_sets:
-            raise InputError("boundary", on, f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}")
+            raise InputError(
+                "boundary", on, f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
+            )
         basis = skfem.FacetBasis(grid, shape, facets=_facets(space, grid, on), intorder=intorder)
         cells = basis.tind
     else:
         if on not in mesh.region_names:
-            raise InputError("region", on, f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}")
+            raise InputError(
+                "region", on, f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}"
+            )
         cells = mesh.cells_of(on)
         basis = skfem.Basis(grid, shape, elements=cells, intorder=intorder)
     value = np.stack([np.broadcast_to(basis.basis[a][0].value, basis.dx.shape) for a in range(basis.Nbfun)])
-    grad = np.stack([np.broadcast_to(basis.basis[a][0].grad, (2, *basis.dx.shape)) for a in range(basis.Nbfun)])
+    grad = np.stack(
+        [np.broadcast_to(basis.basis[a][0].grad, (2, *basis.dx.shape)) for a in range(basis.Nbfun)]
+    )
     rows = np.zeros((*basis.dx.shape, 6, basis.Nbfun, 2))
     rows[:, :, 0, :, 0] = rows[:, :, 1, :, 1] = np.moveaxis(value, 0, -1)
     for i in range(2):

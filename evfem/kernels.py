@@ -1,7 +1,9 @@
-"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`, one cell after the other.
+"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`, one cell
+after the other.
 
-psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are mu (per gradient
-component) and lmbda (for theta). Array shapes as in `evfem.assembly`; `projection` of size 0 means theta = ln J pointwise.
+psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are
+mu (per gradient component) and lmbda (for theta). Array shapes as in `evfem.assembly`; `projection` of size 0
+means theta = ln J pointwise.
 """
 
 from __future__ import annotations
@@ -53,7 +55,14 @@ def _volume_force(log_J: Any, mu: float, lmbda: float, weight: Any, projection: 
 
 @njit(cache=True, error_model="numpy")
 def forces(
-    u: Floats, mu: Floats, lmbda: Floats, nodes: Ints, gradient: Floats, weight: Floats, sample: Floats, projection: Floats
+    u: Floats,
+    mu: Floats,
+    lmbda: Floats,
+    nodes: Ints,
+    gradient: Floats,
+    weight: Floats,
+    sample: Floats,
+    projection: Floats,
 ) -> Floats:
     """Internal nodal forces (N, 2); nan where a cell is inverted."""
     E, Q, n = gradient.shape[:3]
@@ -95,7 +104,14 @@ def forces(
 
 @njit(cache=True, error_model="numpy")
 def tangent(
-    u: Floats, mu: Floats, lmbda: Floats, nodes: Ints, gradient: Floats, weight: Floats, sample: Floats, projection: Floats
+    u: Floats,
+    mu: Floats,
+    lmbda: Floats,
+    nodes: Ints,
+    gradient: Floats,
+    weight: Floats,
+    sample: Floats,
+    projection: Floats,
 ) -> Floats:
     """Cell tangents (E, 2 n, 2 n)."""
     E, Q, n = gradient.shape[:3]
@@ -129,7 +145,8 @@ def tangent(
                 shear = 0.0
                 for q in range(Q):
                     shear += weight[e, q] * (
-                        gradient[e, q, k, 0] * gradient[e, q, m, 0] + gradient[e, q, k, 1] * gradient[e, q, m, 1]
+                        gradient[e, q, k, 0] * gradient[e, q, m, 0]
+                        + gradient[e, q, k, 1] * gradient[e, q, m, 1]
                     )
                 shear *= mu[e]
                 for i in range(2):

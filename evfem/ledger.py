@@ -1,7 +1,9 @@
-r"""What is reported of a run: one row per requested step, works and energies summed over its parts, and the fields.
+r"""What is reported of a run: one row per requested step, works and energies summed over its parts, and the
+fields.
 
-Works are trapezoidal over every accepted part: the bone's reaction on its travel, the attraction on the pad's displacement (with the attraction the part begins
-with, at its own voltage), and friction :math:`-\frac12(\lambda_t^0 + \lambda_t)\,s` on the slip along the profile.
+Works are trapezoidal over every accepted part: the bone's reaction on its travel, the attraction on the pad's
+displacement (with the attraction the part begins with, at its own voltage), and friction
+:math:`-\frac12(\lambda_t^0 + \lambda_t)\,s` on the slip along the profile.
 """
 
 from __future__ import annotations

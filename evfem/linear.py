@@ -1,12 +1,15 @@
 r"""Sparse factorisation of the tissue's tangent with exact condensation onto a few unknowns.
 
-The symmetric tangent is split into interior unknowns i and kept unknowns c (contact candidates and the bone's two translations):
+The symmetric tangent is split into interior unknowns i and kept unknowns c (contact candidates and the bone's
+two translations):
 
-.. math:: S = K_{cc} - K_{ci} K_{ii}^{-1} K_{ic}, \qquad g = b_c - K_{ci} K_{ii}^{-1} b_i, \qquad S x_c = g, \qquad K_{ii} x_i = b_i - K_{ic} x_c .
+.. math:: S = K_{cc} - K_{ci} K_{ii}^{-1} K_{ic}, \qquad g = b_c - K_{ci} K_{ii}^{-1} b_i, \qquad
+          S x_c = g, \qquad K_{ii} x_i = b_i - K_{ic} x_c .
 
-Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to the small dense S by the caller. `Pardiso` (from
-evfem[fast]) returns S with its factorisation and solves in two halves. `SuperLU` eliminates the kept unknowns last, so that S is
-the product of the trailing blocks of L and U. Only i must be positive definite: the bone may be free to move.
+Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to the small
+dense S by the caller. `Pardiso` (from evfem[fast]) returns S with its factorisation and solves in two halves.
+`SuperLU` eliminates the kept unknowns last, so that S is the product of the trailing blocks of L and U. Only
+i must be positive definite: the bone may be free to move.
 """
 
 from __future__ import annotations
@@ -25,7 +28,9 @@ class Singular(ArithmeticError):
 
 
 class Pattern:
-    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR matrix of size n."""
+    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR matrix
+    of size n.
+    """
 
     def __init__(self, unknowns: Ints, size: int) -> None:
         self.size = size
@@ -42,7 +47,9 @@ class Pattern:
 
     def upper(self, cells: Floats, diagonal: Floats | None = None) -> Floats:
         """CSR data of the upper triangle from cell matrices, with an optional diagonal (n,) added."""
-        data = np.bincount(self.position, cells.ravel()[self.kept], self.indices.size)
+        data: Floats = np.bincount(self.position, cells.ravel()[self.kept], self.indices.size).astype(
+            float, copy=False
+        )
         if diagonal is not None:
             data[self.diagonal] += diagonal
         return data
@@ -66,12 +73,16 @@ class Condensation(Protocol):
 
 
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
-    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves S singular."""
+    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves S
+    singular.
+    """
     return float(np.abs(upper[pattern.diagonal[kept]]).max())
 
 
 class Pardiso:
-    """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many factorisations."""
+    """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many
+    factorisations.
+    """
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
         from pypardiso.pardiso_wrapper import PyPardisoSolver
@@ -91,7 +102,8 @@ class Pardiso:
         self.mtype = mtype
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
-        # user values; METIS; no refinement; pivot shift 1e-8 if indefinite; C indices; dense Schur complement kept for solves
+        # user values; METIS; no refinement; pivot shift 1e-8 if indefinite; C indices; dense Schur complement
+        # kept for solves
         for index, value in {0: 1, 1: 2, 7: 0, 9: 8, 34: 1, 35: 2}.items():
             self._iparm[index] = value
         self._mark[:] = 0
@@ -109,15 +121,17 @@ class Pardiso:
             return array.ctypes.data_as(ctypes.c_void_p)
 
         error = ctypes.c_int32(0)
-        self._call_pardiso(
-            self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)), number(1), number(1), number(self.mtype), number(phase),
-            number(self.pattern.size), values(self._values), integers(self.pattern.indptr), integers(self.pattern.indices),
-            integers(self._mark), number(1), integers(self._iparm), number(0), values(b), values(x), ctypes.byref(error),
-        )  # fmt: skip
+        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        kind = (number(1), number(1), number(self.mtype), number(phase), number(self.pattern.size))
+        matrix = (values(self._values), integers(self.pattern.indptr), integers(self.pattern.indices))
+        control = (integers(self._mark), number(1), integers(self._iparm), number(0))
+        self._call_pardiso(handle, *kind, *matrix, *control, values(b), values(x), ctypes.byref(error))
         return error.value
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if even the indefinite factorisation fails."""
+        """Factorise new values of the pattern; raises `Singular` if even the indefinite factorisation
+        fails.
+        """
         shift = shift_of_kept(self.pattern, self.kept, upper)
         self._values = upper.copy()
         self._values[self.pattern.diagonal[self.kept]] += shift
@@ -186,10 +200,13 @@ class SuperLU:
                 first = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
                 self._ordering = np.concatenate([self._interior[np.argsort(first.perm_c)], self.kept])
             order = self._ordering
-            self._lu = splu(A[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options)
+            self._lu = splu(
+                A[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options
+            )
         except RuntimeError as error:
             raise Singular(str(error)) from error
-        # elimination starts where SuperLU's own post-ordering says; the kept unknowns stay last, in their order
+        # elimination starts where SuperLU's own post-ordering says; the kept unknowns stay last, in their
+        # order
         m = self.kept.size
         if not np.array_equal(self._lu.perm_c[-m:], np.arange(self.pattern.size - m, self.pattern.size)):
             raise Singular("SuperLU moved the kept unknowns")

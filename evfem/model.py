@@ -1,4 +1,6 @@
-"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction, equilibrium solver."""
+"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction, equilibrium
+solver.
+"""
 
 from __future__ import annotations
 
@@ -16,13 +18,16 @@ from evfem.electrostatics import Layer, Layers
 from evfem.errors import InputError
 from evfem.forms import make_term
 from evfem.mesh import Floats, Mesh
-from evfem.newton import Equilibrium
+from evfem.newton import Equilibrium, RigidOutline
+from evfem.plan import plan_on, scene_mesh
 from evfem.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical gap at the start."""
+    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical
+    gap at the start.
+    """
 
     scene: Scene
     mesh: Mesh
@@ -42,32 +47,29 @@ class Model:
         return float(-bone[1] - self.first_gap)
 
 
-def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
-    """The finger's mesh and the element to use on it."""
-    linear = scene.solver.element in ("q1", "q1_fbar")
-    mesh = scene.finger.mesh(1 if linear else 2)
-    return mesh, scene.solver.element_on(mesh.corners)
-
-
 def make_model(scene: Scene) -> Model:
     """Build the parts of a scene; raises `InputError` where mesh, names and scene do not fit."""
     mesh, element = scene_mesh(scene)
     check_laws(mesh, scene.finger.materials)
-    if "bone" not in mesh.node_sets or not len(mesh.node_sets["bone"]):
-        raise InputError("finger.mesh", "no nodes on `bone`", "point data or a physical group `bone` that holds the finger")
+    needed = plan_on(scene, mesh, element)
     space = make_space(mesh, element)
     pad = outline.make_pad(mesh)
     surface, first_gap = placed(scene.surface, mesh.points[pad.nodes])
-    attraction = make_attraction(scene, mesh, pad, surface)
-    terms = [make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary") for term in scene.forms]
+    attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
+    terms = [
+        make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary")
+        for term in scene.forms
+    ]
     solver, laws = scene.solver, scene.finger.materials
     dynamics = None
-    if solver.dynamics != "quasistatic":
+    if needed.has("time"):
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
-    equilibrium = Equilibrium(body, pad, surface, attraction, solver.tolerance, solver.threads)
+    solve = Equilibrium if needed.has("tissue") else RigidOutline
+    equilibrium = solve(body, pad, surface, attraction, solver.tolerance, solver.threads)
     if solver.contact == "penalty":
-        equilibrium.penalties = (solver.penalty_normal, solver.penalty_tangential or solver.penalty_normal)
+        normal = float(solver.penalty_normal or 0.0)
+        equilibrium.penalties = (normal, solver.penalty_tangential or normal)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 
@@ -79,19 +81,21 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
         return surface.shifted(gap), 0.0
     g0 = gap - surface.y
     if g0 < -1e-12 * np.ptp(outline_points, axis=0).max():
-        raise InputError("surface.y", surface.y, f"at most {gap:.9g} mm, where the surface touches the undeformed outline")
+        raise InputError(
+            "surface.y", surface.y, f"at most {gap:.9g} mm, where the surface touches the undeformed outline"
+        )
     return surface, max(g0, 0.0)
 
 
-def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) -> Attraction | None:
-    """The attraction, or None without a voltage; the skin's layer is a given number or the local thickness of the mesh."""
-    if scene.law is None:
-        return None
+def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) -> Attraction:
+    """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
     electrical = scene.finger.electrical
     thickness = None if electrical is None else electrical.stratum_corneum_thickness
     if thickness is None:
         if electrical is None or "stratum_corneum" not in mesh.region_names:
-            allowed = "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+            allowed = (
+                "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+            )
             raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
         from evfem.mesh import layer_thickness
 

@@ -1,15 +1,18 @@
-r"""One equilibrium step: outer Newton iterations on the whole body, contact solved exactly inside each of them.
+r"""One equilibrium step: outer Newton iterations on the whole body, contact solved exactly inside each of
+them.
 
-At the iterate u with contact forces lam and attraction f the out-of-balance forces are R = f_int(u) - f(u) - lam. With the factorised
-(possibly older) tangent K of the tissue, condensed onto the candidates c and the bone b,
+At the iterate u with contact forces lam and attraction f the out-of-balance forces are R = f_int(u) - f(u) -
+lam. With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and the
+bone b,
 
 .. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b - G\,\Delta u_c = g_c + \lambda^+ - \lambda, \qquad
           S_{yc}\,\Delta u_c + S_{yy}\,\Delta u_y = g_y - F - ... ,
 
-where G is the attraction's stiffness. The compliance :math:`C' = (S_{cc} - G)^{-1}` turns this into a contact problem for the new forces
-(`evfem.contact`); a prescribed force makes the bone's travel its extra unknown. Then the interior follows by the backward solve.
-The factorisation is kept across iterations and steps and renewed when the residual stalls or the iterations it would save cost more.
-A step is accepted only if residual, gaps, penetration, stick, slip direction and cone all hold at the accepted positions.
+where G is the attraction's stiffness. The compliance :math:`C' = (S_{cc} - G)^{-1}` turns this into a contact
+problem for the new forces (`evfem.contact`); a prescribed force makes the bone's travel its extra unknown.
+Then the interior follows by the backward solve. The factorisation is kept across iterations and steps and
+renewed when the residual stalls or the iterations it would save cost more. A step is accepted only if
+residual, gaps, penetration, stick, slip direction and cone all hold at the accepted positions.
 """
 
 from __future__ import annotations
@@ -44,9 +47,9 @@ class StepFailed(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's normal and tangent (P, 2), their
-    statuses (P,), the bone's translation (2,), voltage, attraction on the pad nodes (P, 2), forces on the bone (2,), nodal
-    velocities (N, 2) in mm/s."""
+    """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's
+    normal and tangent (P, 2), their statuses (P,), the bone's translation (2,), voltage, attraction on the
+    pad nodes (P, 2), forces on the bone (2,), nodal velocities (N, 2) in mm/s."""
 
     u: Floats
     contact_force: Floats
@@ -60,7 +63,9 @@ class State:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm); voltage (V); seconds it takes."""
+    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm);
+    voltage (V); seconds it takes.
+    """
 
     bone: Floats
     force: float | None
@@ -81,7 +86,9 @@ class Record:
 
 @dataclass(frozen=True)
 class Balance:
-    """Out-of-balance forces of the reduced unknowns (n,), their largest relative to the reaction, the prescribed force on the bone along y."""
+    """Out-of-balance forces of the reduced unknowns (n,), their largest relative to the reaction, the
+    prescribed force on the bone along y.
+    """
 
     forces: Floats
     residual: float
@@ -91,27 +98,51 @@ class Balance:
 class Equilibrium:
     """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
-    def __init__(self, body: Body, pad: outline.Pad, surface: Any, attraction: Attraction | None, tolerance: float, threads: int = 1) -> None:
+    def __init__(
+        self,
+        body: Body,
+        pad: outline.Pad,
+        surface: Any,
+        attraction: Attraction | None,
+        tolerance: float,
+        threads: int = 1,
+    ) -> None:
         self.body, self.pad, self.surface, self.attraction = body, pad, surface, attraction
         self.tolerance, self.threads = tolerance, threads
         self.penalties: tuple[float, float] | None = None
         self.record = Record()
         self.points = body.space.mesh.points
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
-        self.length = float(np.median(np.hypot(*(self.points[pad.nodes[pad.edges[:, 0]]] - self.points[pad.nodes[pad.edges[:, 1]]]).T)))
+        self.length = float(
+            np.median(
+                np.hypot(
+                    *(self.points[pad.nodes[pad.edges[:, 0]]] - self.points[pad.nodes[pad.edges[:, 1]]]).T
+                )
+            )
+        )
         self._factor: Any = None
         self._condensed: Any = None
         self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
         self._frozen = False
         self._outdated = False
 
-    # -- what a state is ----------------------------------------------------------------------------------------------
+    # -- what a state is
+    # ----------------------------------------------------------------------------------------------
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone`."""
         zero = np.zeros((self.pad.nodes.size, 2))
         u = np.broadcast_to(bone, self.points.shape).copy()
-        state = State(u, zero, np.zeros(len(zero), dtype=np.int64), np.array(bone, dtype=float), voltage, zero, np.zeros(2), np.zeros_like(u))
+        state = State(
+            u,
+            zero,
+            np.zeros(len(zero), dtype=np.int64),
+            np.array(bone, dtype=float),
+            voltage,
+            zero,
+            np.zeros(2),
+            np.zeros_like(u),
+        )
         return replace(state, attraction=self.attraction_at(state, state, voltage))
 
     def positions(self, u: Floats) -> Floats:
@@ -125,11 +156,14 @@ class Equilibrium:
         slope, stretch = frame.slope, frame.stretch
         return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
 
-    # -- one step -------------------------------------------------------------------------------------------------------
+    # -- one step
+    # -------------------------------------------------------------------------------------------------------
 
-    def step(self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None) -> State:
-        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the current one if given;
-        iterations begin at `start` (default `old`). Raises `StepFailed`."""
+    def step(
+        self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
+    ) -> State:
+        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the
+        current one if given; iterations begin at `start` (default `old`). Raises `StepFailed`."""
         travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
         self._touching, self._frozen = old.status != OPEN, frozen is not None
         self.choose_candidates(old, 1.2 * travel)
@@ -138,7 +172,9 @@ class Equilibrium:
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
             state, balance = self._balance(old, state, target, frozen)
-            arrived = target.bone[0] == state.bone[0] and (target.force is not None or target.bone[1] == state.bone[1])
+            arrived = target.bone[0] == state.bone[0] and (
+                target.force is not None or target.bone[1] == state.bone[1]
+            )
             history.append(balance.residual)
             self.record.residuals = history
             if not np.isfinite(balance.residual):
@@ -162,8 +198,12 @@ class Equilibrium:
         self._outdated = not 0.67 * dynamics.step <= duration <= 1.5 * dynamics.step
         dynamics.begin(old.u, old.velocity, duration)
 
-    def _balance(self, old: State, state: State, target: Target, frozen: Floats | None) -> tuple[State, Balance]:
-        """Out-of-balance forces (n,) of the reduced unknowns, the forces that make them, and their relative size."""
+    def _balance(
+        self, old: State, state: State, target: Target, frozen: Floats | None
+    ) -> tuple[State, Balance]:
+        """Out-of-balance forces (n,) of the reduced unknowns, the forces that make them, and their
+        relative size.
+        """
         attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
         nodal = self.body.forces(state.u)
         nodal[self.pad.nodes] -= attraction + self.contact_forces(state)
@@ -175,10 +215,14 @@ class Equilibrium:
         free = max(np.abs(forces[:-2]).max(), sums)
         if load is not None:
             free = max(free, abs(reaction[1] - load))
-        return replace(state, attraction=attraction, reaction=reaction), Balance(forces, float(free / largest), load)
+        return replace(state, attraction=attraction, reaction=reaction), Balance(
+            forces, float(free / largest), load
+        )
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from `old`, the last converged state."""
+        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from
+        `old`, the last converged state.
+        """
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
         return self.attraction.forces(self.positions(state.u), voltage, old.status != OPEN)
@@ -188,7 +232,9 @@ class Equilibrium:
         self._factor = None
 
     def _advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells would collapse."""
+        """One outer iteration: solve the contact problem of the linearised body, move, shorten where
+        cells would collapse.
+        """
         saved, g = self._factor.forward(-balance.forces)
         c = self.candidates
         step = Step(self._condensed, self._describe(old, state), g, target.bone - state.bone, balance.load)
@@ -215,12 +261,17 @@ class Equilibrium:
         position = self.positions(state.u)[c]
         frame = outline.frame(self.surface, position)
         softness = self._softness(old)[c]
-        slip = frame.stretch * (position[:, 0] - self.positions(old.u)[c, 0]) - softness[:, 1] * old.contact_force[c, 1]
+        slip = (
+            frame.stretch * (position[:, 0] - self.positions(old.u)[c, 0])
+            - softness[:, 1] * old.contact_force[c, 1]
+        )
         friction = self._friction(position[:, 0])
         return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness)
 
     def _softness(self, old: State) -> Floats:
-        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is exact."""
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
+        exact.
+        """
         if self.penalties is None:
             return np.zeros_like(old.contact_force)
         length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
@@ -237,27 +288,34 @@ class Equilibrium:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return share
 
-    # -- candidates and factorisation ---------------------------------------------------------------------------------
+    # -- candidates and factorisation
+    # ---------------------------------------------------------------------------------
 
     def choose_candidates(self, state: State, reach: float) -> None:
-        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the present set does not do."""
+        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the
+        present set does not do.
+        """
         gap = outline.frame(self.surface, self.positions(state.u)).gap
         needed = self.pad.free & ((gap <= reach) | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
-        if not needed[self.candidates].sum() == needed.sum():
+        if needed[self.candidates].sum() != needed.sum():
             wider = self.pad.free & ((gap <= max(2.0 * reach, 4.0 * self.length)) | needed)
             self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
             self._factor = None
 
     def _renew(self, state: State, history: list[float]) -> None:
-        """Factorise at the present state where there is no factorisation, the old one stalls, or a new one saves iterations."""
+        """Factorise at the present state where there is no factorisation, the old one stalls, or a new
+        one saves iterations.
+        """
         if self._factor is not None and not self._outdated and not self._stale(history):
             return
         self._outdated = False
         if self._factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
-            self._factor = make_condensation(self.body.pattern, np.concatenate([unknowns, self.body.bone]), self.threads)
+            self._factor = make_condensation(
+                self.body.pattern, np.concatenate([unknowns, self.body.bone]), self.threads
+            )
             self.record.backend = type(self._factor).__name__
         try:
             self._factor.factorise(self.body.tangent(state.u))
@@ -281,10 +339,13 @@ class Equilibrium:
         unknowns = (2 * self.candidates[:, None] + np.array([0, 1])).ravel()
         return np.asarray(whole[unknowns][:, unknowns].toarray())
 
-    # -- acceptance -----------------------------------------------------------------------------------------------------
+    # -- acceptance
+    # -----------------------------------------------------------------------------------------------------
 
     def obeys_contact(self, old: State, state: State) -> bool:
-        """Whether gaps, stick, slip and the friction cone hold at the present positions; admits new candidates where a node sinks in."""
+        """Whether gaps, stick, slip and the friction cone hold at the present positions; admits new
+        candidates where a node sinks in.
+        """
         position = self.positions(state.u)
         frame = outline.frame(self.surface, position)
         short = self.tolerance * self.length
@@ -302,7 +363,26 @@ class Equilibrium:
         status = state.status[active]
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
-        slips = (status == STICK) | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak)) | (limit == 0.0)
+        slips = (
+            (status == STICK)
+            | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
+            | (limit == 0.0)
+        )
         gap = frame.normal_gap[active] + softness[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())
+
+
+class RigidOutline(Equilibrium):
+    """The same questions asked of a pad that does not deform: it hovers, and the bone carries the
+    attraction.
+    """
+
+    def step(
+        self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
+    ) -> State:
+        """The translated outline under its attraction; raises `StepFailed` if it would touch."""
+        state = replace(self.rest(target.bone, target.voltage), velocity=old.velocity)
+        if outline.frame(self.surface, self.positions(state.u)).gap.min() <= 0.0 or target.force is not None:
+            raise StepFailed("a rigid outline cannot touch", [1.0])
+        return replace(state, reaction=-state.attraction.sum(axis=0))

@@ -63,6 +63,10 @@ class Finger(Protocol):
     def viscosity(self) -> float:
         """Relaxation time of Kelvin-Voigt tissue (s)."""
 
+    @property
+    def electrical(self) -> Any:
+        """Thickness (mm, or None for the mesh's own) and permittivity of the stratum corneum."""
+
     def mesh(self, order: int) -> Any:
         """The mesh with elements of that order."""
 
@@ -78,6 +82,10 @@ class Surface(Protocol):
     @property
     def has_friction(self) -> bool:
         """Whether the friction coefficient is positive anywhere."""
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether height, slope and curvature are zero everywhere."""
 
     def height(self, x: Any) -> Any:
         """Height of the profile at x (mm)."""

@@ -1,4 +1,6 @@
-"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged step out."""
+"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged step
+out.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,6 @@ import numpy as np
 
 from evfem.errors import InputError, NotConverged
 from evfem.ledger import SUMS, Ledger, frame_of
-from evfem.mesh import Floats
 from evfem.model import Model, make_model
 from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.newton import State, StepFailed, Target
@@ -25,7 +26,9 @@ ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less fr
 
 @dataclass(frozen=True)
 class Request:
-    """One requested step: its number in the run, its motion, and the path from the state before to its exact target."""
+    """One requested step: its number in the run, its motion, and the path from the state before to its
+    exact target.
+    """
 
     step: int
     motion_index: int
@@ -34,12 +37,16 @@ class Request:
     duration: float
 
 
-def simulate(scene: Scene, *, progress: bool = False, observers: Sequence[Any] = (), resume: Saved | None = None) -> Result:
-    """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how they came about.
+def simulate(
+    scene: Scene, *, progress: bool = False, observers: Sequence[Any] = (), resume: Saved | None = None
+) -> Result:
+    """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how
+    they came about.
 
-    `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)` after every converged step
-    (`frame` is None on steps without fields, `checkpoint()` gives the arrays to resume from) and `finished(result)`. `resume` continues from such
-    arrays and rows. Raises `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
+    `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)`
+    after every converged step (`frame` is None on steps without fields, `checkpoint()` gives the arrays to
+    resume from) and `finished(result)`. `resume` continues from such arrays and rows. Raises `NotConverged`,
+    with the result so far, and leaves everything up to the last good step with the observers.
     """
     run = Run(scene, resume)
     total = scene.total_steps
@@ -77,7 +84,8 @@ class Run:
         voltage = self.scene.voltage
         return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
 
-    # -- from motions to targets -------------------------------------------------------------------------------------
+    # -- from motions to targets
+    # -------------------------------------------------------------------------------------
 
     def requests(self) -> Iterator[Request]:
         """The steps still to do; paths start from the state at the time they are asked for."""
@@ -89,14 +97,19 @@ class Run:
                 continue
             start = self._start_of(first)
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
-                ends = [self._target(motion, start, (k - 1 + s) / motion.steps) for s in (0.0, 1.0)]
+                begin, end = (self._target(motion, start, j / motion.steps) for j in (k - 1, k))
                 seconds = _duration(motion, start)
-                yield Request(first + k, index, motion.kind, self._path(*ends, seconds), seconds)
+                yield Request(first + k, index, motion.kind, self._path(begin, end, seconds), seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
         """Bone position, indentation, force and voltage at which a motion starts."""
         if rows_before == 0:
-            return {"position": 0.0, "indentation": 0.0, "applied_force": 0.0, "voltage": self.voltage_at(0.0)}
+            return {
+                "position": 0.0,
+                "indentation": 0.0,
+                "applied_force": 0.0,
+                "voltage": self.voltage_at(0.0),
+            }
         row = self.rows[rows_before - 1]
         return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
 
@@ -142,7 +155,8 @@ class Run:
 
         return target
 
-    # -- one requested step -----------------------------------------------------------------------------------------------
+    # -- one requested step
+    # -----------------------------------------------------------------------------------------------
 
     def advance(self, request: Request) -> Frame | None:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
@@ -176,9 +190,12 @@ class Run:
             "candidates": int(self.model.equilibrium.candidates.size),
             "backend": record.backend,
         }
-        return Result.from_rows(self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver))
+        return Result.from_rows(
+            self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
+        )
 
-    # -- checkpoints --------------------------------------------------------------------------------------------------------
+    # -- checkpoints
+    # --------------------------------------------------------------------------------------------------------
 
     def checkpoint(self) -> dict[str, Any]:
         """Arrays from which the run can go on after its last converged step."""
@@ -199,10 +216,12 @@ class Run:
         }
 
     def _restore(self, saved: Saved) -> None:
-        arrays: dict[str, Floats] = saved.arrays
+        arrays: dict[str, Any] = saved.arrays
         for name, array in self.checkpoint().items():
             if name not in arrays or (name != "candidates" and arrays[name].shape != np.shape(array)):
-                raise InputError("checkpoint", f"no usable {name}", "a checkpoint of the same scene and version")
+                raise InputError(
+                    "checkpoint", f"no usable {name}", "a checkpoint of the same scene and version"
+                )
         names = ("u", "contact_force", "status", "bone", "attraction", "reaction", "velocity")
         self.state = State(**{name: arrays[name] for name in names}, voltage=float(arrays["voltage"]))
         self.model.equilibrium.candidates = arrays["candidates"]
@@ -218,7 +237,11 @@ def _duration(motion: Motion, start: dict[str, float]) -> float:
         return 0.0
     if isinstance(motion, Slide):
         return abs(motion.distance) / motion.steps / speed
-    end = motion.indentation if isinstance(motion, Press) and motion.indentation is not None else start["indentation"]
+    end = (
+        motion.indentation
+        if isinstance(motion, Press) and motion.indentation is not None
+        else start["indentation"]
+    )
     return abs(end - start["indentation"]) / motion.steps / speed
 
 

@@ -1,6 +1,7 @@
 """Adaptive steps: a requested step is reached exactly, in as many parts as its equilibria need.
 
-A part that fails is halved; after a part that took few iterations the next one grows. Nothing that has not converged is kept.
+A part that fails is halved; after a part that took few iterations the next one grows. Nothing that has not
+converged is kept.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ class Stepper:
     cuts: int = 0
 
     def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
-        """From `state` to the end of `path`; `accept(old, new)` sees every converged part. Returns the end and the number of parts.
+        """From `state` to the end of `path`; `accept(old, new)` sees every converged part. Returns the end
+        and the number of parts.
 
         Raises `StepFailed` when the smallest part fails; what was accepted before stays accepted.
         """
@@ -55,7 +57,9 @@ class Stepper:
         return state, parts
 
     def solve(self, state: State, target: Target) -> State:
-        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction found beforehand."""
+        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction found
+        beforehand.
+        """
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:
             return equilibrium.step(state, target)
