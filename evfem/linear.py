@@ -15,6 +15,7 @@ i must be positive definite: the bone may be free to move.
 from __future__ import annotations
 
 import ctypes
+import sys
 from typing import Any, Protocol
 
 import numpy as np
@@ -173,7 +174,7 @@ class Pardiso:
             self._handle[:] = 0
 
     def __del__(self) -> None:
-        if hasattr(self, "_handle"):
+        if hasattr(self, "_handle") and not sys.is_finalizing():
             self.close()
 
 

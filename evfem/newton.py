@@ -337,7 +337,13 @@ class Equilibrium:
             return None
         whole = self.attraction.stiffness(self.positions(state.u), state.voltage, self._touching)
         unknowns = (2 * self.candidates[:, None] + np.array([0, 1])).ravel()
-        return np.asarray(whole[unknowns][:, unknowns].toarray())
+        rows = whole[unknowns]
+        inner = np.asarray(rows[:, unknowns].toarray())
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes no tributary length
+        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
+        index = np.arange(unknowns.size)
+        inner[index, 2 * (index // 2)] += beyond
+        return inner
 
     # -- acceptance
     # -----------------------------------------------------------------------------------------------------

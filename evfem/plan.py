@@ -59,7 +59,7 @@ class Plan:
         lines += [
             "",
             "Unknowns",
-            f"  {self.unknowns} displacements, the bone's translation among them; {self.pad_nodes} pad nodes may touch",
+            f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
         ]
         lines += ["", "Solver"] + [f"  {line}" for line in self.solver]
         return "\n".join(lines)
@@ -227,5 +227,5 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         )
     return (
         *lines,
-        f"every accepted step: largest free residual below {scene.solver.tolerance:g} of the largest reaction",
+        f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",
     )
