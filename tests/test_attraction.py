@@ -1,0 +1,191 @@
+"""Electrostatic forces on the outline: directions, derivatives, energy, and the exact hover force."""
+
+import numpy as np
+import pytest
+
+from evfem.attraction import Attraction
+from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.pad import Pad
+from evfem.surfaces import Flat, Sinusoid
+
+LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+SURFACES = [Flat(y=-1.0), Sinusoid(terms=[[0.05, 4.0, 0.3]], y=-1.0)]
+surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"])
+orders = pytest.mark.parametrize("order", [1, 2])
+directions = pytest.mark.parametrize("direction", ["vertical", "normal"])
+
+
+class TractionOnly:
+    """A user's law with the one method it must have."""
+
+    def traction(self, gap, voltage, layers):
+        return 3e-9 * voltage**2 * np.exp(-gap / (0.1 + layers.thickness))
+
+
+laws = pytest.mark.parametrize("law", [Kaczmarek(), StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
+
+
+def outline(order, size=9):
+    """An irregular open outline whose last edge turns back, and positions that all hover."""
+    s = np.arange(size)
+    x = 0.3 * s + 0.04 * np.sin(5.0 * s)
+    x[-1] = x[-1 - order] - 0.1
+    y = -0.9 + 0.3 * np.cos(s) ** 2 + 0.1 * s / size
+    edges = np.column_stack([s[:-1], s[1:]])
+    if order == 2:
+        edges = np.column_stack([s[:-2:2], s[2::2], s[1::2]])
+    return Pad(s, edges, np.ones(size, dtype=bool)), np.column_stack([x, y])
+
+
+def make(law, surface, order, direction="vertical", air_layer=True):
+    pad, position = outline(order)
+    thickness = np.linspace(0.3, 0.5, pad.nodes.size)
+    layers = Layers.of(Layer(thickness, 1650.0), Layer(0.09, 3.35))
+    return Attraction(law, layers, pad, surface, direction, air_layer), position
+
+
+def everyone(attraction):
+    return np.ones(attraction.pad.nodes.size, dtype=bool)
+
+
+def differences(attraction, position, touching, h=1e-6):
+    """Central differences of the forces, (2 P, 2 P)."""
+    columns = []
+    for unit in np.eye(position.size):
+        step = h * unit.reshape(position.shape)
+        ahead, behind = (attraction.forces(position + s, 800.0, touching) for s in (step, -step))
+        columns.append((ahead - behind).ravel() / (2 * h))
+    return np.array(columns).T
+
+
+@orders
+@laws
+@surfaces
+def test_vertical_forces_are_pressure_times_projected_length(law, surface, order):
+    attraction, position = make(law, surface, order)
+    forces = attraction.forces(position, 800.0, everyone(attraction))
+    gap = position[:, 1] + 1.0 - surface.height(position[:, 0])
+    assert (gap > 0).all()
+    length = attraction.pad.length(position[:, 0])
+    assert forces[:, 0].tolist() == [0.0] * len(forces)
+    np.testing.assert_allclose(-forces[:, 1], law.traction(gap, 800.0, attraction.layers) * length)
+    assert length[-1] == 0.0  # the last node faces up
+    assert length[1] > 0.0
+
+
+def test_the_pressure_of_a_node_by_hand():
+    # eqs. (9a), (9b) with U = 1000 V, g = 0.1 mm, s = 0.38/1650 + 0.09/3.35 mm, D = 0.47 mm
+    pad = Pad(np.arange(3), np.array([[0, 1], [1, 2]]), np.ones(3, dtype=bool))
+    position = np.array([[0.0, 0.1], [1.0, 0.1], [2.0, 0.1]])
+    s = 0.38 / 1650.0 + 0.09 / 3.35
+    rigid = 0.5 * 8.8541878128e-12 * 1e6 / (0.1 + s) ** 2
+    stretching = 0.5 * 8.8541878128e-12 * 1e6 / ((0.1 + s) * 0.57)
+    for law, pressure in ((StrongTroxel(), rigid), (Kaczmarek(), stretching)):
+        forces = Attraction(law, LAYERS, pad, Flat(y=0.0)).forces(position, 1000.0, np.zeros(3, dtype=bool))
+        np.testing.assert_allclose(forces[:, 1], -pressure * np.array([0.5, 1.0, 0.5]), rtol=1e-9)
+
+
+@directions
+def test_without_air_layer_only_touching_nodes_carry_force(direction):
+    surface = SURFACES[1]
+    with_air, position = make(Kaczmarek(), surface, 1, direction)
+    without, _ = make(Kaczmarek(), surface, 1, direction, air_layer=False)
+    nobody = np.zeros(9, dtype=bool)
+    assert not without.forces(position, 800.0, nobody).any()
+    np.testing.assert_array_equal(
+        without.forces(position, 800.0, everyone(without)), with_air.forces(position, 800.0, nobody)
+    )
+    one = np.arange(9) == 3
+    downward = without.forces(position, 800.0, one)[:, 1]
+    assert np.flatnonzero(downward).tolist() == [3]
+    assert downward[3] == with_air.forces(position, 800.0, one)[3, 1]
+
+
+@directions
+def test_forces_grow_with_the_square_of_the_voltage_whatever_its_sign(direction):
+    attraction, position = make(Kaczmarek(), SURFACES[1], 2, direction)
+    forces = [attraction.forces(position, voltage, everyone(attraction)) for voltage in (0.0, 500.0, -1000.0)]
+    assert not forces[0].any()
+    np.testing.assert_allclose(forces[2], 4.0 * forces[1], rtol=1e-14)
+
+
+@pytest.mark.parametrize("air_layer", [True, False])
+@directions
+@orders
+@laws
+@surfaces
+def test_stiffness_by_central_differences(law, surface, order, direction, air_layer):
+    attraction, position = make(law, surface, order, direction, air_layer)
+    touching = np.arange(9) % 3 != 1
+    stiffness = attraction.stiffness(position, 800.0, touching).toarray()
+    expected = differences(attraction, position, touching)
+    np.testing.assert_allclose(stiffness, expected, atol=2e-8 * np.abs(expected).max())
+
+
+@orders
+@surfaces
+def test_stiffness_of_a_law_with_only_a_traction(surface, order):
+    attraction, position = make(TractionOnly(), surface, order)
+    stiffness = attraction.stiffness(position, 800.0, everyone(attraction)).toarray()
+    expected = differences(attraction, position, everyone(attraction))
+    assert np.abs(expected).max() > 0
+    np.testing.assert_allclose(stiffness, expected, atol=2e-8 * np.abs(expected).max())
+
+
+@orders
+@laws
+@surfaces
+def test_normal_forces_are_minus_the_derivative_of_the_energy(law, surface, order):
+    attraction, position = make(law, surface, order, "normal")
+
+    def energy(where):
+        gap = where[:, 1] + 1.0 - surface.height(where[:, 0])
+        return np.sum(law.potential(gap, 800.0, attraction.layers) * attraction.pad.length(where[:, 0]))
+
+    h, expected = 1e-6, np.zeros(position.size)
+    for i, unit in enumerate(np.eye(position.size)):
+        step = h * unit.reshape(position.shape)
+        expected[i] = -(energy(position + step) - energy(position - step)) / (2 * h)
+    forces = attraction.forces(position, 800.0, everyone(attraction)).ravel()
+    np.testing.assert_allclose(forces, expected, atol=1e-8 * np.abs(expected).max())
+    assert np.abs(forces[::2]).max() > 0.1 * np.abs(forces[1::2]).max()  # the sideways part is there
+
+
+@orders
+@surfaces
+def test_only_the_normal_traction_has_a_symmetric_stiffness(surface, order):
+    asymmetry = {}
+    for direction in ("vertical", "normal"):
+        attraction, position = make(Kaczmarek(), surface, order, direction)
+        K = attraction.stiffness(position, 800.0, everyone(attraction)).toarray()
+        asymmetry[direction] = np.abs(K - K.T).max() / np.abs(K).max()
+    assert asymmetry["normal"] < 1e-14
+    assert asymmetry["vertical"] > 0.1
+
+
+def test_trial_states_that_penetrate_count_as_touching():
+    attraction, position = make(Kaczmarek(), SURFACES[0], 1)
+    sunk, touching = position.copy(), position.copy()
+    sunk[3, 1], touching[3, 1] = -1.2, -1.0
+    np.testing.assert_array_equal(
+        attraction.forces(sunk, 800.0, everyone(attraction)),
+        attraction.forces(touching, 800.0, everyone(attraction)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("voltage", "gap", "exact"),
+    [(np.sqrt(2.0) * 1000.0, 0.25, 0.20172e-3), (2000.0, 0.25, 0.40356e-3), (2000.0, 0.5, 0.19761e-3)],
+    ids=["LVLD", "HVLD", "HVHD"],
+)
+@orders
+def test_hover_force_of_half_an_ellipse_on_sixty_edges(order, voltage, gap, exact):
+    # exact numbers: quadrature of (8b) over the true ellipse with semi-axes 8.34 and 6.395 mm
+    theta = np.pi * (1.0 + np.arange(60 * order + 1) / (60 * order))
+    position = np.column_stack([8.34 * np.cos(theta), 6.395 * np.sin(theta)])
+    s = np.arange(60 * order + 1)
+    edges = np.column_stack([s[:-1], s[1:]] if order == 1 else [s[:-2:2], s[2::2], s[1::2]])
+    pad = Pad(s, edges, np.ones(s.size, dtype=bool))
+    attraction = Attraction(Kaczmarek(), LAYERS, pad, Flat(y=-6.395 - gap))
+    force = -attraction.forces(position, voltage, everyone(attraction))[:, 1].sum()
+    assert force == pytest.approx(exact, rel=5e-4)
