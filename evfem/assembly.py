@@ -134,7 +134,7 @@ def make_space(mesh: Mesh, element: str) -> Space:
         sample = _gradients(centre)
         projection = np.ones((len(nodes), gradient.shape[1], 1))
     elif sampling == "linear":
-        projection = _linear_projection(basis.global_coordinates().value, basis.dx)
+        projection = _linear_projection(np.asarray(basis.global_coordinates()), basis.dx)
     return Space(
         mesh,
         element,

@@ -130,7 +130,7 @@ def mass_matrices(space: Space) -> Floats:
     kind, intorder, _ = ELEMENTS[space.element]
     shape = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
     basis = skfem.Basis(scikit_mesh(space.mesh), shape, intorder=intorder)
-    N = np.stack([np.broadcast_to(basis.basis[a][0].value, basis.dx.shape) for a in range(basis.Nbfun)])
+    N = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])
     return np.einsum("aeq,beq,eq->eab", N, N, basis.dx, optimize=True)
 
 

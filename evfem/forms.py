@@ -96,7 +96,7 @@ def make_term(space: Space, function: Callable[[Any, Any, Any], Any], on: str, b
             )
         cells = mesh.cells_of(on)
         basis = skfem.Basis(grid, shape, elements=cells, intorder=intorder)
-    value = np.stack([np.broadcast_to(basis.basis[a][0].value, basis.dx.shape) for a in range(basis.Nbfun)])
+    value = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])
     grad = np.stack(
         [np.broadcast_to(basis.basis[a][0].grad, (2, *basis.dx.shape)) for a in range(basis.Nbfun)]
     )
@@ -105,7 +105,7 @@ def make_term(space: Space, function: Callable[[Any, Any, Any], Any], on: str, b
     for i in range(2):
         rows[:, :, 2 + i, :, 0] = rows[:, :, 4 + i, :, 1] = np.moveaxis(grad[:, i], 0, -1)
     normals = np.asarray(basis.normals) if boundary else None
-    context = SimpleNamespace(x=basis.global_coordinates().value, n=normals)
+    context = SimpleNamespace(x=np.asarray(basis.global_coordinates()), n=normals)
     flat = rows.reshape(*basis.dx.shape, 6, 2 * basis.Nbfun)
     return FormTerm(function, cells, space.nodes[cells], flat, np.asarray(basis.dx), context)
 
