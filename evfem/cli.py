@@ -124,7 +124,7 @@ def _run(given: argparse.Namespace) -> int:
         _finish(folder, error.result)
         raise
     except KeyboardInterrupt:
-        if not folder.opened:
+        if not folder.begun:
             raise
         _finish(folder, None)
         return _say(f"interrupted; {len(folder.rows)} steps are in {path}, go on with --resume", INTERRUPTED)

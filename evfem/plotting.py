@@ -165,7 +165,7 @@ def _by_cell(ax: Axes, mesh: Mesh, points: Floats, values: Floats):  # type: ign
     from matplotlib.collections import PolyCollection
 
     outlines = points[_outline(mesh)]
-    cells = PolyCollection(list(outlines), array=values, cmap="viridis", edgecolors="face", linewidths=0.2)
+    cells = PolyCollection(list(outlines), array=values, cmap="viridis", edgecolors="face", linewidths=0.5)
     return ax.add_collection(cells)
 
 

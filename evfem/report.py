@@ -30,22 +30,34 @@ def table(rows: Sequence[Row], most: int = 12) -> str:
     """
     lines = [_line("step", "motion", list(COLUMNS.values())), _line("", "", UNITS)]
     for row in (rows[i] for i in chosen(rows, most)):
-        numbers = [f"{float(row[name]):.{_digits(name)}f}" for name in COLUMNS]
+        numbers = [_number(float(row[name]), _digits(name)) for name in COLUMNS]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[int]:
-    """Numbers of the rows to show: the last of each motion, and as many between as there is room for."""
-    last = len(rows) - 1
-    ends = [i for i in range(last + 1) if i == last or rows[i]["motion_index"] != rows[i + 1]["motion_index"]]
-    room = max(most - len(ends), 0)
-    between = [round((k + 1) * last / (room + 1)) for k in range(room)] if last > 0 else []
-    return sorted({*ends, *between})
+    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its last.
+
+    >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
+    [0, 2, 3, 36, 70, 103]
+    """
+    index = [row["motion_index"] for row in rows]
+    ends = [i + 1 for i in range(len(index)) if i + 1 == len(index) or index[i + 1] != index[i]]
+    share = max(most // max(len(ends), 1), 1)
+    picked = []
+    for start, end in zip([0, *ends], ends, strict=False):
+        count = min(share, end - start)
+        picked += [start + round((k + 1) * (end - start) / count) - 1 for k in range(count)]
+    return picked
 
 
 def _line(step: str, motion: str, values: Sequence[str]) -> str:
     return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, WIDTHS, strict=True))
+
+
+def _number(value: float, digits: int) -> str:
+    """With so many decimals, and no sign on what rounds to zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def _digits(name: str) -> int:

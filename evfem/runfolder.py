@@ -57,6 +57,7 @@ class RunFolder:
     opened: bool = field(default=False, init=False)
     _series: ParaViewSeries | None = field(default=None, init=False)
     _digest: str = field(default="", init=False)
+    _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
 
     def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
         """The mesh is known: refuse a folder in which files of others are in the way."""
@@ -70,22 +71,41 @@ class RunFolder:
             raise InputError("--out", given, "another folder, for files of others are never touched")
 
     def step(self, row: Row, frame: Frame | None, checkpoint: Callable[[], dict[str, Any]]) -> None:
-        """A step has converged: fields, history and checkpoint go to disk, in this order."""
+        """A step has converged: fields, checkpoint and history go to disk.
+
+        Interrupted in the middle, it is done again by `close`.
+        """
+        self._pending = (row, frame, checkpoint)
+        self._commit()
+
+    @property
+    def begun(self) -> bool:
+        """Whether a step has converged, so that there is something to keep."""
+        return self.opened or self._pending is not None
+
+    def _commit(self) -> None:
+        if self._pending is None:
+            return
+        row, frame, checkpoint = self._pending
         if not self.opened:
             self._open()
         if frame is not None and self._series is not None and self.mesh is not None:
             self._series.add(row, frame, self.mesh)
-            self._series.write_index()
-        self.rows.append(row)
+        if not self.rows or self.rows[-1]["step"] != row["step"]:
+            Checkpoint(self.path / STATE).write(self._digest, checkpoint(), [*self.rows, row])
+            self.rows.append(row)
         with _storing(self.path), open(self.path / HISTORY, "a", encoding="utf-8", newline="") as history:
             history.write(csv_line(row))
-        Checkpoint(self.path / STATE).write(self._digest, checkpoint(), self.rows)
+        if self._series is not None:
+            self._series.write_index()
+        self._pending = None
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
 
         `result` None means interrupted: it is made of the rows so far.
         """
+        self._commit()
         if not self.opened:
             self._open()
         write_history(self.rows, self.path / HISTORY)

@@ -1,0 +1,386 @@
+"""The command line as users meet it: in a process of its own, by exit status, messages and files."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from xml.etree import ElementTree
+
+import meshio
+import numpy as np
+import pytest
+from fakes import square_mesh
+
+import evfem
+from evfem import cli, meshfile
+from evfem.report import table
+from evfem.result import COLUMNS
+
+SCENE = """
+version = 1
+[finger]
+mesh = "square.vtu"
+[finger.materials.soft]
+law = "neo_hookean"
+E = 0.05
+nu = 0.4
+[finger.materials.hard]
+law = "neo_hookean"
+E = 0.1
+nu = 0.3
+[surface]
+kind = "flat"
+friction = 0.2
+[output]
+every = 2
+[[motion]]
+kind = "press"
+indentation = 0.2
+steps = 2
+[[motion]]
+kind = "slide"
+distance = 0.5
+steps = 3
+"""
+MANY_STEPS = SCENE.replace("steps = 3", "steps = 60").replace("every = 2", "every = 1")
+RESULTS = ["checkpoint.npz", "fields.pvd", "forces.png", "history.csv", "summary.json"]
+
+
+def command(*arguments):
+    """The command in this environment, with the package the tests use, in a clean locale."""
+    path = os.pathsep.join(p for p in sys.path if p)
+    environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    return [sys.executable, "-m", "evfem.cli", *map(str, arguments)], environment
+
+
+def evfem_command(folder, *arguments):
+    """(exit status, standard output, standard error) of `evfem ARGUMENTS` in a folder."""
+    words, environment = command(*arguments)
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, timeout=300)
+    return done.returncode, done.stdout, done.stderr
+
+
+def history(folder):
+    with open(folder / "history.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def indexed_files(folder):
+    root = ElementTree.parse(folder / "fields.pvd").getroot()
+    return [entry.attrib["file"] for entry in root.iter("DataSet")]
+
+
+def files(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.fixture
+def place(tmp_path):
+    """A folder with a mesh and a scene."""
+    meshfile.write(square_mesh("quad9"), tmp_path / "square.vtu")
+    (tmp_path / "square.toml").write_text(SCENE)
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """The scene after `evfem run`, with what it printed."""
+    folder = tmp_path_factory.mktemp("finished")
+    meshfile.write(square_mesh("quad9"), folder / "square.vtu")
+    (folder / "square.toml").write_text(SCENE)
+    return folder, *evfem_command(folder, "run", "square.toml")
+
+
+def test_a_run_leaves_all_its_files_and_a_table(finished):
+    folder, status, out, err = finished
+    assert (status, "Traceback" in err) == (0, False)
+    results = folder / "square-out"
+    series = [f"fields_{n:05d}.vtu" for n in (2, 4, 5)]  # every second step, and the last
+    assert files(results) == sorted([".evfem-files", *RESULTS, *series])
+    assert indexed_files(results) == series
+    rows = history(results)
+    assert [row["step"] for row in rows] == ["1", "2", "3", "4", "5"]
+    assert tuple(rows[0]) == COLUMNS
+    assert [row["motion"] for row in rows] == ["press"] * 2 + ["slide"] * 3
+    assert float(rows[1]["indentation"]) == 0.2
+    assert float(rows[4]["position"]) == 0.5
+    assert (results / "forces.png").read_bytes()[:4] == b"\x89PNG"
+    assert all(len(line) <= 80 for line in out.splitlines())
+    assert out.splitlines()[-1].startswith("5 of 5 steps in")
+    assert "step 5 of 5" in err
+
+
+def test_the_summary_agrees_with_the_history(finished):
+    results = finished[0] / "square-out"
+    summary = json.loads((results / "summary.json").read_text())
+    last = history(results)[-1]
+    assert summary["complete"] is True
+    assert all(float(last[name]) == summary["last"][name] for name in COLUMNS if name != "motion")
+    assert summary["provenance"]["versions"]["evfem"] == evfem.__version__
+    assert (
+        "[[motion]]" in summary["provenance"]["parameters"]
+        or "motion = " in summary["provenance"]["parameters"]
+    )
+    assert len(summary["provenance"]["mesh"]["digest"]) == 64
+
+
+def test_the_fields_are_those_of_the_history(finished):
+    results = finished[0] / "square-out"
+    read = meshio.read(results / "fields_00005.vtu")
+    assert set(read.point_data) >= {"displacement", "gap", "contact_pressure", "contact_status"}
+    bone = square_mesh("quad9").node_sets["bone"]
+    moved = read.point_data["displacement"][bone]
+    np.testing.assert_allclose(moved, np.tile([0.5, -0.2, 0.0], (len(bone), 1)), atol=1e-12)
+
+
+def test_a_second_run_replaces_results_and_leaves_other_files_alone(place):
+    assert evfem_command(place, "run", "square.toml", "--out", "here")[0] == 0
+    (place / "here" / "notes.txt").write_text("mine")
+    (place / "here" / "fields.vtu").write_text("mine too")
+    shorter = SCENE.replace("steps = 3", "steps = 1")
+    (place / "square.toml").write_text(shorter)
+    status, _, err = evfem_command(place, "run", "square.toml", "--out", "here", "--no-fields", "--no-plots")
+    assert (status, "Traceback" in err) == (0, False)
+    kept = [".evfem-files", "checkpoint.npz", "fields.vtu", "history.csv", "notes.txt", "summary.json"]
+    assert files(place / "here") == kept
+    assert (place / "here" / "notes.txt").read_text() == "mine"
+    assert len(history(place / "here")) == 3
+
+
+@pytest.mark.parametrize("name", ["history.csv", "fields_00002.vtu", "checkpoint.npz"])
+def test_a_file_of_others_in_the_way_stops_the_run_before_it_starts(place, name):
+    (place / "here").mkdir()
+    (place / "here" / name).write_text("mine")
+    status, out, err = evfem_command(place, "run", "square.toml", "--out", "here")
+    assert (status, out) == (2, "")
+    assert err.count("\n") == 1
+    assert name in err
+    assert files(place / "here") == [name]
+    assert (place / "here" / name).read_text() == "mine"
+
+
+BAD_SCENES = {
+    "unknown key": ("friction = 0.2", "frictoin = 0.2", "surface.frictoin"),
+    "wrong type": ("E = 0.05", "E = 'soft'", "finger.materials.soft.E"),
+    "negative": ("E = 0.05", "E = -1.0", "finger.materials.soft.E"),
+    "no TOML": ("version = 1", "version = ", "scene"),
+    "missing mesh": ("square.vtu", "none.vtu", "finger.mesh"),
+    "mesh that is none": ("square.vtu", "square.toml", "finger.mesh"),
+    "missing region": ("[finger.materials.hard]", "[finger.materials.nail]", "finger.materials"),
+    "element of other cells": ("[output]", "[solver]\nelement = 'p2'\n[output]", "solver.element"),
+    "voltage without skin": ("[output]", "[electrostatics]\nlaw = 'kaczmarek'\nvoltage = 1\n"
+                             "insulator_thickness = 0.1\ninsulator_eps_r = 3\n[output]", "finger"),
+    "below the finger": ("friction = 0.2", "friction = 0.2\ny = 1.0", "surface.y"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_SCENES)
+def test_bad_input_is_one_sentence_and_writes_nothing(place, case):
+    old, new, key = BAD_SCENES[case]
+    assert old in SCENE
+    (place / "square.toml").write_text(SCENE.replace(old, new))
+    before = files(place)
+    status, out, err = evfem_command(place, "run", "square.toml")
+    assert (status, out) == (2, "")
+    assert err.startswith(f"evfem: {key}")
+    assert err.count("\n") == 1
+    assert files(place) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "COMMAND"),
+        (["fly"], "invalid choice"),
+        (["run", "none.toml"], "No such file"),
+        (["run", "--fast"], "unrecognized"),
+        (["run", "--resume"], "--resume"),
+        (["mesh"], "--out"),
+        (["mesh", "square.toml", "--out", "m.stl"], "--out"),
+        (["plan", "none.toml"], "No such file"),
+        (["study"], "NAME"),
+    ],
+)
+def test_wrong_arguments_are_one_sentence_and_write_nothing(place, arguments, words):
+    before = files(place)
+    status, out, err = evfem_command(place, *arguments)
+    assert (status, out) == (2, "")
+    assert words in err
+    assert err.count("\n") == 1
+    assert files(place) == before
+
+
+def test_a_step_that_does_not_converge_keeps_what_went_before(place):
+    crush = SCENE.replace("distance = 0.5\nsteps = 3", "distance = 0.5\nsteps = 2")
+    crush += "[[motion]]\nkind = 'press'\nindentation = 1.99\nsteps = 1\n"
+    (place / "square.toml").write_text(crush)
+    status, out, err = evfem_command(place, "run", "square.toml")
+    assert status == 3
+    message = err.splitlines()[-1]
+    assert message.startswith("evfem: step 5 did not converge (last residuals: ")
+    assert "try" in message
+    assert "Traceback" not in err
+    assert len(history(place / "square-out")) == 4
+    assert indexed_files(place / "square-out") == ["fields_00002.vtu", "fields_00004.vtu"]
+    summary = json.loads((place / "square-out" / "summary.json").read_text())
+    assert (summary["complete"], summary["steps"], summary["requested_steps"]) == (False, 4, 5)
+    assert "4 of 5 steps" in out
+
+
+def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
+    (place / "file").write_text("not a folder")
+    status, out, err = evfem_command(place, "run", "square.toml", "--out", "file/results")
+    assert (status, out) == (4, "")
+    assert "file/results" in err.splitlines()[-1]
+    assert "Traceback" not in err
+
+
+def test_a_disk_that_fills_up_is_exit_status_4_and_what_was_written_is_whole(place):
+    code = (
+        "import resource, sys\n"
+        f"sys.path[:0] = {sys.path!r}\n"
+        "from evfem.cli import main\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))\n"
+        "sys.exit(main(['run', 'square.toml', '--no-plots', '--no-fields']))"
+    )
+    (place / "square.toml").write_text(MANY_STEPS)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=place, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 4
+    assert "File too large" in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def interrupted(place, number):
+    """Start the long scene, send a signal after some steps; returns exit status and standard error."""
+    (place / "square.toml").write_text(MANY_STEPS)
+    words, environment = command("run", "square.toml")
+    with subprocess.Popen(words, cwd=place, env=environment, stderr=subprocess.PIPE, text=True) as process:
+        rows = place / "square-out" / "history.csv"
+        while process.poll() is None and not (rows.exists() and len(rows.read_bytes().splitlines()) > 5):
+            time.sleep(0.002)
+        process.send_signal(number)
+        err = process.stderr.read()
+    return process.returncode, err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end(place, number):
+    status, err = interrupted(place, number)
+    results = place / "square-out"
+    assert status == 130
+    assert "Traceback" not in err
+    assert "--resume" in err.splitlines()[-1]
+    rows = history(results)
+    done = len(rows)
+    assert 5 <= done < 62
+    assert [int(row["step"]) for row in rows] == list(range(1, done + 1))
+    assert len(indexed_files(results)) == done
+    assert all((results / name).exists() for name in indexed_files(results))
+    assert json.loads((results / "summary.json").read_text())["complete"] is False
+    assert not [name for name in files(results) if name.endswith(".tmp")]
+
+    status, _, err = evfem_command(place, "run", "square.toml", "--resume")
+    assert (status, "Traceback" in err) == (0, False)
+    assert history(results)[:done] == rows
+    assert indexed_files(results) == [f"fields_{n:05d}.vtu" for n in range(1, 63)]
+    assert evfem_command(place, "run", "square.toml", "--out", "whole", "--no-fields", "--no-plots")[0] == 0
+    for resumed, whole in zip(history(results), history(place / "whole"), strict=True):
+        for name in ("position", "normal_force", "tangential_force", "friction_dissipation", "stored_energy"):
+            assert float(resumed[name]) == pytest.approx(float(whole[name]), rel=1e-6, abs=1e-9)
+
+
+def test_a_finished_run_can_be_resumed_without_harm(finished):
+    folder = finished[0]
+    before = history(folder / "square-out")
+    status, out, _ = evfem_command(folder, "run", "square.toml", "--resume")
+    assert status == 0
+    assert history(folder / "square-out") == before
+    assert len(indexed_files(folder / "square-out")) == 3
+    assert out.splitlines()[-1].startswith("5 of 5 steps")
+
+
+def test_a_checkpoint_of_another_scene_is_refused(place):
+    assert evfem_command(place, "run", "square.toml", "--no-fields", "--no-plots")[0] == 0
+    before = {name: (place / "square-out" / name).read_bytes() for name in files(place / "square-out")}
+    (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 0.25"))
+    status, _, err = evfem_command(place, "run", "square.toml", "--resume")
+    assert status == 2
+    assert "another scene" in err
+    assert {
+        name: (place / "square-out" / name).read_bytes() for name in files(place / "square-out")
+    } == before
+
+
+def test_plan_says_what_a_scene_needs_and_computes_nothing(place):
+    before = files(place)
+    status, out, err = evfem_command(place, "plan", "square.toml")
+    assert (status, err) == (0, "")
+    assert "friction" in out
+    assert files(place) == before
+
+
+@pytest.mark.parametrize(("element", "kind"), [("q2p1", "quad9"), ("q1", "quad")])
+@pytest.mark.parametrize("ending", [".vtu", ".msh"])
+def test_mesh_writes_the_mesh_the_scene_computes_on(tmp_path, element, kind, ending):
+    text = f"version = 1\n[finger]\nresolution = 'coarse'\n[solver]\nelement = '{element}'\n"
+    text += "[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.1\n"
+    (tmp_path / "scene.toml").write_text(text)
+    status, out, _ = evfem_command(tmp_path, "mesh", "scene.toml", "--out", f"finger{ending}")
+    assert status == 0
+    mesh = meshfile.read(tmp_path / f"finger{ending}")
+    assert mesh.kind == kind
+    assert set(mesh.region_names) == {"stratum_corneum", "epidermis", "dermis", "hypodermis", "nail"}
+    assert {"pad", "bone", "nail"} <= set(mesh.node_sets)
+    assert f"{len(mesh.points)} nodes" in out
+
+
+def test_version_and_help_are_quick_to_load_and_print():
+    status = {}
+    for words in (["--version"], ["--help"], ["run", "--help"]):
+        code = (
+            f"import sys; sys.path[:0] = {sys.path!r}\nfrom evfem.cli import main\nstatus = main({words})\n"
+        )
+        heavy = "{'numpy', 'scipy', 'matplotlib', 'skfem', 'pydantic'}"
+        code += f"print(sorted({heavy} & set(sys.modules)))\nsys.exit(status)"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        status[words[0]] = done.returncode
+        assert done.stdout.splitlines()[-1] == "[]"
+        assert done.stderr == ""
+    assert set(status.values()) == {0}
+    assert evfem_command(".", "--version")[1] == f"evfem {evfem.__version__}\n"
+
+
+def test_the_exit_status_is_that_of_the_error(monkeypatch, capsys):
+    from evfem.errors import InputError, NotConverged, StorageError
+
+    errors = {
+        2: InputError("a", 1, "b"),
+        3: NotConverged(3, [1.0], "try less"),
+        4: StorageError("disk"),
+        130: KeyboardInterrupt(),
+    }
+    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    for status, error in errors.items():
+
+        def fail(given, error=error):
+            raise error
+
+        monkeypatch.setattr(cli, "_plan", fail)
+        assert cli.main(["plan"]) == status
+        assert capsys.readouterr().err.startswith("evfem: ")
+    for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
+        signal.signal(number, handler)
+
+
+def test_the_table_fits_80_columns_with_long_numbers():
+    row = dict.fromkeys(COLUMNS, -12.345678) | {"motion": "voltage", "motion_index": 0, "voltage": -10000.0}
+    rows = [row | {"step": n} for n in range(1, 2001)]
+    lines = table(rows).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) == 14
+    assert lines[-1].split() == ["2000", "voltage", "-12.346", "-12.346", "-10000"] + ["-12.34568"] * 4
