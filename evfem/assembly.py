@@ -281,16 +281,15 @@ class Tissue:
         return float(np.sum(psi * self.space.weight))
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Cell means of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,), weighted by reference
-        volume.
-        """
+        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,)."""
         F, theta, _, _ = self.kinematics(u)
         J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
         S, q = self._stress(F, theta)
         sigma = np.empty((*theta.shape, 4))
-        for i, (a, b) in enumerate([(0, 0), (1, 1), (None, None), (0, 1)]):
-            if a is not None and b is not None:
-                sigma[..., i] = (S[a, 0] * F[b, 0] + S[a, 1] * F[b, 1] + (q if a == b else 0.0)) / J
+        push, volume, small = F.copy(), J.copy(), self._small_strain
+        push[:, :, small], volume[small] = np.eye(2)[:, :, None, None], 1.0
+        for i, a, b in ((0, 0, 0), (1, 1, 1), (3, 0, 1)):
+            sigma[..., i] = (S[a, 0] * push[b, 0] + S[a, 1] * push[b, 1] + q * (a == b)) / volume
         for law, cells in self.groups:
             sigma[cells, :, 2] = law.split_sigma_zz(F[:, :, cells], theta[cells])
         w = self.space.weight / self.space.weight.sum(axis=1, keepdims=True)
