@@ -238,7 +238,10 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
         point_data[name] = np.zeros(len(mesh.points), dtype=np.uint8)
         point_data[name][nodes] = 1
     out = meshio.Mesh(
-        _three(mesh.points), [(mesh.kind, mesh.cells)], point_data, {"region": [mesh.region.astype(np.int32)]}
+        _three(mesh.points),
+        [(mesh.kind, mesh.cells.astype(np.int32))],
+        point_data,
+        {"region": [mesh.region.astype(np.int32)]},
     )
     out.write(path, file_format="vtu", compression=None)
     form = '<DataArray type="Int32" Name="{}{}" NumberOfTuples="1" format="ascii">{}</DataArray>'

@@ -1,0 +1,304 @@
+"""The parametric finger: outline and ridges on their formula, layers as offsets, counts, symmetry,
+quality.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.fingerpad import RANGES, RESOLUTIONS, TABLE_2, FingerPad, MeshedFinger
+from evfem.materials import NeoHookean
+from evfem.mesh import layer_thickness
+from evfem.meshcheck import check
+from evfem.quality import scaled_jacobian
+
+A, B = 8.34, 6.395
+
+
+def green_area(mesh):
+    """Area of the region inside the outer edges, exactly also for parabolas (Simpson), mm^2."""
+    p = mesh.points[mesh.outer_edges]
+    a, b = p[:, 0], p[:, 1]
+    chord = 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    if mesh.order == 1:
+        return chord.sum()
+    # a parabola bulges out by 2/3 of chord times height: twice the triangle start, end, middle, times 2/3
+    m = p[:, 2]
+    triangle = 0.5 * ((b - a)[:, 0] * (m - a)[:, 1] - (b - a)[:, 1] * (m - a)[:, 0])
+    return chord.sum() - 4.0 / 3.0 * triangle.sum()
+
+
+def region_area(mesh, name):
+    from evfem.mesh import Mesh
+
+    cells = mesh.cells[mesh.cells_of(name)]
+    return green_area(Mesh(mesh.points, cells, mesh.kind, np.zeros(len(cells), int), {name: 0}))
+
+
+def outline_ridges(pad, mesh):
+    """Abscissa of the foot on the ellipse, and distance from it, of every pad node (Newton on the
+    ellipse).
+    """
+    x, y = mesh.points[mesh.node_sets["pad"]].T
+    a, b = 0.5 * pad.width, 0.5 * pad.height
+    theta = -np.arccos(np.clip(x / a, -1.0, 1.0))
+    for _ in range(60):
+        c, s = np.cos(theta), np.sin(theta)
+        slope = (x - a * c) * a * s - (y - b * s) * b * c
+        bend = (x - a * c) * a * c + (y - b * s) * b * s + a * a * s * s + b * b * c * c
+        theta = theta - slope / bend
+    return a * np.cos(theta), np.hypot(x - a * np.cos(theta), y - b * np.sin(theta))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_area_of_the_smooth_section_is_ellipse_minus_bone(order):
+    # pi a b of the outline minus that of the bone; chords lose O(h^2), parabolas O(h^4); h is a third in
+    # "fine"
+    exact = np.pi * (A * B - 3.0 * 2.5)
+    errors = []
+    for resolution in ("coarse", "fine"):
+        mesh = FingerPad(ridges=False, resolution=resolution).mesh(order)
+        errors.append(abs(green_area(mesh) - exact) / exact)
+    assert errors[1] < (3e-4 if order == 1 else 1e-7)
+    assert errors[0] / errors[1] > (3.0**1.9 if order == 1 else 3.0**3.5)
+
+
+def test_area_of_the_nail_is_that_between_ellipse_and_offset():
+    pad = FingerPad(ridges=False, resolution="fine")
+    edge = np.arccos(0.5 * pad.nail_width / A)
+    theta = np.linspace(edge, np.pi - edge, 20001)
+    speed = np.hypot(A * np.sin(theta), B * np.cos(theta))
+    curvature = A * B / speed**3
+    d = pad.nail_thickness
+    # offset strip: d times length minus d^2/2 times the turning angle
+    exact = np.trapezoid(d * speed - 0.5 * d * d * curvature * speed, theta)
+    assert region_area(pad.mesh(2), "nail") == pytest.approx(exact, rel=1e-6)
+
+
+def test_regions_fill_the_section():
+    mesh = FingerPad().mesh(2)
+    total = sum(region_area(mesh, name) for name in mesh.region_names)
+    assert total == pytest.approx(green_area(mesh), rel=1e-12)
+    assert sorted(mesh.region_names) == sorted(TABLE_2)
+
+
+@pytest.mark.parametrize(
+    ("resolution", "nodes"), [("coarse", 3000), ("medium", 10000), ("paper", 22500), ("fine", 50000)]
+)
+@pytest.mark.parametrize("ridges", [True, False])
+def test_presets_have_the_promised_number_of_nodes_for_both_orders(resolution, nodes, ridges):
+    counts = [len(FingerPad(resolution=resolution, ridges=ridges).mesh(order).points) for order in (1, 2)]
+    assert counts == pytest.approx([nodes, nodes], rel=0.13)
+    assert counts[0] == pytest.approx(counts[1], rel=0.09)
+
+
+def test_paper_preset_spreads_its_elements_like_the_paper():
+    # paper, caption of Fig. 3 (the second number of the epidermis are elements)
+    paper = {"stratum_corneum": 1662, "epidermis": 10281, "dermis": 7677, "hypodermis": 1314, "nail": 216}
+    mesh = FingerPad(resolution="paper").mesh(1)
+    counts = {name: len(mesh.cells_of(name)) for name in paper}
+    assert sum(counts.values()) == pytest.approx(21150, rel=0.05)
+    assert len(mesh.points) == pytest.approx(23139, rel=0.05)
+    for name, elements in paper.items():
+        assert counts[name] == pytest.approx(elements, rel=0.15), name
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("phase", [0.0, 0.5])
+def test_mesh_is_symmetric_and_has_nodes_on_crests_and_grooves(order, phase):
+    pad = FingerPad(resolution="coarse", ridge_phase=phase)
+    mesh = pad.mesh(order)
+    points = mesh.points
+    mirrored = points * [-1.0, 1.0]
+    order_of = [np.lexsort(np.round(p, 9).T) for p in (points, mirrored)]
+    np.testing.assert_allclose(points[order_of[0]], mirrored[order_of[1]], atol=1e-12)
+    foot, _ = outline_ridges(pad, mesh)
+    for position in np.arange(-6, 6.1, 0.25):  # crests and grooves alternate every half pitch
+        assert np.abs(foot - position).min() < 1e-9
+
+
+def test_every_ridge_of_the_finest_zone_has_the_same_nodes():
+    pad = FingerPad(resolution="medium", ridge_phase=0.2)
+    foot, _ = outline_ridges(pad, pad.mesh(2))
+    local = [
+        np.sort(foot[(foot > k - 1e-9) & (foot < k + 0.5 - 1e-9)] - k) for k in np.arange(-2.9, 2.2, 0.5)
+    ]
+    assert {len(ridge) for ridge in local} == {24}  # 12 quadratic cells, 24 nodes per pitch
+    for ridge in local[1:]:
+        np.testing.assert_allclose(ridge, local[0], atol=1e-9)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("exponent", [3.0, 7.0])
+def test_outline_nodes_lie_on_the_ridge_formula(order, exponent):
+    pad = FingerPad(ridge_exponent=exponent, ridge_phase=0.5, ridge_width=0.6, ridge_height=0.12)
+    foot, depth = outline_ridges(pad, pad.mesh(order))
+    crest = 0.6 * (np.round(foot / 0.6 - 0.5) + 0.5)
+    t = np.abs(foot - crest) / 0.3
+    ridged, smooth = np.abs(foot) <= 0.72 * A, np.abs(foot) >= 0.79 * A
+    np.testing.assert_allclose(depth[ridged], 0.12 * t[ridged] ** exponent, atol=1e-11)
+    np.testing.assert_allclose(depth[smooth], 0.0, atol=1e-12)
+    assert (depth <= 0.12 + 1e-12).all()
+    assert ridged.sum() > 300
+
+
+def test_flat_topped_ridges_have_flat_crests_and_grooves():
+    pad = FingerPad(ridge_crest=0.5, ridge_groove=0.15)
+    foot, depth = outline_ridges(pad, pad.mesh(2))
+    t = np.abs(foot - 0.5 * np.round(foot / 0.5)) / 0.25
+    near = np.abs(foot) < 6.0
+    np.testing.assert_allclose(depth[near & (t < 0.5)], 0.0, atol=1e-12)
+    np.testing.assert_allclose(depth[near & (t > 0.85)], 0.15, atol=1e-12)
+    between = near & (t > 0.5) & (t < 0.85)
+    expected = 0.075 * (1.0 - np.cos(np.pi * (t[between] - 0.5) / 0.35))
+    np.testing.assert_allclose(depth[between], expected, atol=1e-10)
+    assert between.sum() > 100
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_stratum_corneum_is_as_thick_as_asked_for(order):
+    smooth = FingerPad(ridges=False, stratum_corneum_thickness=0.31).mesh(order)
+    nodes = smooth.node_sets["pad"]
+    # normal offset of the ellipse: every node of the outline has its partner at exactly that distance
+    np.testing.assert_allclose(layer_thickness(smooth, "stratum_corneum", nodes), 0.31, rtol=1e-5)
+    pad = FingerPad()
+    mesh = pad.mesh(order)
+    _, depth = outline_ridges(pad, mesh)
+    thickness = layer_thickness(mesh, "stratum_corneum", mesh.node_sets["pad"])
+    np.testing.assert_allclose(thickness, 0.38 - depth, rtol=1e-5)
+    assert thickness.min() == pytest.approx(0.23, rel=1e-6)
+
+
+def test_mid_nodes_lie_on_the_true_bone_and_interface():
+    pad = FingerPad(ridges=False)
+    mesh = pad.mesh(2)
+    x, y = mesh.points[mesh.node_sets["bone"]].T
+    assert np.abs((x / 3.0) ** 2 + ((y - 1.0) / 2.5) ** 2 - 1.0).max() < 1e-3
+    corner = np.isin(mesh.node_sets["bone"], mesh.cells[:, :4])
+    assert np.abs((x / 3.0) ** 2 + ((y - 1.0) / 2.5) ** 2 - 1.0)[corner].max() < 1e-12
+    middle = ~corner
+    assert middle.sum() == corner.sum()
+    assert np.abs((x / 3.0) ** 2 + ((y - 1.0) / 2.5) ** 2 - 1.0)[middle].max() < 1e-12
+
+
+def test_sets_are_the_lower_outline_the_nail_and_the_bone():
+    pad = FingerPad()
+    mesh = pad.mesh(1)
+    lower = mesh.points[mesh.node_sets["pad"]]
+    assert lower[:, 1].max() == 0.0
+    np.testing.assert_allclose([lower[:, 0].min(), lower[:, 0].max()], [-A, A], rtol=1e-14)
+    assert lower[:, 1].min() == -B
+    nail = mesh.points[mesh.node_sets["nail"]]
+    assert np.abs(nail[:, 0]).max() == pytest.approx(5.5)
+    np.testing.assert_allclose((nail[:, 0] / A) ** 2 + (nail[:, 1] / B) ** 2, 1.0)
+    edges = [len(mesh.edges_of(name)) for name in ("pad", "nail", "bone")]
+    assert edges[0] == len(lower) - 1
+    assert edges[1] == len(nail) - 1
+    assert edges[2] == len(mesh.node_sets["bone"])
+
+
+def test_meshes_pass_the_checks_of_user_meshes():
+    for ridges in (True, False):
+        for order in (1, 2):
+            mesh = FingerPad(resolution="coarse", ridges=ridges).mesh(order)
+            assert check(mesh).points is mesh.points
+
+
+def sampled_fingers(count, seed=20240):
+    """Fingers spread over the documented ranges; draws whose parts do not fit together are refused and
+    drawn again.
+    """
+    draw, fingers = np.random.default_rng(seed), []
+    while len(fingers) < count:
+        values = {name: draw.uniform(low, high) for name, (low, high, _) in RANGES.items()}
+        if len(fingers) % 2:
+            values["ridge_crest"] = 0.0
+        try:
+            fingers.append(FingerPad(ridges=len(fingers) % 3 > 0, **values))
+        except InputError:
+            continue
+    return fingers
+
+
+@pytest.mark.parametrize("resolution", RESOLUTIONS)
+def test_scaled_jacobian_over_the_parameter_range(resolution):
+    for pad in sampled_fingers(30):
+        for order in (1, 2):
+            mesh = replace(pad, resolution=resolution).mesh(order)
+            assert scaled_jacobian(mesh).min() > 0.2, pad
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_scaled_jacobian_at_the_steepest_ridge(order):
+    # the slope at a groove is 2 m h / p / (1 - h b / a^2); the cell's corner there has the sine 1 / sqrt(1 +
+    # slope^2)
+    pad = FingerPad(resolution="fine", ridge_exponent=8.0)
+    smallest = scaled_jacobian(pad.mesh(order)).min()
+    slope = 2.0 * 8.0 * 0.15 / 0.5 / (1.0 - 0.15 * B / A**2)
+    exact = 1.0 / np.sqrt(1.0 + slope**2)
+    assert exact > 0.2
+    assert exact < smallest < 1.2 * exact
+
+
+@pytest.mark.parametrize(
+    ("values", "key"),
+    [
+        ({"width": 3.0}, "finger.width"),
+        ({"width": float("nan")}, "finger.width"),
+        ({"height": "12"}, "finger.height"),
+        ({"height": 19.0, "width": 13.0}, "finger.height"),
+        ({"ridges": 1}, "finger.ridges"),
+        ({"ridge_height": -0.1}, "finger.ridge_height"),
+        ({"ridge_height": 0.3}, "finger.ridge_height"),
+        ({"ridge_exponent": 9.0}, "finger.ridge_height"),
+        ({"ridge_width": 0.76}, "finger.ridge_width"),
+        ({"ridge_crest": 0.8, "ridge_groove": 0.3}, "finger.ridge_crest"),
+        ({"ridge_crest": 0.85}, "finger.ridge_height"),
+        ({"stratum_corneum_thickness": 0.2}, "finger.ridge_height"),
+        ({"dermis_thickness": 2.0, "width": 20.0, "height": 10.0}, "finger.dermis_thickness"),
+        ({"nail_thickness": 0.9}, "finger.nail_thickness"),
+        ({"nail_width": 14.0}, "finger.nail_width"),
+        ({"bone_height": 9.0}, "finger.bone_height"),
+        ({"bone_offset": 2.2}, "finger.bone_height"),
+        ({"resolution": "ultra"}, "finger.resolution"),
+        ({"materials": {"skin": NeoHookean(E=1.0, nu=0.3)}}, "finger.materials.skin"),
+        ({"viscosity": -1.0}, "finger.viscosity"),
+    ],
+)
+def test_geometry_that_cannot_exist_gets_a_sentence(values, key):
+    with pytest.raises(InputError) as caught:
+        FingerPad(**values)
+    assert caught.value.key == key
+    assert "allowed" in str(caught.value)
+
+
+def test_materials_are_those_of_table_2_unless_replaced():
+    own = NeoHookean(E=2.0, nu=0.4)
+    materials = FingerPad(materials={"dermis": own}).materials
+    assert materials["dermis"] is own
+    assert materials["stratum_corneum"] == NeoHookean(E=1.0, nu=0.3)
+    assert materials["hypodermis"] == NeoHookean(E=0.034, nu=0.48)
+    assert materials["nail"] == NeoHookean(E=17.0, nu=0.3)
+    assert materials["epidermis"] == NeoHookean(E=0.136, nu=0.3)
+
+
+def test_order_other_than_one_and_two_is_refused():
+    with pytest.raises(InputError, match="order"):
+        FingerPad().mesh(3)
+
+
+def test_meshed_finger_raises_its_mesh_and_wants_every_material():
+    linear = FingerPad(resolution="coarse").mesh(1)
+    laws = FingerPad().materials
+    finger = MeshedFinger(linear, laws)
+    assert finger.mesh(1).kind == "quad"
+    assert finger.mesh(2).kind == "quad9"
+    assert len(finger.mesh(2).node_sets["pad"]) == 2 * len(linear.node_sets["pad"]) - 1
+    with pytest.raises(InputError, match=r"finger\.materials\.nail"):
+        MeshedFinger(linear, {name: law for name, law in laws.items() if name != "nail"})
+    with pytest.raises(InputError, match="no such region"):
+        MeshedFinger(linear, {**laws, "skin": laws["nail"]})
+    with pytest.raises(InputError, match=r"solver\.element"):
+        MeshedFinger(FingerPad(resolution="coarse").mesh(2), laws).mesh(1)

@@ -1,0 +1,164 @@
+"""The mesh container: edges, raising to quadratic cells, thickness of layers, shape of cells."""
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.mesh import Mesh, layer_thickness, raised
+from evfem.quality import scaled_jacobian
+
+
+def strip(columns=4, order=1):
+    """[0, 4] x [0, 3]: `under` (2 high) below `layer` (1 high)."""
+    x, y = np.meshgrid(np.linspace(0.0, 4.0, columns + 1), [0.0, 2.0, 3.0])
+    node = np.arange(x.size).reshape(x.shape)
+    corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
+    cells = np.stack([c.ravel() for c in corners], axis=1)
+    region = np.repeat([7, 9], columns)
+    sets = {"top": node[-1], "bottom": node[0]}
+    mesh = Mesh(
+        np.column_stack([x.ravel(), y.ravel()]), cells, "quad", region, {"under": 7, "layer": 9}, sets
+    )
+    return raised(mesh) if order == 2 else mesh
+
+
+def triangle(kind="triangle", apex=(0.5, 0.75**0.5)):
+    mesh = Mesh(
+        np.array([[0.0, 0.0], [1.0, 0.0], apex]),
+        np.array([[0, 1, 2]]),
+        "triangle",
+        np.zeros(1, int),
+        {"skin": 0},
+    )
+    return raised(mesh) if kind == "triangle6" else mesh
+
+
+def test_outer_edges_run_around_the_body_with_the_body_on_the_left():
+    for order in (1, 2):
+        mesh = strip(order=order)
+        start, end = mesh.points[mesh.outer_edges[:, 0]], mesh.points[mesh.outer_edges[:, 1]]
+        assert len(mesh.outer_edges) == 12
+        # Green: the integral of (x dy - y dx)/2 over the outline is plus the area
+        assert 0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]) == pytest.approx(12.0)
+
+
+def test_edges_of_a_set_need_all_their_nodes():
+    mesh = strip()
+    assert len(mesh.edges_of("top")) == 4
+    part = Mesh(
+        mesh.points, mesh.cells, "quad", mesh.region, mesh.region_names, {"top": mesh.node_sets["top"][:3]}
+    )
+    assert len(part.edges_of("top")) == 2
+
+
+def test_every_edge_is_listed_once():
+    edges, of_cell = strip().edges
+    # 3 rows of 4 horizontal edges and 2 rows of 5 vertical ones
+    assert len(edges) == 22
+    assert len(np.unique(edges, axis=0)) == 22
+    assert (edges[:, 0] < edges[:, 1]).all()
+    assert of_cell.shape == (8, 4)
+    assert np.bincount(of_cell.ravel()).tolist().count(1) == 12
+
+
+def test_raised_mesh_has_straight_edges_and_middles():
+    mesh, old = strip(order=2), strip()
+    corner = mesh.points[mesh.cells[:, :4]]
+    assert mesh.kind == "quad9"
+    assert len(mesh.points) == 5 * 9  # (2 * 4 + 1) x (2 * 2 + 1) nodes, none twice
+    np.testing.assert_allclose(mesh.points[mesh.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1)))
+    np.testing.assert_allclose(mesh.points[mesh.cells[:, 8]], corner.mean(axis=1))
+    np.testing.assert_array_equal(mesh.points[: len(old.points)], old.points)
+    assert raised(mesh) is mesh
+
+
+def test_raised_triangle_has_mid_nodes_in_vtk_order():
+    mesh = triangle("triangle6", apex=(0.0, 2.0))
+    assert mesh.kind == "triangle6"
+    expected = [[0.5, 0.0], [0.5, 1.0], [0.0, 1.0]]
+    np.testing.assert_allclose(mesh.points[mesh.cells[0, 3:]], expected)
+
+
+def test_new_nodes_join_the_sets_of_their_outer_edge_only():
+    mesh = strip(order=2)
+    np.testing.assert_allclose(mesh.points[mesh.node_sets["top"], 1], 3.0)
+    assert len(mesh.node_sets["top"]) == 9
+    two_sided = strip(columns=1)
+    both = {"all": np.arange(len(two_sided.points))}
+    two_sided = raised(
+        Mesh(two_sided.points, two_sided.cells, "quad", two_sided.region, {"a": 7, "b": 9}, both)
+    )
+    # the edge at y = 2 lies inside although both of its ends are in the set
+    middle = np.flatnonzero((two_sided.points == [2.0, 2.0]).all(axis=1))
+    assert len(middle) == 1
+    assert not np.isin(middle, two_sided.node_sets["all"]).any()
+    assert len(two_sided.node_sets["all"]) == 6 + 6
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_thickness_of_a_flat_layer_is_its_height(order):
+    mesh = strip(order=order)
+    nodes = np.append(mesh.node_sets["top"], mesh.node_sets["bottom"])
+    thickness = layer_thickness(mesh, "layer", nodes)
+    half = len(nodes) // 2
+    np.testing.assert_allclose(thickness[:half], 1.0, rtol=1e-13)
+    np.testing.assert_allclose(thickness[half:], 2.0, rtol=1e-13)
+
+
+def test_thickness_follows_a_curved_quadratic_interface():
+    # one cell above another, the common edge through (0, 0), (1, 0.3), (2, 0): y = 0.3 x (2 - x)
+    mesh = raised(
+        Mesh(
+            np.array([[0.0, -1.0], [2.0, -1.0], [2.0, 0.0], [0.0, 0.0], [2.0, 1.0], [0.0, 1.0]]),
+            np.array([[0, 1, 2, 3], [3, 2, 4, 5]]),
+            "quad",
+            np.array([0, 1]),
+            {"under": 0, "layer": 1},
+        )
+    )
+    points = mesh.points.copy()
+    middle = np.flatnonzero((points == [1.0, 0.0]).all(axis=1))[0]
+    points[middle] = [1.0, 0.3]
+    mesh = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names)
+    x = np.linspace(0.0, 2.0, 200001)
+    for node in mesh.cells[1, [2, 3, 6]]:
+        brute = np.hypot(x - points[node, 0], 0.3 * x * (2.0 - x) - points[node, 1]).min()
+        assert layer_thickness(mesh, "layer", np.array([node]))[0] == pytest.approx(brute, rel=1e-9)
+
+
+def test_thickness_needs_the_region_and_a_neighbour():
+    with pytest.raises(InputError, match="allowed: under"):
+        layer_thickness(strip(), "skin", np.array([0]))
+    with pytest.raises(InputError, match="another one below"):
+        layer_thickness(triangle(), "skin", np.array([0]))
+
+
+@pytest.mark.parametrize("kind", ["triangle", "triangle6"])
+def test_equilateral_triangle_has_scaled_jacobian_one(kind):
+    assert scaled_jacobian(triangle(kind))[0] == pytest.approx(1.0, rel=1e-12)
+    # right angle with two equal sides: sin 45 / sin 60
+    right = triangle(kind, apex=(0.0, 1.0))
+    assert scaled_jacobian(right)[0] == pytest.approx(np.sqrt(0.5) / np.sqrt(0.75), rel=1e-12)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_scaled_jacobian_of_a_parallelogram_is_the_sine_of_its_angle(order):
+    angle = np.radians(25.0)
+    points = np.array(
+        [[0.0, 0.0], [3.0, 0.0], [3.0 + np.cos(angle), np.sin(angle)], [np.cos(angle), np.sin(angle)]]
+    )
+    mesh = Mesh(points, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, int), {"skin": 0})
+    mesh = raised(mesh) if order == 2 else mesh
+    assert scaled_jacobian(mesh)[0] == pytest.approx(np.sin(angle), rel=1e-12)
+    flipped = Mesh(points * [1.0, -1.0], np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, int), {"skin": 0})
+    assert scaled_jacobian(flipped)[0] == pytest.approx(-np.sin(angle), rel=1e-12)
+
+
+def test_scaled_jacobian_sees_a_mid_node_beyond_the_quarter_point():
+    # x(s) = s + d (1 - s^2) folds where 1 - 2 d s <= 0: at s = 1 for d >= 1/2
+    for shift, sign in ((0.45, 1.0), (0.55, -1.0)):
+        mesh = strip(columns=1, order=2)
+        points = mesh.points.copy()
+        points[mesh.cells[0, 4], 0] += 2.0 * shift  # half width 2
+        moved = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names)
+        assert np.sign(scaled_jacobian(moved)[0]) == sign
