@@ -1,0 +1,253 @@
+"""The dense Signorini-Coulomb solver against enumeration, non-negative least squares and its own conditions."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.optimize import nnls
+
+from evfem.contact import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    STICK,
+    Border,
+    ContactNotSolved,
+    ContactProblem,
+    solve_contact,
+)
+
+
+def random_problem(seed, k, friction):
+    """A random SPD compliance with strong coupling of neighbours and of normal and tangential directions."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(2 * k, 2 * k))
+    compliance = np.eye(2 * k) + 0.6 * A @ A.T / k
+    return ContactProblem(rng.normal(size=2 * k), compliance, np.full(k, friction))
+
+
+def half_plane(k, friction, push=0.02, shift=0.01):
+    """Compliance like that of a half plane under a parabolic punch: logarithmic decay, odd coupling."""
+    x = np.linspace(-1.0, 1.0, k)
+    distance = np.abs(np.subtract.outer(x, x))
+    direct = np.log(4.0 / (distance + 0.6 / k))
+    odd = 0.1 * np.sign(np.subtract.outer(x, x)) * (1.0 - np.exp(-10.0 * distance))
+    compliance = np.block([[direct, odd], [odd.T, direct]]) * 0.1
+    start = np.concatenate([0.1 * x**2 - push, np.full(k, shift) * (1.0 + 0.3 * x)])
+    return ContactProblem(start, compliance, np.full(k, friction))
+
+
+def closed(k):
+    return np.full(k, STICK)
+
+
+def violation(problem, force, state, status=None):
+    """Largest violation of Signorini's and Coulomb's conditions, from forces, gaps and slips alone."""
+    k = problem.size
+    normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
+    limit = problem.friction * normal
+    touching = normal > 1e-9
+    slipping = touching & (np.abs(slip) > 1e-9)
+    return max(
+        (-normal).max(),
+        (-gap).max(),
+        np.abs(normal * gap).max(),
+        (np.abs(shear) - limit).max(),
+        np.abs(shear + np.sign(slip) * limit)[slipping].max(initial=0.0),
+    )
+
+
+def enumerate_solutions(problem):
+    """Every solution of a small problem, by trying all statuses in the full system of equations."""
+    k, mu, found = problem.size, problem.friction, []
+    for status in product((OPEN, STICK, FORWARD, BACKWARD), repeat=k):
+        matrix, right = np.zeros((2 * k, 2 * k)), np.zeros(2 * k)
+        for i, s in enumerate(status):
+            if s == OPEN:
+                matrix[i, i] = 1.0
+            else:
+                matrix[i], right[i] = problem.compliance[i], -problem.start[i]
+            if s == STICK:
+                matrix[k + i], right[k + i] = problem.compliance[k + i], -problem.start[k + i]
+            else:
+                matrix[k + i, k + i] = 1.0
+                matrix[k + i, i] = {OPEN: 0.0, FORWARD: mu[i], BACKWARD: -mu[i]}[s]
+        if abs(np.linalg.det(matrix)) < 1e-12:
+            continue
+        force = np.linalg.solve(matrix, right)
+        state = problem.start + problem.compliance @ force
+        if violation(problem, force, state) < 1e-9:
+            found.append(force)
+    return found
+
+
+def distinct(forces):
+    kept = []
+    for force in forces:
+        if not any(np.allclose(force, other, atol=1e-8) for other in kept):
+            kept.append(force)
+    return kept
+
+
+@pytest.mark.parametrize("k", [1, 2, 3])
+@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
+def test_finds_the_one_solution_that_enumeration_finds(k, friction):
+    unique = 0
+    for seed in range(20):
+        problem = random_problem(seed, k, friction)
+        solutions = distinct(enumerate_solutions(problem))
+        if len(solutions) != 1:
+            continue
+        unique += 1
+        for start in (np.full(k, OPEN), closed(k), np.full(k, BACKWARD)):
+            found = solve_contact(problem, start)
+            np.testing.assert_allclose(found.force, solutions[0], atol=1e-9)
+            np.testing.assert_allclose(
+                found.state, problem.start + problem.compliance @ found.force, atol=1e-12
+            )
+    assert unique >= 15
+
+
+def test_with_large_friction_finds_one_of_the_solutions_of_four_nodes_or_says_so():
+    solved = 0
+    for seed in range(20):
+        problem = random_problem(seed, 4, 4.0)
+        solutions = distinct(enumerate_solutions(problem))
+        try:
+            found = solve_contact(problem, closed(4))
+        except ContactNotSolved:
+            continue
+        solved += 1
+        assert any(np.allclose(found.force, force, atol=1e-8) for force in solutions)
+    assert solved >= 14
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.1, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("shift", [0.0, 0.002, 0.02, -0.02])
+def test_conditions_hold_on_two_hundred_nodes(friction, shift):
+    problem = half_plane(200, friction, shift=shift)
+    found = solve_contact(problem, np.full(200, OPEN))
+    np.testing.assert_allclose(found.state, problem.start + problem.compliance @ found.force, atol=1e-14)
+    assert violation(problem, found.force, found.state) < 1e-11
+    statuses = set(found.status.tolist())
+    assert OPEN in statuses
+    assert len(statuses) > 1
+
+
+def test_small_shear_leaves_sticking_and_slipping_nodes():
+    counts = np.bincount(
+        solve_contact(half_plane(200, 0.3, shift=0.004), np.full(200, OPEN)).status, minlength=4
+    )
+    assert counts[OPEN] > 0
+    assert counts[STICK] > 5
+    assert counts[FORWARD] > 5
+
+
+def test_without_friction_the_pressures_are_those_of_non_negative_least_squares():
+    # minimise lam C lam / 2 + g0 lam over lam >= 0: a non-negative least squares problem
+    problem = half_plane(200, 0.0)
+    k = problem.size
+    root = np.linalg.cholesky(problem.compliance[:k, :k])
+    expected, _ = nnls(root.T, np.linalg.solve(root, -problem.start[:k]))
+    found = solve_contact(problem, np.full(k, OPEN))
+    np.testing.assert_allclose(found.force[:k], expected, atol=1e-10)
+    assert not found.force[k:].any()
+    assert (expected > 0).sum() > 20
+
+
+def test_huge_friction_sticks_wherever_it_presses():
+    # positive normal forces and zero slip: the bilateral problem on the touching nodes
+    problem = half_plane(60, 50.0)
+    found = solve_contact(problem, closed(60))
+    active = np.flatnonzero(found.force[:60] > 0)
+    assert active.size > 5
+    np.testing.assert_allclose(found.state[60:][active], 0.0, atol=1e-13)
+    assert violation(problem, found.force, found.state) < 1e-9
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.05, 0.2])
+def test_the_warm_start_does_not_change_the_solution_for_small_friction(friction):
+    problem = half_plane(120, friction, shift=0.003)
+    rng = np.random.default_rng(1)
+    starts = [np.full(120, s) for s in (OPEN, STICK, FORWARD, BACKWARD)]
+    starts += [rng.integers(0, 4, 120) for _ in range(6)]
+    found = [solve_contact(problem, start) for start in starts]
+    for other in found[1:]:
+        np.testing.assert_allclose(other.force, found[0].force, atol=1e-11)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_mirrored_problem_has_the_mirrored_solution(seed):
+    problem = random_problem(seed, 5, 0.3)
+    mirror = np.repeat([1.0, -1.0], 5)
+    mirrored = ContactProblem(
+        mirror * problem.start, mirror[:, None] * problem.compliance * mirror, problem.friction
+    )
+    one, other = (solve_contact(p, closed(5)) for p in (problem, mirrored))
+    np.testing.assert_allclose(other.force, mirror * one.force, atol=1e-11)
+    swapped = np.array([OPEN, STICK, BACKWARD, FORWARD])
+    np.testing.assert_array_equal(other.status, swapped[one.status])
+
+
+def punch(k=80, friction=0.2):
+    problem = half_plane(k, friction)
+    effect = np.concatenate([np.full(k, -1.0), np.zeros(k)])
+    return problem, effect, np.concatenate([np.ones(k), np.zeros(k)])
+
+
+def test_a_prescribed_force_is_reached_and_equals_the_prescribed_travel():
+    problem, effect, row = punch()
+    k = problem.size
+    loaded = ContactProblem(
+        problem.start, problem.compliance, problem.friction, Border(effect, row, 0.0, 0.5)
+    )
+    found = solve_contact(loaded, closed(k))
+    assert found.force[:k].sum() == pytest.approx(0.5, rel=1e-12)
+    moved = ContactProblem(problem.start + effect * found.extra, problem.compliance, problem.friction)
+    same = solve_contact(moved, np.full(k, OPEN))
+    np.testing.assert_allclose(same.force, found.force, atol=1e-11)
+    np.testing.assert_allclose(same.state, found.state, atol=1e-12)
+
+
+def test_the_border_may_depend_on_shear_and_on_its_own_unknown():
+    problem, effect, row = punch()
+    k = problem.size
+    effect = effect + np.concatenate([np.zeros(k), np.full(k, 0.1)])
+    row = row + np.concatenate([np.zeros(k), np.full(k, 0.25)])
+    border = Border(effect, row, 3.0, 0.7)
+    found = solve_contact(
+        ContactProblem(problem.start, problem.compliance, problem.friction, border), closed(k)
+    )
+    assert row @ found.force + 3.0 * found.extra == pytest.approx(0.7, rel=1e-12)
+    np.testing.assert_allclose(
+        found.state, problem.start + problem.compliance @ found.force + effect * found.extra, atol=1e-13
+    )
+    assert violation(problem, found.force, found.state) < 1e-11
+    assert np.abs(found.force[k:]).sum() > 0.01
+
+
+def test_friction_may_differ_from_node_to_node():
+    problem = half_plane(100, 0.3, shift=0.05)
+    table = np.where(np.arange(100) < 50, 0.1, 0.6)
+    varied = ContactProblem(problem.start, problem.compliance, table)
+    found = solve_contact(varied, closed(100))
+    assert violation(varied, found.force, found.state) < 1e-11
+    slipping = found.status == FORWARD
+    ratio = -found.force[100:][slipping] / found.force[:100][slipping]
+    np.testing.assert_allclose(ratio, table[slipping], rtol=1e-12)
+    assert set(ratio.round(9)) == {0.1, 0.6}
+
+
+def test_an_impossible_problem_is_refused_not_answered():
+    # two nodes whose compliance is negative: pushing one back brings it nearer, so no force closes the gap
+    problem = ContactProblem(np.array([-1.0, 0.0]), -np.eye(2), np.array([0.0]))
+    with pytest.raises(ContactNotSolved):
+        solve_contact(problem, np.array([OPEN]))
+
+
+def test_nothing_touches_nothing_pushes():
+    problem = ContactProblem(np.array([0.5, 0.1, 0.0, 0.3]), np.eye(4), np.full(2, 0.3))
+    found = solve_contact(problem, closed(2))
+    assert not found.force.any()
+    assert found.status.tolist() == [OPEN, OPEN]
+    np.testing.assert_allclose(found.state, problem.start)
