@@ -1,0 +1,125 @@
+"""Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or steps."""
+
+import numpy as np
+import scipy.sparse as sparse
+import skfem
+from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
+from skfem.io.meshio import from_meshio
+
+from evfem.assembly import ELEMENTS, make_space
+from evfem.mesh import Mesh, raised
+
+#: element -> cells before they are raised to the element's order
+CELLS = {"q1": "quad", "q1_fbar": "quad", "q2": "quad", "q2p1": "quad", "p2": "triangle"}
+SHAPES = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}
+
+
+def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=None):
+    """The space of `element` on [0, w] x [0, h] in nx x ny cells.
+
+    `jitter` moves inner corners at random by that share of a cell and keeps edges straight; `warp` maps all
+    nodes, mid-nodes too, so that edges become curves; `split(x, y)` at the centre of a cell is True in region
+    `upper`, the rest is `lower`. Node sets: left, right, bottom, top and outline.
+    """
+    nx, ny = divisions
+    x, y = np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    number = np.arange(points.shape[0]).reshape(ny + 1, nx + 1)
+    quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], -1).reshape(-1, 4)
+    cells = quads if CELLS[element] == "quad" else _halves(quads, nx)
+    sets = {"bottom": number[0], "top": number[-1], "left": number[:, 0], "right": number[:, -1]}
+    sets["outline"] = np.unique(np.concatenate(list(sets.values())))
+    inner = np.setdiff1d(np.arange(len(points)), sets["outline"])
+    shift = np.random.default_rng(5).uniform(-jitter, jitter, (len(inner), 2))
+    points[inner] += shift * [size[0] / nx, size[1] / ny]
+    centre = points[cells].mean(axis=1)
+    region = np.zeros(len(cells), dtype=int) if split is None else split(*centre.T).astype(int)
+    names = {"lower": 0, "upper": 1} if split is not None else {"lower": 0}
+    mesh = Mesh(points, cells, CELLS[element], region, names, {k: np.sort(v) for k, v in sets.items()})
+    if ELEMENTS[element][0] in ("quad9", "triangle6"):
+        mesh = raised(mesh)
+    if warp is not None:
+        x, y = warp(*mesh.points.T)
+        mesh = Mesh(
+            np.column_stack([x, y]), mesh.cells, mesh.kind, mesh.region, mesh.region_names, mesh.node_sets
+        )
+    return make_space(mesh, element)
+
+
+def _halves(quads, nx):
+    """Two triangles of each quadrilateral, the diagonal alternating like a chess board."""
+    i = np.arange(len(quads))
+    odd = (i % nx + i // nx) % 2 == 1
+    turned = np.where(odd[:, None], np.roll(quads, -1, axis=1), quads)
+    return np.stack([turned[:, [0, 1, 2]], turned[:, [0, 2, 3]]], axis=1).reshape(-1, 3)
+
+
+def quarter_ring(inner, outer):
+    """Warp of the unit square to a quarter of a ring: x along the radius, y along the angle."""
+
+    def warp(x, y):
+        r, angle = inner + (outer - inner) * x, 0.5 * np.pi * y
+        return r * np.cos(angle), r * np.sin(angle)
+
+    return warp
+
+
+def assembled(space, cells):
+    """Cell matrices as one sparse matrix, unknowns (node, component)."""
+    unknown = (2 * space.nodes[:, :, None] + [0, 1]).reshape(len(space.nodes), -1)
+    rows = np.broadcast_to(unknown[:, :, None], cells.shape)
+    columns = np.broadcast_to(unknown[:, None, :], cells.shape)
+    return sparse.csr_matrix((cells.ravel(), (rows.ravel(), columns.ravel())), shape=(2 * space.size,) * 2)
+
+
+def solve(tissue, u, free, load=0.0, iterations=14):
+    """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all else stays."""
+    u, free = u.copy(), free.ravel()
+    scale = None
+    for _ in range(iterations):
+        K = assembled(tissue.space, tissue.tangent(u))[free][:, free]
+        step = np.zeros(u.size)
+        step[free] = spsolve(K.tocsc(), (load - tissue.forces(u)).ravel()[free])
+        length = 1.0
+        while not tissue.smallest_J(u + length * step.reshape(-1, 2)) > 0.05:
+            length *= 0.5
+        u += length * step.reshape(-1, 2)
+        size = np.abs(step).max()
+        scale = max(scale or 0.0, size)
+        if size <= 1e-11 * max(1.0, scale):
+            return u
+    raise AssertionError(f"no equilibrium, last correction {size:g}")
+
+
+def fine_points(space, intorder=8):
+    """Points (2, E, Q), weights, values (n, E, Q) and gradients (n, 2, E, Q) of the shape functions, and the
+    nodes (E, n), all taken from scikit-fem on its own mesh: an oracle for the space, of higher order."""
+    mesh = space.mesh
+    basis = skfem.Basis(grid_of(mesh), SHAPES[mesh.kind](), intorder=intorder)
+    value = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])
+    grad = np.stack(
+        [np.broadcast_to(basis.basis[a][0].grad, (2, *basis.dx.shape)) for a in range(basis.Nbfun)]
+    )
+    _, node = cKDTree(mesh.points).query(basis.doflocs.T)
+    return np.asarray(basis.global_coordinates()), basis.dx, value, grad, node[basis.element_dofs].T
+
+
+def grid_of(mesh):
+    """The scikit-fem mesh with the same nodes, built by scikit-fem's reader of VTK cells."""
+    import meshio
+
+    kind = {"quad": "quad", "quad9": "quad9", "triangle6": "triangle6"}[mesh.kind]
+    return from_meshio(meshio.Mesh(mesh.points, [(kind, mesh.cells)]))
+
+
+def l2_error(space, u, exact):
+    """L2 norm of u_h - u over the reference, with `exact(X, Y)` -> (2, ...)."""
+    x, dx, value, _, nodes = fine_points(space)
+    difference = np.einsum("aeq,eai->ieq", value, u[nodes]) - exact(*x)
+    return float(np.sqrt(np.sum(difference**2 * dx)))
+
+
+def order(errors, ratio=2.0):
+    """Order of convergence between the last two errors, sizes in `ratio`."""
+    return float(np.log(errors[-2] / errors[-1]) / np.log(ratio))
