@@ -1,0 +1,467 @@
+"""Mesh files: round trips of every kind, clean terminal, and a sentence for each wrong mesh."""
+
+import shutil
+import subprocess
+import sys
+
+import evfem.meshes
+import meshio
+import numpy as np
+import pytest
+from evfem.meshes.make import RECIPES, triangles
+from evfem.studies.benchmark import LEVELS, benchmark_mesh
+
+from evfem import meshfile
+from evfem.errors import InputError, StorageError
+from evfem.fingerpad import FingerPad, MeshedFinger
+from evfem.materials import NeoHookean
+from evfem.mesh import Mesh, raised
+from evfem.quality import scaled_jacobian
+
+NUMBERS = {"tissue": 0, "skin": 1}
+
+
+def of_kind(kind):
+    mesh = benchmark_mesh(0)
+    mesh = triangles(mesh) if kind.startswith("triangle") else mesh
+    return raised(mesh) if kind in ("quad9", "triangle6") else mesh
+
+
+def raw(mesh=None, **changes):
+    """The parts of a `.vtu` file as meshio takes them, some of them replaced."""
+    mesh = benchmark_mesh(0) if mesh is None else mesh
+    point_data = {
+        name: np.isin(np.arange(len(mesh.points)), nodes).astype(float)
+        for name, nodes in mesh.node_sets.items()
+    }
+    parts = {
+        "points": np.column_stack([mesh.points, np.zeros(len(mesh.points))]),
+        "cells": [(mesh.kind, mesh.cells)],
+        "point_data": point_data,
+        "cell_data": {"region": [mesh.region]},
+    }
+    return parts | changes
+
+
+def stored(folder, **changes):
+    path = folder / "mesh.vtu"
+    meshio.Mesh(**raw(**changes)).write(path)
+    return path
+
+
+def same(one, other):
+    np.testing.assert_allclose(one.points, other.points, rtol=1e-15)
+    np.testing.assert_array_equal(one.cells, other.cells)
+    assert one.kind == other.kind
+    assert set(one.region_names) == set(other.region_names)
+    for name in one.region_names:
+        np.testing.assert_array_equal(one.cells_of(name), other.cells_of(name))
+    assert set(one.node_sets) == set(other.node_sets)
+    for name, nodes in one.node_sets.items():
+        np.testing.assert_array_equal(nodes, other.node_sets[name])
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad9", "triangle", "triangle6"])
+@pytest.mark.parametrize("ending", ["vtu", "msh"])
+def test_every_kind_of_mesh_survives_a_file(kind, ending, tmp_path):
+    mesh = of_kind(kind)
+    path = tmp_path / f"mesh.{ending}"
+    meshfile.write(mesh, path)
+    same(meshfile.read(path), mesh)
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("ending", ["vtu", "msh"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_finger_pad_survives_a_file_with_a_region_and_a_boundary_called_nail(ending, order, tmp_path):
+    mesh = FingerPad(resolution="coarse").mesh(order)
+    path = tmp_path / f"finger.{ending}"
+    meshfile.write(mesh, path)
+    same(meshfile.read(path), mesh)
+
+
+def test_vtu_is_in_the_encoding_of_the_contract(tmp_path):
+    path = tmp_path / "mesh.vtu"
+    meshfile.write(benchmark_mesh(0), path)
+    file = meshio.read(path)
+    assert file.points.shape == (793, 3)
+    assert file.cell_data["region"][0].dtype.kind == "i"
+    for name in ("pad", "bone"):
+        assert set(np.unique(file.point_data[name])) == {0, 1}
+    assert b"compressor" not in path.read_bytes()
+
+
+def test_msh_has_named_physical_groups_of_lines_and_surfaces(tmp_path):
+    path = tmp_path / "mesh.msh"
+    meshfile.write(benchmark_mesh(0), path)
+    text = path.read_text()
+    assert text.startswith("$MeshFormat\n2.2 0 8\n")
+    assert [
+        text.count(f'{d} {n} "{name}"') for d, n, name in [(2, 1, "tissue"), (2, 2, "skin"), (1, 3, "pad")]
+    ] == [1, 1, 1]
+    file = meshio.read(path)
+    assert {block.type: len(block.data) for block in file.cells} == {"quad": 720, "line": 60 + 84}
+
+
+def test_foreign_gmsh_file_with_numbers_that_repeat_per_dimension(tmp_path):
+    # gmsh numbers physical lines and surfaces apart: number 1 is a line here and a surface there
+    path = tmp_path / "foreign.msh"
+    path.write_text(
+        '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 "pad"\n1 2 "bone"\n2 1 "soft tissue"\n'
+        "$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 2 0 0\n3 2 2 0\n4 0 2 0\n$EndNodes\n"
+        "$Elements\n3\n1 1 2 1 1 1 2\n2 1 2 2 3 3 4\n3 3 2 1 1 1 2 3 4\n$EndElements\n"
+    )
+    mesh = meshfile.read(path)
+    assert mesh.region_names == {"soft tissue": 1}
+    assert [mesh.node_sets[name].tolist() for name in ("pad", "bone")] == [[0, 1], [2, 3]]
+
+
+def test_version_four_gmsh_file_is_read(tmp_path):
+    mesh = benchmark_mesh(0)
+    meshfile.write(mesh, tmp_path / "two.msh")
+    file = meshio.read(tmp_path / "two.msh")
+    names = {(1, 3): "pad", (1, 4): "bone", (2, 1): "tissue", (2, 2): "skin"}
+    path = tmp_path / "four.msh"
+    path.write_text(version_four(file, names))
+    read = meshfile.read(path)
+    np.testing.assert_array_equal(read.cells[np.argsort(read.region, kind="stable")], mesh.cells)
+    np.testing.assert_array_equal(read.node_sets["pad"], mesh.node_sets["pad"])
+    np.testing.assert_array_equal(read.node_sets["bone"], mesh.node_sets["bone"])
+
+
+def version_four(file, names):
+    """A `.msh` 4.1 text as gmsh writes it: entities that carry the physical groups, blocks per entity."""
+    box = "-9 -9 0 9 9 0"
+    lines = [f"{tag} {box} 1 {tag} 0" for d, tag in names if d == 1]
+    faces = [f"{tag} {box} 1 {tag} 0" for d, tag in names if d == 2]
+    nodes = [f"{x:.17g} {y:.17g} 0" for x, y, _ in file.points]
+    numbers = [str(i + 1) for i in range(len(nodes))]
+    blocks, count = [], 0
+    for block, tags in zip(file.cells, file.cell_data["gmsh:physical"], strict=True):
+        for tag in np.unique(tags):
+            rows = block.data[tags == tag] + 1
+            kind, dimension = {"line": (1, 1), "quad": (3, 2)}[block.type]
+            blocks.append(f"{dimension} {tag} {kind} {len(rows)}")
+            blocks += [f"{count + i + 1} {' '.join(map(str, row))}" for i, row in enumerate(rows)]
+            count += len(rows)
+    text = ["$MeshFormat", "4.1 0 8", "$EndMeshFormat", "$PhysicalNames", str(len(names))]
+    text += [f'{d} {tag} "{name}"' for (d, tag), name in names.items()] + ["$EndPhysicalNames"]
+    text += ["$Entities", f"0 {len(lines)} {len(faces)} 0", *lines, *faces, "$EndEntities"]
+    text += ["$Nodes", f"1 {len(nodes)} 1 {len(nodes)}", f"2 1 0 {len(nodes)}", *numbers, *nodes, "$EndNodes"]
+    text += ["$Elements", f"4 {count} 1 {count}", *blocks, "$EndElements", ""]
+    return "\n".join(text)
+
+
+def test_regions_may_be_named_by_the_user(tmp_path):
+    mesh = meshfile.read(stored(tmp_path), {"deep": 0, "outer": 1})
+    assert mesh.region_names == {"deep": 0, "outer": 1}
+    assert len(mesh.cells_of("outer")) == 120
+
+
+def test_clockwise_meshes_are_turned_round(tmp_path):
+    for kind in ("quad", "quad9", "triangle", "triangle6"):
+        mesh = of_kind(kind)
+        mirrored = Mesh(
+            mesh.points * [-1.0, 1.0], mesh.cells, kind, mesh.region, mesh.region_names, mesh.node_sets
+        )
+        assert scaled_jacobian(mirrored).max() < 0.0
+        path = tmp_path / "mesh.vtu"
+        meshio.Mesh(**raw(mirrored)).write(path)
+        read = meshfile.read(path, NUMBERS)
+        np.testing.assert_allclose(np.sort(scaled_jacobian(read)), np.sort(scaled_jacobian(mesh)), rtol=1e-12)
+        # the same nodes in each cell, mid-nodes still between their corners
+        np.testing.assert_array_equal(np.sort(read.cells, axis=1), np.sort(mesh.cells, axis=1))
+
+
+def test_pad_is_reduced_to_the_outline(tmp_path):
+    parts = raw()
+    parts["point_data"]["pad"][:] = 1.0
+    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
+    mesh = meshfile.read(tmp_path / "mesh.vtu", NUMBERS)
+    np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_edges))
+
+
+def shifted_copy(gap):
+    """Two bodies side by side."""
+    mesh = benchmark_mesh(0)
+    n = len(mesh.points)
+    points = np.vstack([mesh.points, mesh.points + np.array([gap, 0.0])])
+    sets = {name: np.append(nodes, nodes + n) for name, nodes in mesh.node_sets.items()}
+    region = np.tile(mesh.region, 2)
+    return Mesh(points, np.vstack([mesh.cells, mesh.cells + n]), "quad", region, mesh.region_names, sets)
+
+
+def curl():
+    """A strip of cells that goes round by more than a turn, so that its end lies over its beginning."""
+    angle = np.linspace(0.0, 2.2 * np.pi, 45)
+    rings = [r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (3.0, 4.0)]
+    node = np.arange(90).reshape(2, 45)
+    cells = np.stack([node[0, :-1], node[1, :-1], node[1, 1:], node[0, 1:]], axis=1)
+    points = np.vstack(rings) + np.column_stack([0.003 * np.arange(90), np.zeros(90)])
+    return Mesh(points, cells, "quad", np.zeros(44, int), {"tissue": 0}, {"pad": node[1], "bone": node[0]})
+
+
+def hanging():
+    """A cell whose upper edge meets two cells: their common node hangs on it (a side column joins them)."""
+    points = np.array(
+        [[0, 0], [4, 0], [4, 2], [0, 2], [2, 2], [0, 4], [2, 4], [4, 4], [6, 0], [6, 2], [6, 4.0]]
+    )
+    cells = np.array([[0, 1, 2, 3], [3, 4, 6, 5], [4, 2, 7, 6], [1, 8, 9, 2], [2, 9, 10, 7]])
+    sets = {"pad": np.array([0, 1]), "bone": np.array([5, 6, 7])}
+    return Mesh(points, cells, "quad", np.zeros(5, int), {"tissue": 0}, sets)
+
+
+def changed_cells(change):
+    mesh = benchmark_mesh(0)
+    cells, region = change(mesh.cells.copy(), mesh.region)
+    return {"cells": [("quad", cells)], "cell_data": {"region": [region]}}
+
+
+def moved(node, place, mesh=None):
+    mesh = benchmark_mesh(0) if mesh is None else mesh
+    points = mesh.points.copy()
+    points[node] = place
+    return raw(Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names, mesh.node_sets))
+
+
+def scaled(factor):
+    return {"points": raw()["points"] * factor}
+
+
+def without(name, value=0.0):
+    data = raw()["point_data"]
+    if value is None:
+        del data[name]
+    else:
+        data[name] = np.full(793, value)
+    return {"point_data": data}
+
+
+def inverted(cells, region):
+    cells[17] = cells[17, ::-1]
+    return cells, region
+
+
+QUAD8 = {"cells": [("quad8", of_kind("quad9").cells[:, :8])]}
+MIXED = {
+    "cells": [("quad", benchmark_mesh(0).cells[:-1]), ("triangle", benchmark_mesh(0).cells[-1:, :3])],
+    "cell_data": {"region": [benchmark_mesh(0).region[:-1], benchmark_mesh(0).region[-1:]]},
+}
+
+WRONG = {
+    "eight-node quads": (raw(of_kind("quad9")) | QUAD8, "quad8 has no middle node"),
+    "quads and triangles": (MIXED, "quad and triangle cells"),
+    "lines only": ({"cells": [("line", np.array([[0, 1]]))], "cell_data": {}}, "no two-dimensional cells"),
+    "tetrahedra": ({"cells": [("tetra", np.array([[0, 1, 2, 70]]))], "cell_data": {}}, "tetra cells"),
+    "not a number": (moved(5, [np.nan, 0.0]), "no finite coordinates at node 5"),
+    "infinite": (moved(5, [np.inf, 0.0]), "no finite coordinates at node 5"),
+    "not plane": ({"points": raw()["points"] + np.arange(793)[:, None] * [0, 0, 1.0]}, "a plane mesh"),
+    "metres": (scaled(1e-3), "between 1 and 200 mm"),
+    "micrometres": (scaled(1e3), "between 1 and 200 mm"),
+    "orphan nodes": (changed_cells(lambda c, r: (c[1:], r[1:])), "1 nodes that no cell uses (node 0)"),
+    "double nodes": (raw(shifted_copy(0.0)), "nodes in the same place (nodes"),
+    "one inverted cell": (changed_cells(inverted), "inverted or empty cells (cell 17)"),
+    "tangled cell": (moved(61 * 5 + 30, [0.0, -2.0]), "cells (cell"),
+    "tangled mid-node": (
+        moved(benchmark_mesh(0, 2).cells[80, 4], [0.0, -3.0], benchmark_mesh(0, 2)),
+        "tangled cells",
+    ),
+    "cell twice": (
+        changed_cells(lambda c, r: (np.vstack([c, c[60:61]]), np.append(r, r[60]))),
+        "do not overlap",
+    ),
+    "separate parts": (raw(shifted_copy(30.0)), "2 separate parts"),
+    "overlap of neighbours": (raw(curl()), "crosses or touches itself"),
+    "hanging node": (raw(hanging()), "crosses or touches itself"),
+    "no pad": (without("pad", None), "no boundary pad (it has bone)"),
+    "no bone": (without("bone", None), "no boundary bone (it has pad)"),
+    "empty pad": (without("pad"), "no boundary pad"),
+    "pad of NaN": (without("pad", np.nan), "NaN in point data `pad`"),
+    "pad on the bone": (
+        {"point_data": raw()["point_data"] | {"pad": raw()["point_data"]["bone"]}},
+        "a pad that lies on the bone",
+    ),
+    "pad without an edge": (
+        {"point_data": raw()["point_data"] | {"pad": np.arange(793) == 740.0}},
+        "without an edge",
+    ),
+    "no regions": ({"cell_data": {}}, "without region numbers"),
+    "fractional regions": ({"cell_data": {"region": [benchmark_mesh(0).region + 0.5]}}, "no integers"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_wrong_mesh_gets_one_sentence(case, tmp_path, capfd):
+    changes, words = WRONG[case]
+    changes = {
+        k: ({n: v * 1.0 for n, v in d.items()} if k == "point_data" else d) for k, d in changes.items()
+    }
+    parts = raw() | changes
+    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
+    capfd.readouterr()
+    present = np.unique(np.concatenate([np.ravel(r) for r in parts["cell_data"].get("region", [0])]))
+    with pytest.raises(InputError) as caught:
+        meshfile.read(tmp_path / "mesh.vtu", {name: n for name, n in NUMBERS.items() if n in present})
+    message = str(caught.value)
+    assert words in message
+    assert "\n" not in message
+    assert caught.value.key == "finger.mesh"
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("regions", "words"),
+    [
+        (None, "no name for 0, 1"),
+        ({"tissue": 0}, "no name for 1"),
+        ({"tissue": 0, "skin": 1, "nail": 7}, "nail = 7"),
+        ({"tissue": 0, "skin": 1, "fat": 0}, "fat and tissue with the same number"),
+    ],
+)
+def test_names_must_fit_the_numbers(regions, words, tmp_path):
+    with pytest.raises(InputError) as caught:
+        meshfile.read(stored(tmp_path), regions)
+    assert words in str(caught.value)
+    assert caught.value.key == "finger.regions"
+
+
+@pytest.mark.parametrize("name", ["mesh.vtu", "mesh.msh", "mesh.vtk", "mesh.inp", "mesh.xyz"])
+@pytest.mark.parametrize(
+    "content", [b"", b"no mesh at all\n", b"$MeshFormat\n9.9 0 8\n", b"\x00\xff\x10", b"<VTKFile/>"]
+)
+def test_unreadable_file_gets_a_sentence_and_a_clean_terminal(name, content, tmp_path, capfd):
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError) as caught:
+        meshfile.read(path, NUMBERS)
+    assert name in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_truncated_files_get_a_sentence(tmp_path, capfd):
+    for ending in ("vtu", "msh"):
+        path = tmp_path / f"mesh.{ending}"
+        meshfile.write(benchmark_mesh(0), path)
+        whole = path.read_bytes()
+        for share in (0.1, 0.5, 0.9):
+            path.write_bytes(whole[: int(share * len(whole))])
+            with pytest.raises(InputError, match=path.name):
+                meshfile.read(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_missing_file_and_folder(tmp_path):
+    with pytest.raises(InputError, match="a mesh file that exists"):
+        meshfile.read(tmp_path / "nothing.vtu")
+    with pytest.raises(InputError, match="a mesh file that exists"):
+        meshfile.read(tmp_path)
+
+
+def test_cells_outside_every_physical_group_are_refused(tmp_path):
+    path = tmp_path / "mesh.msh"
+    meshfile.write(benchmark_mesh(0), path)
+    path.write_text(
+        path.read_text().replace('2 2 "skin"\n', "").replace("$PhysicalNames\n4", "$PhysicalNames\n3")
+    )
+    with pytest.raises(InputError, match="120 cells outside every named group"):
+        meshfile.read(path)
+
+
+@pytest.mark.parametrize("name", ["mesh.stl", "mesh.vtk", "mesh.obj", "mesh", "mesh.VTX"])
+def test_format_without_names_is_refused_and_nothing_written(name, tmp_path):
+    with pytest.raises(InputError, match="cannot carry the names"):
+        meshfile.write(benchmark_mesh(0), tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failed_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
+    path = tmp_path / "mesh.vtu"
+    path.write_bytes(b"old")
+
+    def full(mesh, part):
+        part.write_bytes(b"half")
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(meshfile.WRITERS, ".vtu", full)
+    with pytest.raises(StorageError, match="No space left"):
+        meshfile.write(benchmark_mesh(0), path)
+    assert path.read_bytes() == b"old"
+    assert [file.name for file in tmp_path.iterdir()] == ["mesh.vtu"]
+    with pytest.raises(StorageError):
+        meshfile.write(benchmark_mesh(0), tmp_path / "no folder" / "mesh.vtu")
+
+
+def test_msh_cannot_carry_a_lonely_node(tmp_path):
+    mesh = benchmark_mesh(0)
+    sets = {**mesh.node_sets, "mark": np.array([400])}
+    with pytest.raises(InputError, match="node 400"):
+        meshfile.write(
+            Mesh(mesh.points, mesh.cells, "quad", mesh.region, mesh.region_names, sets), tmp_path / "m.msh"
+        )
+
+
+def test_meshed_finger_reads_a_file(tmp_path):
+    laws = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.3)}
+    finger = MeshedFinger(stored(tmp_path), laws, regions=NUMBERS)
+    same(finger.mesh(1), benchmark_mesh(0))
+    same(finger.mesh(2), benchmark_mesh(0, 2))
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_benchmark_mesh_has_the_nodes_of_the_problem(level):
+    mesh = benchmark_mesh(level)
+    assert len(mesh.points) == {0: 793, 1: 3025, 2: 23253, 3: 46657}[level]
+    outer = mesh.points[mesh.node_sets["pad"]]
+    np.testing.assert_allclose((outer[:, 0] / 8.34) ** 2 + (outer[:, 1] / 6.395) ** 2, 1.0, rtol=1e-13)
+    assert outer[:, 1].min() == pytest.approx(-6.395, rel=1e-15)
+    bone = mesh.points[mesh.node_sets["bone"]]
+    on_contour = np.abs((bone[:, 0] / 3.0) ** 2 + (bone[:, 1] / 2.5) ** 2 - 1.0) < 1e-12
+    assert (on_contour | (bone[:, 1] == 0.0)).all()
+    around, tissue, skin = LEVELS[level]
+    assert len(bone) == around + 1 + 2 * (tissue + skin)
+    # node between bone and interface at the middle column: on the straight line at equal parts
+    below = np.sort(mesh.points[np.abs(mesh.points[:, 0]) < 1e-9, 1])[::-1]
+    np.testing.assert_allclose(below[: tissue + 1], np.linspace(-2.5, -6.015, tissue + 1), rtol=1e-13)
+    np.testing.assert_allclose(below[tissue:], np.linspace(-6.015, -6.395, skin + 1), rtol=1e-13)
+
+
+def test_quadratic_benchmark_meshes():
+    straight = benchmark_mesh(0, 2)
+    corner = straight.points[straight.cells[:, :4]]
+    np.testing.assert_allclose(
+        straight.points[straight.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1))
+    )
+    through = benchmark_mesh(1, 2, same_nodes=True)
+    np.testing.assert_array_equal(through.points, benchmark_mesh(1).points)
+    assert len(through.cells) == 2880 // 4
+    assert scaled_jacobian(through).min() > 0.5
+    with pytest.raises(InputError, match="0, 1, 2 or 3"):
+        benchmark_mesh(4)
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_ready_made_meshes_are_what_the_recipe_makes(name, tmp_path):
+    path = evfem.meshes.path(name)
+    meshfile.write(RECIPES[name](), tmp_path / name)
+    fresh, kept = meshfile.read(tmp_path / name), meshfile.read(path)
+    np.testing.assert_allclose(kept.points, fresh.points, atol=1e-12)
+    np.testing.assert_array_equal(kept.cells, fresh.cells)
+    np.testing.assert_array_equal(kept.region, fresh.region)
+    readme = (path.parent / "README.md").read_text()
+    assert f"`{name}` | {len(kept.cells)} {kept.kind}s, {len(kept.points)} |" in readme
+
+
+def test_ready_made_meshes_are_listed_and_small():
+    assert evfem.meshes.names() == sorted(RECIPES)
+    assert sum(evfem.meshes.path(name).stat().st_size for name in RECIPES) < 3e6
+    with pytest.raises(InputError, match="benchmark-L0"):
+        evfem.meshes.path("benchmark-L9.vtu")
+
+
+def test_recipe_runs_as_a_module(tmp_path):
+    command = [sys.executable, "-m", "evfem.meshes.make", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(RECIPES)
+    shutil.rmtree(tmp_path)
