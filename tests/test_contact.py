@@ -1,4 +1,4 @@
-"""The dense Signorini-Coulomb solver against enumeration, non-negative least squares and its own conditions."""
+"""The dense contact solver against enumeration, non-negative least squares and its own conditions."""
 
 from itertools import product
 
