@@ -46,11 +46,23 @@ class Candidates:
 
     @property
     def turning(self) -> Floats:
-        """Change of the contact force in the laboratory frame by the node's displacement, (c, 2, 2)."""
+        """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2)."""
         axes = self.axes
         rate = self.frame.curvature / self.frame.stretch**2
-        by_x = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
-        return np.stack([by_x, np.zeros_like(by_x)], axis=2)
+        return rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses (c,), the
+    bone's step (2,), number of dense contact solves.
+    """
+
+    moved: Floats
+    force: Floats
+    status: Ints
+    bone: Floats
+    solves: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,120 +96,136 @@ class Step:
     bone: Floats
     load: float | None
 
-    def solve(self) -> tuple[Floats, Floats, Ints, Floats, int]:
-        """(displacement (c, 2), contact force (c, 2) along n and t, statuses (c,), bone step (2,), number
-        of dense solves).
-        """
-        free, effect = self._free_motion()
-        axes = self.candidates.axes
-        gap = self.candidates.frame.normal_gap + np.einsum("ck,ck->c", axes[:, 0], free.reshape(-1, 2))
+    def solve(self) -> Motion:
+        """Contact among the candidates, their motion, and the bone's."""
+        free = self._free_motion()
+        normal_gap = self.candidates.frame.normal_gap
+        gap = normal_gap + self._along_normal(free[:, 0])
         status, solves = self.candidates.status.copy(), 0
         near = np.flatnonzero((status != OPEN) | (gap < 0.0))
         if self.load is not None and not near.size:
             near = np.array([np.argmin(gap)])
         while True:
-            found, lab = self._solve_near(near, free, effect, status[near])
+            found, pushed = self._solve_near(near, free, status[near])
             solves += found.solves
-            motion = free + self._columns(near) @ lab.ravel()
-            if effect is not None:
-                motion = motion + effect * found.extra
-            moved = motion.reshape(-1, 2)
-            new_gap = self.candidates.frame.normal_gap + np.einsum("ck,ck->c", axes[:, 0], moved)
-            new_gap[near] = 0.0
-            hit = np.flatnonzero(new_gap < -1e-12 * (1.0 + np.abs(self.candidates.frame.gap)))
             status[near] = found.status
+            moved = free[:, 0] + self._columns(near) @ pushed
+            if self.load is not None:
+                moved = moved + free[:, 1] * found.extra
+            gap = normal_gap + self._along_normal(moved)
+            gap[near] = 0.0
+            hit = np.flatnonzero(gap < -1e-12 * (1.0 + np.abs(self.candidates.frame.gap)))
             if not hit.size:
                 break
             near = np.union1d(near, hit)
-        k = near.size
         force = np.zeros_like(self.candidates.force)
-        force[near] = np.stack([found.force[:k], found.force[k:]], axis=1)
+        force[near] = found.force.reshape(2, -1).T
         bone = self.bone if self.load is None else np.array([self.bone[0], found.extra])
-        return moved, force, status, bone, solves
+        return Motion(moved, force, status, bone, solves)
 
-    def _free_motion(self) -> tuple[Floats, Floats | None]:
-        """Candidates' motion without contact forces (2 c,), and per unit of the bone's unknown travel (2
-        c,).
+    def _along_normal(self, moved: Floats) -> Floats:
+        return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
+
+    def _free_motion(self) -> Floats:
+        """Candidates' motion without contact forces, and per unit of the bone's unknown travel: (2 c, 1
+        or 2).
         """
-        S, C = self.body.schur, self.body.compliance
-        axes, force = self.candidates.axes, self.candidates.force
-        present = np.einsum("ca,cak->ck", force, axes).ravel()
+        S = self.body.schur
+        present = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
         right = self.residual[:-2] - present - S[:-2, -2] * self.bone[0]
         if self.load is None:
-            return C @ (right - S[:-2, -1] * self.bone[1]), None
-        both = C @ np.stack([right, -S[:-2, -1]], axis=1)
-        return both[:, 0], both[:, 1]
+            return self.body.compliance @ (right - S[:-2, -1] * self.bone[1])[:, None]
+        return self.body.compliance @ np.stack([right, -S[:-2, -1]], axis=1)
 
     def _columns(self, near: Ints) -> Floats:
         c = self.candidates.status.size
         return self.body.compliance.reshape(2 * c, c, 2)[:, near].reshape(2 * c, -1)
 
-    def _solve_near(
-        self, near: Ints, free: Floats, effect: Floats | None, status: Ints
-    ) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and forces (k, 2) in the laboratory
-        frame, turning included.
+    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
+        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,) that move the body,
+        turning included.
         """
-        k, known = near.size, self.candidates
+        known, columns = self.candidates, self._columns(near)
         rows = (2 * near[:, None] + np.array([0, 1])).ravel()
-        columns = self._columns(near)
-        C, w = columns[rows], free[rows]
-        turning: Floats | None = None
-        e = None if effect is None else effect[rows]
-        if known.frame.curvature[near].any():
-            turning = _blocks(known.turning[near])
-            solved = np.linalg.solve(
-                np.eye(2 * k) - C @ turning, np.column_stack([C, w] + ([] if e is None else [e]))
-            )
-            C, w = solved[:, : 2 * k], solved[:, 2 * k]
-            e = None if e is None else solved[:, 2 * k + 1]
-        to_local = _rotation(known.axes[near])
-        start = to_local @ w + np.concatenate([known.frame.normal_gap[near], known.slip[near]])
-        border = None
-        if e is not None:
-            border = self._border(free, effect, columns, (C, w, e), turning, to_local)
-        softness = np.diag(known.softness[near].T.ravel())
-        problem = ContactProblem(start, to_local @ C @ to_local.T + softness, known.friction[near], border)
-        found = solve_contact(problem, status)
-        lab = to_local.T @ found.force
-        if turning is not None:
-            lab = lab + turning @ (w + C @ lab + (0.0 if e is None else e * found.extra))
-        return found, lab.reshape(-1, 2)
+        C, W = columns[rows], free[rows]
+        turning = Turning.of(known, near)
+        C, W = turning.soften(C, W)
+        axes = known.axes[near]
+        start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
+            [known.frame.normal_gap[near], known.slip[near]]
+        )
+        compliance = _local(axes, _local(axes, C).T).T
+        compliance[np.diag_indices_from(compliance)] += known.softness[near].T.ravel()
+        border = None if self.load is None else self._border(columns, free, (C, W), turning, axes)
+        found = solve_contact(ContactProblem(start, compliance, known.friction[near], border), status)
+        force = np.einsum("ak,kab->kb", found.force.reshape(2, -1), axes).ravel()
+        moved = W[:, 0] + C @ force
+        if border is not None:
+            moved = moved + W[:, 1] * found.extra
+        return found, force + turning.force(moved)
 
     def _border(
-        self,
-        free: Floats,
-        effect: Floats | None,
-        columns: Floats,
-        near: tuple[Floats, Floats, Floats],
-        turning: Floats | None,
-        to_local: Floats,
+        self, columns: Floats, free: Floats, near: tuple[Floats, Floats], turning: Turning, axes: Floats
     ) -> Border:
         """Balance of the bone along y as the extra equation for its travel."""
-        assert effect is not None
         assert self.load is not None
-        C, w, e = near
+        C, W = near
         S_y = self.body.schur[-1]
         row = S_y[:-2] @ columns
-        pivot = float(S_y[-1] + S_y[:-2] @ effect)
-        value = float(self.residual[-1] + self.load - S_y[-2] * self.bone[0] - S_y[:-2] @ free)
-        if turning is not None:
-            through = row @ turning
-            row, pivot, value = row + through @ C, pivot + float(through @ e), value - float(through @ w)
-        return Border(to_local @ e, to_local @ row, pivot, value)
+        pivot = float(S_y[-1] + S_y[:-2] @ free[:, 1])
+        value = float(self.residual[-1] + self.load - S_y[-2] * self.bone[0] - S_y[:-2] @ free[:, 0])
+        through = turning.transposed(row)
+        row, pivot, value = (
+            row + through @ C,
+            pivot + float(through @ W[:, 1]),
+            value - float(through @ W[:, 0]),
+        )
+        return Border(_local(axes, W[:, 1:])[:, 0], _local(axes, row[:, None])[:, 0], pivot, value)
 
 
-def _rotation(axes: Floats) -> Floats:
-    """(2 k, 2 k) from interleaved laboratory components to (all normal, all tangential) components."""
-    k = len(axes)
-    rotation = np.zeros((2, k, k, 2))
-    rotation[:, np.arange(k), np.arange(k)] = np.swapaxes(axes, 0, 1)
-    return rotation.reshape(2 * k, 2 * k)
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces per x displacement of
+    the loaded nodes.
+    """
+
+    size: int
+    loaded: Ints
+    rate: Floats
+
+    @classmethod
+    def of(cls, candidates: Candidates, near: Ints) -> Turning:
+        """Of the `near` nodes; on a flat surface no node is loaded."""
+        rate = candidates.turning[near]
+        loaded = np.flatnonzero(rate.any(axis=1))
+        return cls(near.size, loaded, rate[loaded])
+
+    def soften(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
+        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small system, T
+        has few columns.
+        """
+        if not self.loaded.size:
+            return C, W
+        x = 2 * self.loaded
+        B = C[:, x] * self.rate[:, 0] + C[:, x + 1] * self.rate[:, 1]
+        gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
+        return C + gain @ C[x], W + gain @ W[x]
+
+    def force(self, moved: Floats) -> Floats:
+        """Change of the forces (2 k,) by displacements (2 k,)."""
+        change = np.zeros((self.size, 2))
+        change[self.loaded] = self.rate * moved[2 * self.loaded, None]
+        return change.ravel()
+
+    def transposed(self, row: Floats) -> Floats:
+        """Row (2 k,) times T."""
+        through = np.zeros_like(row)
+        through[2 * self.loaded] = np.einsum("ak,ak->a", row.reshape(-1, 2)[self.loaded], self.rate)
+        return through
 
 
-def _blocks(blocks: Floats) -> Floats:
-    """Block-diagonal (2 k, 2 k) matrix of (k, 2, 2) blocks."""
-    k = len(blocks)
-    matrix = np.zeros((k, 2, k, 2))
-    matrix[np.arange(k), :, np.arange(k)] = blocks
-    return matrix.reshape(2 * k, 2 * k)
+def _local(axes: Floats, columns: Floats) -> Floats:
+    """Columns (2 k, m) of interleaved laboratory components as (all normal, all tangential) components."""
+    x, y = columns[0::2], columns[1::2]
+    normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
+    return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -73,6 +74,14 @@ class Condensation(Protocol):
         """Solution (n,) once the kept unknowns (m,) are known."""
 
 
+@cache
+def pardiso_library() -> Any:
+    """pypardiso's handle of the library; finding the shared object takes long, so it is looked for once."""
+    from pypardiso.pardiso_wrapper import PyPardisoSolver
+
+    return PyPardisoSolver(mtype=2)
+
+
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
     """A number added to the diagonal of S while it is computed: a bone that is free to move leaves S
     singular.
@@ -86,12 +95,10 @@ class Pardiso:
     """
 
     def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
-        from pypardiso.pardiso_wrapper import PyPardisoSolver
-
         self.pattern, self.kept = pattern, kept
-        self._library = PyPardisoSolver(mtype=2)
-        self._library.libmkl.MKL_Set_Num_Threads(threads)
-        self._call_pardiso = self._library._mkl_pardiso
+        library = pardiso_library()
+        library.libmkl.MKL_Set_Num_Threads(threads)
+        self._call_pardiso = library._mkl_pardiso
         self._mark = np.zeros(pattern.size, dtype=np.int32)
         # PARDISO numbers the Schur complement in ascending order of the unknowns
         self._order = np.argsort(kept)

@@ -239,21 +239,22 @@ class Equilibrium:
         c = self.candidates
         step = Step(self._condensed, self._describe(old, state), g, target.bone - state.bone, balance.load)
         try:
-            moved, force, status, bone_step, solves = step.solve()
+            found = step.solve()
         except ContactNotSolved as error:
             raise StepFailed(f"contact: {error}", self.record.residuals) from error
-        self.record.contact_solves += solves
-        delta = self.body.expand(self._factor.backward(saved, np.concatenate([moved.ravel(), bone_step])))
+        self.record.contact_solves += found.solves
+        kept = np.concatenate([found.moved, found.bone])
+        delta = self.body.expand(self._factor.backward(saved, kept))
         share = self._largest_share(state.u, delta)
-        all_force, all_status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
-        all_force[c], all_status[c] = force, status
+        force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
+        force[c], status[c] = found.force, found.status
         whole = share == 1.0 and balance.load is None
         return replace(
             state,
             u=state.u + share * delta,
-            contact_force=state.contact_force + share * (all_force - state.contact_force),
-            status=all_status,
-            bone=target.bone.copy() if whole else state.bone + share * bone_step,
+            contact_force=state.contact_force + share * (force - state.contact_force),
+            status=status,
+            bone=target.bone.copy() if whole else state.bone + share * found.bone,
         )
 
     def _describe(self, old: State, state: State) -> Candidates:
@@ -339,7 +340,8 @@ class Equilibrium:
         unknowns = (2 * self.candidates[:, None] + np.array([0, 1])).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())
-        # nodes beyond the candidates move along with their neighbours, so that sliding changes no tributary length
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes no tributary
+        # length
         beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
         index = np.arange(unknowns.size)
         inner[index, 2 * (index // 2)] += beyond
