@@ -1,0 +1,209 @@
+"""What the studies share: writing a study down, the two laws, the measurements, and how they are drawn."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evfem import data
+from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.errors import StorageError
+from evfem.result import versions
+from evfem.storage import replacing, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = NDArray[np.float64]
+
+LAWS: dict[str, StrongTroxel | Kaczmarek] = {"strong_troxel": StrongTroxel(), "kaczmarek": Kaczmarek()}
+LABELS = {"strong_troxel": "Strong-Troxel", "kaczmarek": "Kaczmarek"}
+#: told apart with any colour vision (Okabe and Ito, 2008)
+COLOURS = {
+    "strong_troxel": "#E69F00",
+    "kaczmarek": "#0072B2",
+    "measured": "#B04A85",
+    "fe": "#009E73",
+    "accent": "#56B4E9",
+    "neutral": "#555555",
+}
+#: hover cases of the measurements: voltage in V, air gap in mm
+CASES = {"HVHD": (2000.0, 0.50), "HVLD": (2000.0, 0.25), "LVLD": (1414.0, 0.25)}
+WIDTH = 7.0  # of a figure, in inches
+
+
+@dataclass(frozen=True)
+class Series:
+    """One plotted curve or set of points, as it goes into the csv; `unit` is that of y."""
+
+    name: str
+    x: Any
+    y: Any
+    unit: str
+
+
+@dataclass(frozen=True)
+class Study:
+    """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it."""
+
+    name: str
+    numbers: dict[str, float]
+    paper: dict[str, float]
+    assumptions: dict[str, Any]
+    series: list[Series]
+    draw: Callable[[], Figure]
+    parameters: dict[str, Any] = field(default_factory=dict)
+
+    def finish(self, out: Path | None, quick: bool = False) -> dict[str, Any]:
+        """The study's dictionary; with `out` also NAME.json, NAME.csv and NAME.png in that folder."""
+        result = {
+            "study": self.name,
+            "numbers": {key: float(value) for key, value in self.numbers.items()},
+            "paper": self.paper,
+            "assumptions": self.assumptions,
+            "provenance": provenance(self.parameters, quick),
+        }
+        if out is not None:
+            folder = make_folder(out)
+            write_text(folder / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
+            write_text(folder / f"{self.name}.csv", csv_text(self.series))
+            with replacing(folder / f"{self.name}.png") as temporary:
+                self.draw().savefig(temporary, format="png", dpi=160)
+        return result
+
+
+def make_folder(out: str | Path) -> Path:
+    """`out` as an existing folder; StorageError where the disk refuses."""
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"cannot create the folder {folder}: {error.strerror or error}") from error
+    return folder
+
+
+def provenance(parameters: Mapping[str, Any], quick: bool) -> dict[str, Any]:
+    """Versions, date, eps_0 and parameters behind a study's numbers."""
+    return {
+        "versions": versions(),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "eps_0_F_per_m": eps_0,
+        "quick": quick,
+        "parameters": dict(parameters),
+    }
+
+
+def csv_text(series: Iterable[Series]) -> str:
+    """Every point of every series as a line ``series,x,y,unit``."""
+    lines = ["series,x,y,unit"]
+    for one in series:
+        if "," in one.name or "," in one.unit:
+            raise ValueError(f"a comma in {one.name!r} or {one.unit!r}")
+        for x, y in zip(np.atleast_1d(one.x), np.atleast_1d(one.y), strict=True):
+            lines.append(f"{one.name},{_cell(x)},{_cell(y)},{one.unit}")
+    return "\n".join(lines) + "\n"
+
+
+def _cell(value: Any) -> str:
+    return str(value) if isinstance(value, str) else repr(float(value))
+
+
+@cache
+def participants() -> data.Table:
+    """Table 1."""
+    return data.load("table1")
+
+
+def table2_layers(stratum_corneum: Any = None) -> Layers:
+    """Table 2's stack; `stratum_corneum` in mm replaces the thickness of the stratum corneum."""
+    table = data.load("table2")
+    thickness = table.value("d_sc") if stratum_corneum is None else stratum_corneum
+    skin = Layer(thickness, table.value("eps_sc"))
+    return Layers.of(skin, Layer(table.value("d_i"), table.value("eps_i")))
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """An empty figure of `width` x `height` inches whose parts keep clear of each other; no pyplot."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def median_interval(values: Floats) -> tuple[float, float, float]:
+    """Confidence interval of the median from order statistics: low, high, and the confidence it has.
+
+    The narrowest symmetric pair of order statistics with at least 90 %: for eleven values the third and
+    ninth, 93.5 %. It assumes nothing about the distribution.
+    """
+    from math import comb
+
+    ordered = np.sort(values)
+    n = len(ordered)
+    for rank in range(n // 2, -1, -1):
+        confidence = 1.0 - 2.0 * sum(comb(n, i) for i in range(rank + 1)) / 2.0**n
+        if confidence >= 0.90:
+            return float(ordered[rank]), float(ordered[n - 1 - rank]), confidence
+    return float(ordered[0]), float(ordered[-1]), 1.0 - 2.0 ** (1 - n)
+
+
+def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str) -> None:
+    """Box (quartiles), whiskers (extremes), median, its confidence interval as a bar, and the points."""
+    low, high, _ = median_interval(values)
+    box = ax.boxplot(
+        [values],
+        positions=[at],
+        widths=[width],
+        whis=(0, 100),
+        showcaps=True,
+        patch_artist=True,
+        manage_ticks=False,
+    )
+    for part in ("boxes", "whiskers", "caps", "medians"):
+        for artist in box[part]:
+            artist.set(color=colour, linewidth=1.1)
+    box["boxes"][0].set(facecolor=colour, alpha=0.30)
+    box["medians"][0].set(linewidth=2.2)
+    ax.plot([at, at], [low, high], color=colour, linewidth=3.0, alpha=0.75, solid_capstyle="butt")
+    spread = np.linspace(-0.3, 0.3, len(values)) * width
+    ax.plot(at + spread, values, ".", color=colour, markersize=3.0, alpha=0.8)
+
+
+def measured_boxes(ax: Axes, at: Mapping[str, float], width: float) -> None:
+    """The measured forces (mN) of the cases as boxes at the given abscissae."""
+    for case, place in at.items():
+        draw_box(ax, place, participants()[case], width, COLOURS["measured"])
+
+
+def measured_handle() -> Any:
+    """Legend entry of the measured boxes."""
+    from matplotlib.patches import Patch
+
+    return Patch(
+        facecolor=COLOURS["measured"], edgecolor=COLOURS["measured"], alpha=0.5, label="measured (Table 1)"
+    )
+
+
+def not_shown(figure: Figure, what: str) -> None:
+    """A line at the foot of the figure on measured points that the paper plots but does not print."""
+    figure.supxlabel(
+        f"{what}: only plotted in the paper, not shown", fontsize="x-small", color=COLOURS["neutral"]
+    )
+
+
+def panel_letter(ax: Axes, letter: str) -> None:
+    """The letter of a panel, in its upper left corner outside the axes."""
+    ax.set_title(f"[{letter}]", loc="left", fontsize="medium")
+
+
+def law_line(ax: Axes, law: str, x: Floats, y: Floats, **style: Any) -> Any:
+    """A curve in the law's colour; further keywords of `Axes.plot`."""
+    return ax.plot(x, y, color=COLOURS[law], **style)[0]

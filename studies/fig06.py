@@ -1,0 +1,114 @@
+"""Fig. 6: friction with and without voltage, and the contact area that each law needs to explain it.
+
+Meyer et al.: 140 V, mu = 0.3, attraction 0.25 +- 0.01 N. The paper fits A = k F_n^m: k = 125.359 with
+Kaczmarek's law (16a), 0.446 with Strong-Troxel's (16b), m = 0.489, for d_sc = 0.1 mm and d_i = 0.001 mm.
+Expected: the two k differ by the ratio of contact pressures, about 281; 0.25 N is reached at F_n = 0.69
+N.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem import data
+from evfem.electrostatics import Layer, Layers
+from evfem.encoding import AreaLaw, Encoding, fit_area_to_friction
+
+from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PAPER = {
+    "kaczmarek.area_mm2_at_1N": 125.359,
+    "strong_troxel.area_mm2_at_1N": 0.446,
+    "gross.area_mm2_at_1N": 107.626,
+    "ridge.area_mm2_at_1N": 63.000,
+}
+ASSUMPTIONS = {
+    "measured points": "Meyer et al., Adams: only plotted in the paper; neither shown nor fitted again",
+    "k and m of (16a)": "the paper's fit; k of (16b) follows from it by the ratio of the contact pressures",
+    "layers": "d_sc = 0.1 mm, d_i = 0.001 mm, permittivities of Table 2",
+}
+ADAMS = {"gross": ("Adams, gross", "--"), "ridge": ("Adams, ridges", ":")}
+
+
+def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+    """Friction by (16a) and (16b), the areas behind it, and Adams' area laws."""
+    meyer, laws = data.load("meyer"), data.load("area_laws")
+    areas = {name: AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in laws["law"]}
+    layers = _layers(meyer)
+    voltage, friction = meyer.value("U"), meyer.value("mu")
+    force = np.linspace(0.02, 1.2, 31 if quick else 119)
+    display = {law: Encoding(LAWS[law], layers, areas[law], friction) for law in LAWS}
+    k_ratio = LAWS["strong_troxel"].traction(0.0, 1.0, layers) / LAWS["kaczmarek"].traction(0.0, 1.0, layers)
+    tangential = {law: display[law].tangential_force(force, voltage) for law in LAWS}
+    refit = fit_area_to_friction(force, tangential["kaczmarek"], voltage, display["strong_troxel"])
+    numbers = {
+        "k_ratio": k_ratio,
+        "normal_force_at_0.25N_N": _force_for(display["kaczmarek"], meyer.value("F_e"), voltage),
+        "kaczmarek.area_mm2_at_1N": areas["kaczmarek"](1.0),
+        "strong_troxel.area_mm2_at_1N": refit.k,
+        "gross.area_mm2_at_1N": areas["gross"](1.0),
+        "ridge.area_mm2_at_1N": areas["ridge"](1.0),
+        "paper_k_ratio": areas["kaczmarek"].k / areas["strong_troxel"].k,
+    }
+    for law, area in (("kaczmarek", areas["kaczmarek"]), ("strong_troxel", AreaLaw(refit.k, refit.m))):
+        for name in ADAMS:
+            ratio = area(force[force >= 0.1]) / areas[name](force[force >= 0.1])
+            numbers |= {f"verdict.{law}.area_over_{name}": np.exp(np.mean(np.log(ratio)))}
+    series = [Series("friction voltage off", force, friction * force, "N over N")]
+    series += [Series(f"friction {law}", force, y, "N over N") for law, y in tangential.items()]
+    series += [Series(f"area {name}", force, area(force), "mm2 over N") for name, area in areas.items()]
+    parameters = {"U_V": voltage, "mu": friction, "d_sc_mm": 0.1, "d_i_mm": 0.001}
+    study = Study(
+        "fig06",
+        numbers,
+        PAPER,
+        ASSUMPTIONS,
+        series,
+        lambda: _draw(force, friction, tangential, areas),
+        parameters,
+    )
+    return study.finish(out, quick)
+
+
+def _layers(meyer: data.Table) -> Layers:
+    table = data.load("table2")
+    skin = Layer(meyer.value("d_sc_max_force"), table.value("eps_sc"))
+    return Layers.of(skin, Layer(meyer.value("d_i"), table.value("eps_i")))
+
+
+def _force_for(display: Encoding, attraction: float, voltage: float) -> float:
+    """Normal force in N at which the attraction is reached: (k F^m p = F_e) solved for F."""
+    pressure = display.law.traction(0.0, voltage, display.layers)
+    return float((attraction / (display.area.k * pressure)) ** (1.0 / display.area.m))
+
+
+def _draw(force: Any, friction: float, tangential: dict[str, Any], areas: dict[str, AreaLaw]) -> Figure:
+    figure = new_figure(3.4)
+    left, right = figure.subplots(1, 2)
+    left.plot(force, friction * force, color=COLOURS["fe"], label=f"off: $F_t$ = {friction:g} $F_n$")
+    law_line(
+        left,
+        "strong_troxel",
+        force,
+        tangential["strong_troxel"],
+        linewidth=4.5,
+        label="on: (16b) Strong-Troxel",
+    )
+    law_line(left, "kaczmarek", force, tangential["kaczmarek"], linewidth=1.5, label="on: (16a) Kaczmarek")
+    left.set(xlabel="normal force $F_n$ (N)", ylabel="friction $F_t$ (N)", xlim=(0, 1.2), ylim=(0, None))
+    for law in LAWS:
+        law_line(right, law, force, areas[law](force), label=f"needed by {LABELS[law]}")
+    for (name, (label, style)), colour in zip(ADAMS.items(), ("neutral", "measured"), strict=True):
+        right.plot(force, areas[name](force), style, color=COLOURS[colour], label=label)
+    right.set(xlabel="normal force $F_n$ (N)", ylabel="contact area (mm²)", xlim=(0, 1.2), ylim=(-4, 220))
+    for ax, letter in ((left, "a"), (right, "b")):
+        ax.legend(fontsize="small")
+        panel_letter(ax, letter)
+    not_shown(figure, "Measured points of Meyer et al. and of Adams")
+    return figure

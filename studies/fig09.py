@@ -1,0 +1,43 @@
+"""Fig. 9: a hovering finger taken for a flat plate, for areas from 10 to 50 mm2.
+
+Table 2, equations (6) and (7), against the boxes of Table 1. Expected: the right growth with the
+voltage, the wrong one with the distance (a plate's force falls too fast), and areas of only 10 to 20 mm2
+to meet the measured forces. (Recomputed for the medians: 12 to 29 mm2 by (6), 31 to 53 mm2 by (7).)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from evfem.forces import plate_force
+
+from . import hover
+from .common import LAWS, Study, table2_layers
+
+AREAS = {f"A_{area}mm2": float(area) for area in (10, 20, 30, 40, 50)}
+ASSUMPTIONS = {
+    "pad": "flat stratum corneum of the given area at the air gap of the case",
+    "measured": "box: quartiles; whiskers: extremes; bar: 93.5 % confidence interval of the median (n = 11)",
+}
+
+
+def _force(law: str, area: float, gap: Any, voltage: Any) -> Any:
+    return plate_force(LAWS[law], area, gap, voltage, table2_layers())
+
+
+def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+    """Forces of the five areas in the three cases, and over voltage and distance."""
+    numbers = hover.case_numbers(_force, AREAS)
+    verdict = hover.verdict(numbers, "A_10mm2")
+    for law in LAWS:
+        for case in hover.CASES:  # the force is proportional to the area
+            verdict[f"verdict.{law}.area_mm2_for_median.{case}"] = (
+                10.0 / verdict[f"verdict.{law}.over_median.{case}"]
+            )
+    series = hover.curves(_force, AREAS, quick)
+    names = {key: f"{area:g} mm²" for key, area in AREAS.items()}
+    study = Study(
+        "fig09", numbers | verdict, {}, ASSUMPTIONS, series, lambda: hover.draw(series, AREAS, names, 9.0)
+    )
+    return study.finish(out, quick)

@@ -1,0 +1,121 @@
+"""The studies in their quick versions: one physical number each, and the files they leave behind."""
+
+import importlib
+import importlib.util
+import json
+
+import numpy as np
+import pytest
+
+from evfem import data
+from evfem.electrostatics import Layer
+from evfem.errors import InputError, StorageError
+from evfem.reference import cylinder_force
+
+studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
+common, laws = (importlib.import_module(f"{studies.__name__}.{name}") for name in ("common", "laws"))
+CASES = ("HVHD", "HVLD", "LVLD")
+
+
+@pytest.mark.parametrize("name", ["section321", "laws", "fig06", "fig07", "fig08", "fig09", "fig10"])
+def test_study_leaves_numbers_curves_and_picture(name, tmp_path):
+    result = studies.run(name, quick=True, out=tmp_path / "new")
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
+        f"{name}.{e}" for e in ("csv", "json", "png")
+    ]
+    assert json.loads((tmp_path / "new" / f"{name}.json").read_text()) == json.loads(json.dumps(result))
+    assert list(result) == ["study", "numbers", "paper", "assumptions", "provenance"]
+    assert set(result["paper"]) <= set(result["numbers"])
+    assert all(type(value) is float and np.isfinite(value) for value in result["numbers"].values())
+    lines = (tmp_path / "new" / f"{name}.csv").read_text().splitlines()
+    assert lines[0] == "series,x,y,unit"
+    assert all(line.count(",") == 3 for line in lines)
+    assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_section321_thicknesses():
+    numbers = studies.run("section321", quick=True)["numbers"]
+    assert round(numbers["effective_thickness_um"], 3) == 2.746
+    assert round(numbers["thickness_strong_troxel_mm"], 2) == 5.49
+    assert round(numbers["thickness_kaczmarek_um"], 2) == 76.17
+
+
+def test_fig06_forces_and_areas():
+    numbers = studies.run("fig06", quick=True)["numbers"]
+    assert numbers["k_ratio"] == pytest.approx(281.25, abs=0.01)  # 1 / 0.003556 of the notes
+    assert round(numbers["normal_force_at_0.25N_N"], 2) == 0.69
+    assert (
+        round(numbers["strong_troxel.area_mm2_at_1N"], 3) == 0.446
+    )  # from the other law's k: the paper's own fit
+
+
+def test_fig07_and_fig08_ranges():
+    numbers = studies.run("fig07", quick=True)["numbers"]
+    assert [round(numbers[f"kaczmarek.{end}_N"], 3) for end in ("min", "max")] == [0.036, 0.360]
+    numbers = studies.run("fig08", quick=True)["numbers"]
+    assert round(numbers["kaczmarek.N_at_140V.dsc_0.1mm"], 2) == 0.24
+    assert round(numbers["kaczmarek.N_at_140V.dsc_0.5mm"], 3) == 0.029
+
+
+def test_fig09_plate_by_hand():
+    # eps_0 A U^2 / (2 (0.25 + s)^2), s = 0.38/1650 + 0.09/3.35: 8.8541878e-12 * 20 * 4e6 / (2 * 0.27709598^2)
+    numbers = studies.run("fig09", quick=True)["numbers"]
+    expected = 1e3 * 8.8541878e-12 * 20.0 * 4e6 / (2 * 0.277095975**2)
+    assert numbers["strong_troxel.mN.A_20mm2.HVLD"] == pytest.approx(expected, rel=1e-7)
+    assert numbers["kaczmarek.mN.A_20mm2.HVLD"] == pytest.approx(expected * 0.277095975 / 0.72, rel=1e-7)
+
+
+def test_fig10_is_the_paper_within_half_a_per_cent():
+    result = studies.run("fig10", quick=True)
+    for key, printed in result["paper"].items():
+        assert result["numbers"][key] == pytest.approx(printed, rel=5e-3)
+    thin, thick = (result["numbers"][f"strong_troxel.mN.dsc_{d}mm.HVLD"] for d in (0.27, 0.49))
+    assert thin == pytest.approx(thick, rel=1e-3)  # (8a) does not see the stratum corneum
+
+
+def test_laws_says_what_theory_and_measurement_say():
+    numbers = studies.run("laws", quick=True)["numbers"]
+    assert numbers["verdict.strong_troxel.over_electrostatics"] == pytest.approx(1.0, abs=0.03)
+    assert numbers["verdict.kaczmarek.over_electrostatics"] == pytest.approx(0.46, abs=0.01)
+    assert numbers["verdict.kaczmarek.median_over_measured.mean"] == pytest.approx(1.0, abs=0.1)
+    assert numbers["verdict.strong_troxel.median_over_measured.mean"] > 1.5
+    assert round(numbers["contact_pressure_kPa.strong_troxel"], 1) == 24.1
+
+
+def test_field_of_the_cylinder_over_a_slab():
+    # a slab of air only moves the electrode away; a slab of huge permittivity is an electrode itself
+    for gap in (0.05, 0.25, 1.0):
+        air = laws.cylinder_over_slab(gap, Layer(0.1, 1.0), 8.34, 2000.0)
+        assert air == pytest.approx(cylinder_force(gap + 0.1, 8.34, 2000.0), rel=1e-8, abs=0)
+    metal = laws.cylinder_over_slab(0.25, Layer(0.1, 1e7), 8.34, 2000.0)
+    assert metal == pytest.approx(cylinder_force(0.25, 8.34, 2000.0), rel=1e-5, abs=0)
+    # the images sum up to the reflection of a wave exp(-k y) by the slab: (tanh kd - e) / (tanh kd + e)
+    depth, strength = laws._images(Layer(0.09, 3.35))
+    for k in (0.1, 3.0, 40.0):
+        expected = (np.tanh(k * 0.09) - 3.35) / (np.tanh(k * 0.09) + 3.35)
+        assert np.sum(strength * np.exp(-k * depth)) == pytest.approx(expected, rel=1e-13)
+
+
+def test_interval_of_the_median():
+    low, high, confidence = common.median_interval(np.arange(11.0))
+    # P(third < median < ninth) = 1 - 2 (1 + 11 + 55) / 2^11
+    assert (low, high) == (2.0, 8.0)
+    assert confidence == pytest.approx(1.0 - 134.0 / 2048.0, rel=1e-14)
+
+
+def test_curves_of_a_study_as_csv():
+    text = common.csv_text(
+        [common.Series("a", [1.0, 2.0], [0.1, 1 / 3], "N over V"), common.Series("b", ["i"], [2.0], "mN")]
+    )
+    assert text == f"series,x,y,unit\na,1.0,0.1,N over V\na,2.0,{1 / 3!r},N over V\nb,i,2.0,mN\n"
+    with pytest.raises(ValueError, match="comma"):
+        common.csv_text([common.Series("a,b", [1.0], [1.0], "N")])
+
+
+def test_unknown_study_and_unusable_folder(tmp_path):
+    with pytest.raises(InputError, match="section321"):
+        studies.run("fig99")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match="folder"):
+        studies.run("section321", quick=True, out=tmp_path / "file" / "inside")
+    assert data.load("table1").units["c"] == "mm"
