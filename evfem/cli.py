@@ -76,8 +76,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         given = parser().parse_args(arguments)
     except SystemExit as done:
         return int(done.code or 0)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number in before:
+            signal.signal(number, signal.default_int_handler)
+        return _status(given)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _status(given: argparse.Namespace) -> int:
+    """Run the command; its exit status, with the message of what went wrong."""
     try:
         return given.function(given)
     except InputError as error:

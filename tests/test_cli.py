@@ -339,6 +339,34 @@ def test_mesh_writes_the_mesh_the_scene_computes_on(tmp_path, element, kind, end
     assert f"{len(mesh.points)} nodes" in out
 
 
+def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path):
+    status, out, err = evfem_command(tmp_path, "study", "section321", "--quick", "--out", "here")
+    assert (status, err) == (0, "study section321\n")
+    assert files(tmp_path / "here") == ["section321.csv", "section321.json", "section321.png"]
+    assert out == "here/section321.json\n"
+    written = json.loads((tmp_path / "here" / "section321.json").read_text())
+    assert written["study"] == "section321"
+    assert set(written) == {"study", "numbers", "paper", "assumptions", "provenance"}
+    assert (tmp_path / "here" / "section321.csv").read_text().startswith("series,x,y,unit\n")
+
+
+def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
+    status, out, err = evfem_command(tmp_path, "study", "section321", "fig99", "--out", "here")
+    assert (status, out) == (2, "")
+    assert err.startswith("evfem: study: given fig99; allowed: section321, ")
+    assert files(tmp_path) == []
+
+
+def test_all_means_every_study_but_the_peers(monkeypatch, tmp_path):
+    from evfem import studies
+
+    ran = []
+    monkeypatch.setattr(studies, "NAMES", ("laws", "peers", "fig05"))
+    monkeypatch.setattr(studies, "run", lambda name, quick, out: ran.append((name, quick, out)))
+    assert cli.main(["study", "fig05", "all", "--out", str(tmp_path)]) == 0
+    assert ran == [("fig05", False, tmp_path), ("laws", False, tmp_path)]
+
+
 def test_version_and_help_are_quick_to_load_and_print():
     status = {}
     for words in (["--version"], ["--help"], ["run", "--help"]):
@@ -358,13 +386,13 @@ def test_version_and_help_are_quick_to_load_and_print():
 def test_the_exit_status_is_that_of_the_error(monkeypatch, capsys):
     from evfem.errors import InputError, NotConverged, StorageError
 
+    before = signal.getsignal(signal.SIGTERM)
     errors = {
         2: InputError("a", 1, "b"),
         3: NotConverged(3, [1.0], "try less"),
         4: StorageError("disk"),
         130: KeyboardInterrupt(),
     }
-    handlers = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     for status, error in errors.items():
 
         def fail(given, error=error):
@@ -373,8 +401,7 @@ def test_the_exit_status_is_that_of_the_error(monkeypatch, capsys):
         monkeypatch.setattr(cli, "_plan", fail)
         assert cli.main(["plan"]) == status
         assert capsys.readouterr().err.startswith("evfem: ")
-    for number, handler in zip((signal.SIGINT, signal.SIGTERM), handlers, strict=True):
-        signal.signal(number, handler)
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 def test_the_table_fits_80_columns_with_long_numbers():
