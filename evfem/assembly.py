@@ -197,7 +197,7 @@ class Tissue:
             [c for m, c in measures if m == "trace"] or [np.zeros(0, np.int64)]
         )
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.kernels = _kernels() if self.mu is not None else None
+        self.kernels = compiled_kernels() if self.mu is not None else None
         self._rows: Floats | None = None
 
     # -- kinematics
@@ -374,7 +374,7 @@ def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any
     return mu, lmbda
 
 
-def _kernels() -> Any:
+def compiled_kernels() -> Any:
     """The compiled kernels of evfem[fast], or None where numba is not installed."""
     try:
         from evfem import kernels

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.assembly import ELEMENTS, Space, gradient_rows, scikit_mesh
+from evfem.assembly import ELEMENTS, Space, compiled_kernels, gradient_rows, scikit_mesh
 from evfem.materials import split
 from evfem.mesh import Floats
 
@@ -35,6 +35,7 @@ class Dynamics:
         self.space = space
         self.viscosity = viscosity
         self.mass = None if density is None else mass_matrices(space) * density[:, None, None]
+        self.kernels = compiled_kernels()
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, 2))
         self._strain0: Floats = np.zeros((*space.weight.shape, 2, 2))
@@ -50,7 +51,9 @@ class Dynamics:
         total = np.zeros_like(u)
         if self.step == 0.0:
             return total
-        if self.viscosity is not None:
+        if self.viscosity is not None and self.kernels is not None:
+            total += self.kernels.viscous_forces(u, *self._arrays())
+        elif self.viscosity is not None:
             F = self._gradient(u)
             P = F @ self._stress(F) * self.space.weight[..., None, None]
             total += self._scatter(np.einsum("eqij,eqnj->eni", P, self.space.gradient, optimize=True))
@@ -64,7 +67,9 @@ class Dynamics:
         if self.step == 0.0:
             return
         E, Q, n, _ = self.space.gradient.shape
-        if self.viscosity is not None:
+        if self.viscosity is not None and self.kernels is not None:
+            self.kernels.add_viscous_tangent(u, *self._arrays(), cells)
+        elif self.viscosity is not None:
             F = self._gradient(u)
             S, rate = self._stress(F), (self.viscosity / self.step)[:, None, None, None, None, None]
             unit = np.eye(2)
@@ -108,6 +113,11 @@ class Dynamics:
         F[..., 0, 0] += 1.0
         F[..., 1, 1] += 1.0
         return F
+
+    def _arrays(self) -> tuple[Floats, ...]:
+        assert self.viscosity is not None
+        space = self.space
+        return self.viscosity / self.step, space.nodes, space.gradient, space.weight, self._strain0
 
     def _stress(self, F: Floats) -> Floats:
         assert self.viscosity is not None

@@ -177,3 +177,77 @@ def smallest_J(u: Floats, nodes: Ints, sample: Floats) -> float:
                 d += uy * gy
             smallest = min(smallest, a * d - b * c)
     return smallest
+
+
+@njit(cache=True, error_model="numpy")
+def viscous_forces(
+    u: Floats, rate: Floats, nodes: Ints, gradient: Floats, weight: Floats, strain0: Floats
+) -> Floats:
+    """Nodal forces (N, 2) of S = 2 rate (E - E0) with `rate` (E,) = eta / time step and E0 (E, Q, 2, 2)."""
+    out = np.zeros_like(u)
+    F, S = np.empty((2, 2)), np.empty((2, 2))
+    for e in range(nodes.shape[0]):
+        if rate[e] == 0.0:
+            continue
+        for q in range(weight.shape[1]):
+            _viscous_point(u, nodes[e], gradient[e, q], rate[e] * weight[e, q], strain0[e, q], F, S)
+            p00 = F[0, 0] * S[0, 0] + F[0, 1] * S[1, 0]
+            p01 = F[0, 0] * S[0, 1] + F[0, 1] * S[1, 1]
+            p10 = F[1, 0] * S[0, 0] + F[1, 1] * S[1, 0]
+            p11 = F[1, 0] * S[0, 1] + F[1, 1] * S[1, 1]
+            for k in range(nodes.shape[1]):
+                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
+                out[nodes[e, k], 0] += p00 * gx + p01 * gy
+                out[nodes[e, k], 1] += p10 * gx + p11 * gy
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _viscous_point(u: Any, cell: Any, gradient: Any, rate: float, strain0: Any, F: Any, S: Any) -> None:
+    """F (2, 2) and S = 2 rate (E - E0) of one point."""
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    for k in range(cell.size):
+        gx, gy = gradient[k, 0], gradient[k, 1]
+        ux, uy = u[cell[k], 0], u[cell[k], 1]
+        a += ux * gx
+        b += ux * gy
+        c += uy * gx
+        d += uy * gy
+    F[0, 0], F[0, 1], F[1, 0], F[1, 1] = a, b, c, d
+    S[0, 0] = 2.0 * rate * (0.5 * (a * a + c * c - 1.0) - strain0[0, 0])
+    S[1, 1] = 2.0 * rate * (0.5 * (b * b + d * d - 1.0) - strain0[1, 1])
+    S[0, 1] = S[1, 0] = 2.0 * rate * (0.5 * (a * b + c * d) - strain0[0, 1])
+
+
+@njit(cache=True, error_model="numpy")
+def add_viscous_tangent(
+    u: Floats, rate: Floats, nodes: Ints, gradient: Floats, weight: Floats, strain0: Floats, cells: Floats
+) -> None:
+    """Add the tangents of `viscous_forces` to the cell matrices (E, 2 n, 2 n)."""
+    n = nodes.shape[1]
+    F, S = np.empty((2, 2)), np.empty((2, 2))
+    push = np.empty((n, 2))
+    for e in range(nodes.shape[0]):
+        if rate[e] == 0.0:
+            continue
+        for q in range(weight.shape[1]):
+            r = rate[e] * weight[e, q]
+            _viscous_point(u, nodes[e], gradient[e, q], r, strain0[e, q], F, S)
+            b00 = F[0, 0] * F[0, 0] + F[0, 1] * F[0, 1]
+            b01 = F[0, 0] * F[1, 0] + F[0, 1] * F[1, 1]
+            b11 = F[1, 0] * F[1, 0] + F[1, 1] * F[1, 1]
+            for k in range(n):
+                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
+                push[k, 0] = F[0, 0] * gx + F[0, 1] * gy
+                push[k, 1] = F[1, 0] * gx + F[1, 1] * gy
+            for k in range(n):
+                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
+                sx, sy = S[0, 0] * gx + S[0, 1] * gy, S[1, 0] * gx + S[1, 1] * gy
+                for m in range(n):
+                    hx, hy = gradient[e, q, m, 0], gradient[e, q, m, 1]
+                    inner = r * (gx * hx + gy * hy)
+                    stress = sx * hx + sy * hy
+                    cells[e, 2 * k, 2 * m] += stress + inner * b00 + r * push[m, 0] * push[k, 0]
+                    cells[e, 2 * k, 2 * m + 1] += inner * b01 + r * push[m, 0] * push[k, 1]
+                    cells[e, 2 * k + 1, 2 * m] += inner * b01 + r * push[m, 1] * push[k, 0]
+                    cells[e, 2 * k + 1, 2 * m + 1] += stress + inner * b11 + r * push[m, 1] * push[k, 1]
