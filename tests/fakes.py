@@ -58,7 +58,7 @@ def fake_frame(mesh, step):
     n, e = len(mesh.points), len(mesh.cells)
     pad = np.isin(np.arange(n), mesh.node_sets["pad"])
     x, y = mesh.points.T
-    u = 0.01 * step * np.column_stack([y, -y * (1 + x**2)])
+    u = 0.01 * step * np.column_stack([1 + y, -y * (1 + x**2)])
     pressure = np.where(pad, 0.02 * (1 - x**2), 0.0)
     values = np.arange(e) + 0.1 * step
     return Frame(

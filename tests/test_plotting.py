@@ -83,6 +83,8 @@ def test_borders_are_the_outline_and_the_line_between_regions(kind):
     lengths = [np.linalg.norm(np.diff(path.vertices, axis=0), axis=1).sum() for path in borders.get_paths()]
     assert sum(lengths) == pytest.approx(8.0 + 2.0)  # mm of outline and between the regions
     assert len(lengths) == 4 * 2 + 2
+    nodes = 3 if kind in ("quad9", "triangle6") else 2
+    assert {len(path.vertices) for path in borders.get_paths()} == {nodes}
 
 
 def test_nodal_fields_interpolate_the_nodal_values():

@@ -240,6 +240,8 @@ def test_the_fingerprint_of_user_code_follows_the_code():
 
     assert digest(make(2.0)) == digest(make(2.0)) != digest(make(3.0))
     assert digest(other) != digest(make(2.0))
+    assert digest(lambda x: 2.0 * x) == digest(lambda x: 2.0 * x) != digest(lambda x: 3.0 * x)
+    assert digest(lambda x: np.sin(x)) != digest(lambda x: np.cos(x))
 
 
 def test_the_fingerprint_is_the_same_in_another_process():
