@@ -85,7 +85,7 @@ def solve(tissue, u, free, load=0.0, iterations=14):
             length *= 0.5
         u += length * step.reshape(-1, 2)
         size = np.abs(step).max()
-        if size <= 1e-11 * np.abs(u).max():
+        if size <= max(1e-11 * np.abs(u).max(), 1e-14):
             return u
     raise AssertionError(f"no equilibrium, last correction {size:g}")
 
