@@ -202,7 +202,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
     corneum, epidermis, dermis = section.layers
     ridges, outer = section.ridges, section.outer
     low, high = SLIMMEST
-    if not low * pad.width <= pad.height <= high * pad.width:
+    if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
         _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")

@@ -24,6 +24,9 @@ import scipy.sparse as sparse
 
 from evfem.mesh import Floats, Ints
 
+#: place of PARDISO's count of perturbed pivots among its parameters
+PERTURBED = 13
+
 
 class Singular(ArithmeticError):
     """The matrix of the interior unknowns cannot be factorised."""
@@ -110,9 +113,9 @@ class Pardiso:
         self.mtype = mtype
         self._handle = np.zeros(64, dtype=np.int64)
         self._iparm = np.zeros(64, dtype=np.int32)
-        # user values; METIS; no refinement; pivot shift 1e-8 if indefinite; C indices; dense Schur complement
-        # kept for solves
-        for index, value in {0: 1, 1: 2, 7: 0, 9: 8, 34: 1, 35: 2}.items():
+        # user values; METIS; no refinement; pivots below 1e-13 are perturbed (and counted); C indices; dense
+        # Schur complement kept for solves
+        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 34: 1, 35: 2}.items():
             self._iparm[index] = value
         self._mark[:] = 0
         self._mark[self.kept] = 1
@@ -151,12 +154,12 @@ class Pardiso:
             error = 0 if self._analysed else self._call(11, b, S)
             error = error or self._call(22, b, S)
             self._analysed = error == 0
-            if error == 0 and np.isfinite(S).all():
+            if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all():
                 self.schur = np.empty_like(S)
                 self.schur[np.ix_(self._order, self._order)] = S
                 self.schur[np.diag_indices_from(S)] -= shift
                 return
-        raise Singular(f"PARDISO error {error}")
+        raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
         y = np.zeros_like(b)
@@ -214,9 +217,10 @@ class SuperLU:
         except RuntimeError as error:
             raise Singular(str(error)) from error
         # elimination starts where SuperLU's own post-ordering says; the kept unknowns stay last, in their
-        # order
+        # order, and no kept row serves as a pivot of the interior
         m = self.kept.size
-        if not np.array_equal(self._lu.perm_c[-m:], np.arange(self.pattern.size - m, self.pattern.size)):
+        last = np.arange(self.pattern.size - m, self.pattern.size)
+        if not (np.array_equal(self._lu.perm_c[-m:], last) and np.array_equal(self._lu.perm_r[-m:], last)):
             raise Singular("SuperLU moved the kept unknowns")
         lower, higher = self._lu.L[-m:, -m:].toarray(), self._lu.U[-m:, -m:].toarray()
         self._shifted = lower @ higher

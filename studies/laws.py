@@ -2,12 +2,14 @@
 
 Fact 1, theory. The skin's permittivity is so high that its surface is as good as a conductor. For a
 conducting cylinder (radius 8.34 mm, half of Table 2's width) over an electrode under a dielectric slab
-(0.09 mm, 3.35) the field can be computed to rounding (line charges with their images in the slab).
+(0.09 mm, 3.35) the field can be computed to 2e-6 or better (line charges with their images in the slab).
 Expected: Strong-Troxel's law, integrated over the curved pad, is its parallel-plate limit and within a
 few per cent; Kaczmarek's is about half as large. Without a slab the closed form gives 0.906597 mN/mm at
-0.25 mm and 2000 V. Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is
-within about 10 % of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two
-differ most: 24.1 kPa against 1.39 kPa at 2000 V.
+0.25 mm and 2000 V.
+
+Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is within about 10 % of the
+medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two differ most: 24.1 kPa
+against 1.39 kPa at 2000 V.
 """
 
 from __future__ import annotations

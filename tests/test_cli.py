@@ -16,7 +16,6 @@ from fakes import square_mesh
 
 import evfem
 from evfem import cli, meshfile
-from evfem.report import table
 from evfem.result import COLUMNS
 
 SCENE = """
@@ -402,12 +401,3 @@ def test_the_exit_status_is_that_of_the_error(monkeypatch, capsys):
         assert cli.main(["plan"]) == status
         assert capsys.readouterr().err.startswith("evfem: ")
     assert signal.getsignal(signal.SIGTERM) is before
-
-
-def test_the_table_fits_80_columns_with_long_numbers():
-    row = dict.fromkeys(COLUMNS, -12.345678) | {"motion": "voltage", "motion_index": 0, "voltage": -10000.0}
-    rows = [row | {"step": n} for n in range(1, 2001)]
-    lines = table(rows).splitlines()
-    assert max(map(len, lines)) <= 80
-    assert len(lines) == 14
-    assert lines[-1].split() == ["2000", "voltage", "-12.346", "-12.346", "-10000"] + ["-12.34568"] * 4

@@ -37,19 +37,24 @@ def region_area(mesh, name):
     return green_area(Mesh(mesh.points, cells, mesh.kind, np.zeros(len(cells), int), {name: 0}))
 
 
-def outline_ridges(pad, mesh):
-    """Abscissa of the foot on the ellipse, and distance from it, of every pad node (Newton on the
-    ellipse).
+def from_ellipse(pad, points):
+    """Abscissa of the nearest point of the outer ellipse, and distance from it, below y = 0 (Newton's
+    method).
     """
-    x, y = mesh.points[mesh.node_sets["pad"]].T
+    x, y = points.T
     a, b = 0.5 * pad.width, 0.5 * pad.height
-    theta = -np.arccos(np.clip(x / a, -1.0, 1.0))
+    theta = np.arctan2(a * y, b * x)
     for _ in range(60):
         c, s = np.cos(theta), np.sin(theta)
         slope = (x - a * c) * a * s - (y - b * s) * b * c
         bend = (x - a * c) * a * c + (y - b * s) * b * s + a * a * s * s + b * b * c * c
         theta = theta - slope / bend
     return a * np.cos(theta), np.hypot(x - a * np.cos(theta), y - b * np.sin(theta))
+
+
+def outline_ridges(pad, mesh):
+    """Abscissa of the foot on the ellipse, and depth below it, of every pad node."""
+    return from_ellipse(pad, mesh.points[mesh.node_sets["pad"]])
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -171,6 +176,19 @@ def test_stratum_corneum_is_as_thick_as_asked_for(order):
     assert thickness.min() == pytest.approx(0.23, rel=1e-6)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_layers_below_are_offsets_of_the_smooth_ellipse_despite_the_ridges(order):
+    pad = FingerPad(resolution="coarse", epidermis_thickness=0.4, dermis_thickness=0.9)
+    mesh = pad.mesh(order)
+    layers = ["stratum_corneum", "epidermis", "dermis", "hypodermis"]
+    for upper, lower, depth in zip(layers[:-1], layers[1:], np.cumsum([0.38, 0.4, 0.9]), strict=True):
+        shared = np.intersect1d(mesh.cells[mesh.cells_of(upper)], mesh.cells[mesh.cells_of(lower)])
+        points = mesh.points[shared]
+        _, distance = from_ellipse(pad, points[points[:, 1] < -0.5])
+        assert len(distance) > 40
+        np.testing.assert_allclose(distance, depth, rtol=1e-9)
+
+
 def test_mid_nodes_lie_on_the_true_bone_and_interface():
     pad = FingerPad(ridges=False)
     mesh = pad.mesh(2)
@@ -228,6 +246,33 @@ def test_scaled_jacobian_over_the_parameter_range(resolution):
         for order in (1, 2):
             mesh = replace(pad, resolution=resolution).mesh(order)
             assert scaled_jacobian(mesh).min() > 0.2, pad
+
+
+EXTREMES = [
+    {"dermis_thickness": 0.5, "ridge_width": 0.75},
+    {"epidermis_thickness": 0.15, "ridge_width": 0.75, "nail_thickness": 0.45},
+    {"width": 12.0, "height": 14.4, "ridge_width": 0.54, "nail_width": 9.6, "ridge_phase": 0.25},
+    {"width": 24.0, "height": 12.0, "ridge_width": 0.8, "ridge_phase": 0.75, "dermis_thickness": 0.5},
+    {"stratum_corneum_thickness": 0.1, "ridges": False, "nail_thickness": 0.2, "bone_offset": 2.0},
+    {
+        "stratum_corneum_thickness": 0.8,
+        "dermis_thickness": 1.5,
+        "ridge_width": 0.3,
+        "ridge_height": 0.1,
+        "bone_height": 2.0,
+    },
+    {"ridge_crest": 0.55, "ridge_groove": 0.15},
+    {"bone_width": 12.0, "bone_height": 2.0, "bone_offset": 0.0},
+    {"bone_width": 2.0, "bone_height": 8.0, "bone_offset": 0.2},
+]
+
+
+@pytest.mark.parametrize("values", EXTREMES)
+def test_scaled_jacobian_at_the_ends_of_the_range(values):
+    for resolution in RESOLUTIONS:
+        for order in (1, 2):
+            mesh = FingerPad(resolution=resolution, **values).mesh(order)
+            assert scaled_jacobian(mesh).min() > 0.2, (resolution, order)
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -113,6 +113,7 @@ def test_foreign_gmsh_file_with_numbers_that_repeat_per_dimension(tmp_path):
     )
     mesh = meshfile.read(path)
     assert mesh.region_names == {"soft tissue": 1}
+    assert sorted(mesh.node_sets) == ["bone", "pad"]
     assert [mesh.node_sets[name].tolist() for name in ("pad", "bone")] == [[0, 1], [2, 3]]
 
 

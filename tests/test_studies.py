@@ -17,7 +17,7 @@ common, laws = (importlib.import_module(f"{studies.__name__}.{name}") for name i
 CASES = ("HVHD", "HVLD", "LVLD")
 
 
-@pytest.mark.parametrize("name", ["section321", "laws", "fig06", "fig07", "fig08", "fig09", "fig10"])
+@pytest.mark.parametrize("name", ["section321", "laws", "fig05", "fig06", "fig07", "fig08", "fig09", "fig10"])
 def test_study_leaves_numbers_curves_and_picture(name, tmp_path):
     result = studies.run(name, quick=True, out=tmp_path / "new")
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
@@ -38,6 +38,26 @@ def test_section321_thicknesses():
     assert round(numbers["effective_thickness_um"], 3) == 2.746
     assert round(numbers["thickness_strong_troxel_mm"], 2) == 5.49
     assert round(numbers["thickness_kaczmarek_um"], 2) == 76.17
+
+
+def test_fig05_participants_by_an_independent_integral():
+    # equation (8b) or (8a) with (24) for one participant, in plain x and y on a fine midpoint grid in angles
+    numbers = studies.run("fig05", quick=True)["numbers"]
+    a, b, c = 18.20 / 2, 15.00 / 2, 28.40 / 2 * np.cos(np.pi / 6)  # participant ix
+    t = (np.arange(1500) + 0.5) / 1500 * np.pi / 2
+    gap = 0.25 + 2 * b - b * np.cos(t)[:, None] - b * np.cos(t)
+    reduced = 0.38 / 1650 + gap + 0.09 / 3.35
+    weight = 4 * a * c * np.cos(t)[:, None] * np.cos(t) * (np.pi / 3000) ** 2
+    pull = 8.8541878e-12 * 1414.0**2 / 2 * weight / reduced
+    assert numbers["strong_troxel.ix.LVLD_mN"] == pytest.approx(1e3 * np.sum(pull / reduced), rel=1e-6)
+    assert numbers["kaczmarek.ix.LVLD_mN"] == pytest.approx(1e3 * np.sum(pull / (0.47 + gap)), rel=1e-6)
+    medians = [numbers[f"measured.median_mN.{case}"] for case in CASES]
+    assert medians == [1.85, 2.73, 1.37]
+    # design notes: rigid smooth outline 0.19761 / 0.40356 / 0.20172 mN/mm, deformation adds 0.4 / 1.6 / 0.8 %
+    for case, rigid, added in zip(CASES, (0.19761, 0.40356, 0.20172), (0.004, 0.016, 0.008), strict=True):
+        per_mm = numbers[f"fe_smooth.kaczmarek.{case}_mN_at_10mm"] / 10.0
+        assert per_mm / rigid - 1.0 == pytest.approx(added, abs=2e-3)
+        assert numbers[f"fe.kaczmarek.{case}_mN_at_8mm"] < 8.0 * per_mm  # grooves are farther away
 
 
 def test_fig06_forces_and_areas():

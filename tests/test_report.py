@@ -1,0 +1,32 @@
+"""The table of forces fits the terminal and shows the end of every motion."""
+
+from evfem.report import chosen, table
+from evfem.result import COLUMNS
+
+
+def rows(*counts):
+    """That many rows of one motion after another."""
+    numbers = [(k, i) for k, count in enumerate(counts) for i in range(count)]
+    return [{"step": n + 1, "motion_index": k, "motion": "slide"} for n, (k, _) in enumerate(numbers)]
+
+
+def test_the_table_fits_80_columns_with_long_numbers():
+    row = dict.fromkeys(COLUMNS, -12.345678) | {"motion": "voltage", "motion_index": 0, "voltage": -10000.0}
+    lines = table([row | {"step": n} for n in range(1, 2001)]).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert len(lines) == 14
+    assert lines[-1].split() == ["2000", "voltage", "-12.346", "-12.346", "-10000"] + ["-12.34568"] * 4
+
+
+def test_the_last_row_of_each_motion_is_shown():
+    for counts in ((10, 100), (1,), (1, 1, 1), (3, 50, 2, 7)):
+        ends = {sum(counts[: k + 1]) - 1 for k in range(len(counts))}
+        picked = chosen(rows(*counts), 12)
+        assert ends <= set(picked)
+        assert picked == sorted(set(picked))
+        assert len(picked) <= 12
+    assert chosen([], 12) == []
+
+
+def test_many_motions_show_one_row_each():
+    assert chosen(rows(*[2] * 20), 12) == list(range(1, 40, 2))

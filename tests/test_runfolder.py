@@ -1,0 +1,140 @@
+"""The folder of a run is whole after every step, whatever interrupts the writing."""
+
+import json
+
+import numpy as np
+import pytest
+from fakes import fake_frame, fake_row, square_mesh
+
+from evfem import export
+from evfem.errors import InputError, StorageError
+from evfem.result import Checkpoint, Result, csv_line
+from evfem.runfolder import RunFolder, saved
+from evfem.scene import default_scene
+
+SCENE = default_scene()
+MESH = square_mesh("quad")
+
+
+def state(step):
+    return lambda: {"u": np.full(3, float(step))}
+
+
+def started(path, **options):
+    folder = RunFolder(path, SCENE, **options)
+    folder.started(MESH, SCENE, SCENE.total_steps)
+    return folder
+
+
+def take(folder, *steps):
+    for step in steps:
+        folder.step(fake_row(step), fake_frame(MESH, step), state(step))
+
+
+def steps_on_disk(path):
+    """Step numbers in the history, of the .vtu files, in the index and in the checkpoint."""
+    rows = [int(line.split(",")[0]) for line in (path / "history.csv").read_text().splitlines()[1:]]
+    series = sorted(int(p.stem[-5:]) for p in path.glob("*.vtu"))
+    index = [int(part[:5]) for part in (path / "fields.pvd").read_text().split('file="fields_')[1:]]
+    point = Checkpoint(path / "checkpoint.npz").read(SCENE.digest())
+    assert point.arrays["u"].tolist() == [float(len(point.rows))] * 3
+    return rows, series, index, [row["step"] for row in point.rows]
+
+
+def test_nothing_is_written_before_the_first_step(tmp_path):
+    started(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_everything_is_there_after_each_step(tmp_path):
+    folder = started(tmp_path)
+    for step in (1, 2, 3):
+        take(folder, step)
+        assert steps_on_disk(tmp_path) == (list(range(1, step + 1)),) * 4
+    assert (tmp_path / "history.csv").read_text().endswith(csv_line(fake_row(3)))
+    assert not (tmp_path / "summary.json").exists()
+
+
+@pytest.mark.parametrize("place", ["frame", "checkpoint", "history", "index"])
+def test_a_step_whose_writing_was_interrupted_is_written_at_the_end(tmp_path, monkeypatch, place):
+    folder = started(tmp_path, plots=False)
+    take(folder, 1, 2)
+
+    def interrupt(*arguments, **more):
+        raise KeyboardInterrupt
+
+    what = {
+        "frame": (export, "write_frame"),
+        "checkpoint": (Checkpoint, "write"),
+        "history": ("evfem.runfolder", "csv_line"),
+        "index": (export.ParaViewSeries, "write_index"),
+    }[place]
+    monkeypatch.setattr(*(what if place != "history" else (f"{what[0]}.{what[1]}",)), interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        take(folder, 3)
+    monkeypatch.undo()
+    summary = folder.close(None)
+    assert steps_on_disk(tmp_path) == ([1, 2, 3],) * 4
+    assert (summary["steps"], summary["complete"]) == (3, False)
+    assert json.loads((tmp_path / "summary.json").read_text())["last"]["step"] == 3
+
+
+def test_an_interruption_in_the_very_first_step_loses_nothing(tmp_path, monkeypatch):
+    folder = started(tmp_path, plots=False)
+    assert not folder.begun
+    monkeypatch.setattr(RunFolder, "_open", lambda self: (_ for _ in ()).throw(KeyboardInterrupt))
+    with pytest.raises(KeyboardInterrupt):
+        take(folder, 1)
+    monkeypatch.undo()
+    assert folder.begun
+    folder.close(None)
+    assert steps_on_disk(tmp_path) == ([1],) * 4
+
+
+def test_a_run_goes_on_from_its_checkpoint(tmp_path):
+    take(started(tmp_path), 1, 2)
+    found = saved(tmp_path, SCENE)
+    assert [row["step"] for row in found.rows] == [1, 2]
+    again = started(tmp_path, resume=found)
+    take(again, 3)
+    assert steps_on_disk(tmp_path) == ([1, 2, 3],) * 4
+
+
+def test_a_folder_without_a_checkpoint_cannot_be_resumed(tmp_path):
+    with pytest.raises(InputError, match=r"--resume.*checkpoint\.npz"):
+        saved(tmp_path, SCENE)
+
+
+def test_a_new_run_removes_what_evfem_wrote_and_nothing_else(tmp_path):
+    take(started(tmp_path), 1, 2, 3)
+    (tmp_path / "fields_0004.vtu.bak").write_text("mine")
+    (tmp_path / "notes.md").write_text("mine")
+    take(started(tmp_path), 1)
+    assert steps_on_disk(tmp_path) == ([1],) * 4
+    assert {"fields_0004.vtu.bak", "notes.md"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_files_of_others_with_our_names_stop_the_run(tmp_path):
+    take(started(tmp_path), 1)
+    (tmp_path / ".evfem-files").unlink()
+    with pytest.raises(InputError, match=r"checkpoint\.npz was not written by evfem"):
+        started(tmp_path)
+
+
+def test_the_result_decides_the_summary_and_the_picture(tmp_path):
+    folder = started(tmp_path, fields=False)
+    take(folder, 1, 2)
+    rows = [fake_row(1), fake_row(2)]
+    given = Result.from_rows(rows, [], MESH, {"scene": {"name": "n", "total_steps": 2}, "solver": {"a": 1}})
+    assert folder.close(given)["complete"] is True
+    assert (tmp_path / "forces.png").stat().st_size > 10_000
+    assert not list(tmp_path.glob("*.vtu")) + list(tmp_path.glob("*.pvd"))
+    assert json.loads((tmp_path / "summary.json").read_text())["provenance"]["solver"] == {"a": 1}
+
+
+def test_a_path_that_is_no_folder_is_a_storage_error(tmp_path):
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(StorageError, match="file"):
+        started(tmp_path / "file")
+    with pytest.raises(StorageError, match="below"):
+        take(started(tmp_path / "file" / "below"), 1)
