@@ -114,12 +114,10 @@ class Equilibrium:
         current one if given; iterations begin at `start` (default `old`). Raises `StepFailed`."""
         travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
         self._touching, self._frozen = old.status != OPEN, frozen is not None
-        self.choose_candidates(old, 1.2 * travel)
+        state = self._first_guess(start or old, target)
+        self.choose_candidates(state, 1.2 * travel)
         self._begin(old, target.duration)
         self._pins.begin(self.positions(old.u)[:, 0])
-        state = start or old
-        if target.tangential_force is None:
-            state = replace(state, voltage=target.voltage)
         self._steering = self._first_steering(old, target)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
@@ -142,6 +140,15 @@ class Equilibrium:
             self._pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
+
+    @staticmethod
+    def _first_guess(state: State, target: Target) -> State:
+        """Where iterations begin: the present state, carried along with the bone if nothing touches."""
+        if target.tangential_force is None:
+            state = replace(state, voltage=target.voltage)
+        if target.force is not None or (state.status != OPEN).any():
+            return state
+        return replace(state, u=state.u + (target.bone - state.bone), bone=target.bone.copy())
 
     @staticmethod
     def _first_steering(old: State, target: Target) -> str:
@@ -313,6 +320,9 @@ class Equilibrium:
         present set does not do.
         """
         gap = outline.frame(self.surface, self.positions(state.u)).gap
+        if self.attraction is not None:
+            # open nodes that are pulled hardest belong into the dense system too
+            reach = max(reach, 2.0 * float(gap[self.pad.free].min()))
         needed = self.pad.free & ((gap <= reach) | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
