@@ -201,9 +201,9 @@ def _studies() -> ModuleType:
 def _mesh(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
     from evfem.meshfile import write
+    from evfem.plan import scene_mesh
 
-    order = 1 if scene.solver.element in ("q1", "q1_fbar") else 2
-    mesh = scene.finger.mesh(order)
+    mesh, _ = scene_mesh(scene)
     write(mesh, given.out)
     regions = ", ".join(mesh.region_names)
     print(

@@ -8,6 +8,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from datetime import UTC, datetime
@@ -132,7 +133,7 @@ class Result:
             "nodes": len(self.mesh.points),
             "cells": len(self.mesh.cells),
             "kind": self.mesh.kind,
-            "last": self.rows[-1] if steps else {},
+            "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
             "largest": extremes,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
@@ -208,6 +209,11 @@ def _column(name: str, values: list[Any]) -> Any:
     if name == "motion":
         return [str(value) for value in values]
     return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)
+
+
+def _json(value: Any) -> Any:
+    """The value itself, or None for a number that JSON does not know."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _plain(column: Any) -> list[Any]:

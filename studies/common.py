@@ -33,7 +33,6 @@ COLOURS = {
     "kaczmarek": "#0072B2",
     "measured": "#B04A85",
     "fe": "#009E73",
-    "accent": "#56B4E9",
     "neutral": "#555555",
 }
 #: hover cases of the measurements: voltage in V, air gap in mm
@@ -181,15 +180,6 @@ def measured_boxes(ax: Axes, at: Mapping[str, float], width: float) -> None:
     """The measured forces (mN) of the cases as boxes at the given abscissae."""
     for case, place in at.items():
         draw_box(ax, place, participants()[case], width, COLOURS["measured"])
-
-
-def measured_handle() -> Any:
-    """Legend entry of the measured boxes."""
-    from matplotlib.patches import Patch
-
-    return Patch(
-        facecolor=COLOURS["measured"], edgecolor=COLOURS["measured"], alpha=0.5, label="measured (Table 1)"
-    )
 
 
 def not_shown(figure: Figure, what: str) -> None:

@@ -95,7 +95,7 @@ def hover_force(ridges: bool, gap: float, voltage: float, resolution: str = "med
     table = data.load("table2")
     display = Display(insulator=Layer(table.value("d_i"), table.value("eps_i")), friction=table.value("mu"))
     finger = FingerPad(ridges=ridges, resolution=resolution)
-    motion = [Hover(gap=gap), VoltageRamp(voltage, steps=1)]
+    motion = (Hover(gap=gap), VoltageRamp(voltage, steps=1))
     scene = Scene(finger, display, law=Kaczmarek(), voltage=0.5 * voltage, motion=motion, name="hover")
     return float(simulate(scene).electrostatic_force[-1])
 

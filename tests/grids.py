@@ -76,7 +76,6 @@ def assembled(space, cells):
 def solve(tissue, u, free, load=0.0, iterations=14):
     """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all else stays."""
     u, free = u.copy(), free.ravel()
-    scale = None
     for _ in range(iterations):
         K = assembled(tissue.space, tissue.tangent(u))[free][:, free]
         step = np.zeros(u.size)
@@ -86,8 +85,7 @@ def solve(tissue, u, free, load=0.0, iterations=14):
             length *= 0.5
         u += length * step.reshape(-1, 2)
         size = np.abs(step).max()
-        scale = max(scale or 0.0, size)
-        if size <= 1e-11 * max(1.0, scale):
+        if size <= max(1e-11 * np.abs(u).max(), 1e-14):
             return u
     raise AssertionError(f"no equilibrium, last correction {size:g}")
 

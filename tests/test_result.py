@@ -163,7 +163,9 @@ def test_csv_numbers_are_plain_also_from_numpy_scalars():
 
 def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
     result = fake_result()
+    result.min_gap[-1] = np.inf
     summary = json.loads(json.dumps(result.summary(), allow_nan=False))
+    assert summary["last"]["min_gap"] is None
     assert (summary["steps"], summary["requested_steps"], summary["complete"]) == (4, 4, True)
     assert summary["last"]["normal_force"] == result.normal_force[-1]
     assert summary["largest"]["tangential_force"] == result.tangential_force.max()
