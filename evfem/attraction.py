@@ -24,6 +24,9 @@ from evfem import pad as outline
 from evfem.electrostatics import traction_derivative
 from evfem.mesh import Floats
 
+#: gaps up to this (mm) count as closed
+TOUCHING = 1e-9
+
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
@@ -63,7 +66,10 @@ class Attraction:
         on = 1.0 if self.air_layer else touching.astype(float)
         gap = np.maximum(frame.gap, 0.0)
         p = on * self.law.traction(gap, voltage, self.layers)
-        dp = on * traction_derivative(self.law, gap, voltage, self.layers) * length
+        # where the outline touches, the gap is held by contact: the law's steep fall belongs to open nodes
+        # alone
+        rate = np.where(frame.gap > TOUCHING, traction_derivative(self.law, gap, voltage, self.layers), 0.0)
+        dp = on * rate * length
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)
         rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]

@@ -1,11 +1,12 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
 it.
 
-With the condensed tangent S, the attraction's stiffness G and the bone's step b (x known; y known, or the
-unknown d under a prescribed force),
+With the condensed tangent S, the attraction's stiffness G, the bone's known step b and extra unknowns d (the
+bone's travel under a prescribed force, the squared voltage under a prescribed friction force) that push with
+p,
 
-.. math:: (S_{cc} - G)\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b, \qquad
-          S_{yc}\Delta u_c + S_{yx} b_x + S_{yy} b_y = g_y + F_y .
+.. math:: (S_{cc} - G)\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
+          S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
 
 :math:`C = (S_{cc} - G)^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
 the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness
@@ -61,7 +62,7 @@ class Motion:
     moved: Floats
     force: Floats
     status: Ints
-    bone: Floats
+    extra: Floats
     solves: int
 
 
@@ -82,36 +83,47 @@ class Condensed:
 
 
 @dataclass(frozen=True, eq=False)
+class Unknown:
+    """A number that a step has to find beside the displacements, and the force on the bone that settles it.
+
+    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose force shall be
+    `force`.
+    """
+
+    push: Floats
+    axis: int
+    force: float
+
+
+@dataclass(frozen=True, eq=False)
 class Step:
     """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes
     back.
 
-    `residual` g (m,) of the forward solve, `bone` (2,) the bone's step (y ignored if `load` is given), `load`
-    the force on the bone along y.
+    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known step; `unknowns` what else moves the
+    body.
     """
 
     body: Condensed
     candidates: Candidates
     residual: Floats
     bone: Floats
-    load: float | None
+    unknowns: tuple[Unknown, ...] = ()
 
     def solve(self) -> Motion:
-        """Contact among the candidates, their motion, and the bone's."""
+        """Contact among the candidates, their motion, and the extra unknowns."""
         free = self._free_motion()
         normal_gap = self.candidates.frame.normal_gap
         gap = normal_gap + self._along_normal(free[:, 0])
         status, solves = self.candidates.status.copy(), 0
         near = np.flatnonzero((status != OPEN) | (gap < 0.0))
-        if self.load is not None and not near.size:
+        if not near.size:
             near = np.array([np.argmin(gap)])
         while True:
             found, pushed = self._solve_near(near, free, status[near])
             solves += found.solves
             status[near] = found.status
-            moved = free[:, 0] + self._columns(near) @ pushed
-            if self.load is not None:
-                moved = moved + free[:, 1] * found.extra
+            moved = free[:, 0] + self._columns(near) @ pushed + free[:, 1:] @ found.extra
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0
             hit = np.flatnonzero(gap < -1e-12 * (1.0 + np.abs(self.candidates.frame.gap)))
@@ -120,22 +132,19 @@ class Step:
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(2, -1).T
-        bone = self.bone if self.load is None else np.array([self.bone[0], found.extra])
-        return Motion(moved, force, status, bone, solves)
+        return Motion(moved, force, status, found.extra, solves)
 
     def _along_normal(self, moved: Floats) -> Floats:
         return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
 
     def _free_motion(self) -> Floats:
-        """Candidates' motion without contact forces, and per unit of the bone's unknown travel: (2 c, 1
-        or 2).
-        """
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 + p)."""
         S = self.body.schur
         present = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
-        right = self.residual[:-2] - present - S[:-2, -2] * self.bone[0]
-        if self.load is None:
-            return self.body.compliance @ (right - S[:-2, -1] * self.bone[1])[:, None]
-        return self.body.compliance @ np.stack([right, -S[:-2, -1]], axis=1)
+        right = self.residual[:-2] - present - S[:-2, -2:] @ self.bone
+        return self.body.compliance @ np.column_stack(
+            [right, *(unknown.push[:-2] for unknown in self.unknowns)]
+        )
 
     def _columns(self, near: Ints) -> Floats:
         c = self.candidates.status.size
@@ -156,31 +165,26 @@ class Step:
         )
         compliance = _local(axes, _local(axes, C).T).T
         compliance[np.diag_indices_from(compliance)] += known.softness[near].T.ravel()
-        border = None if self.load is None else self._border(columns, free, (C, W), turning, axes)
+        border = self._border(columns, free, (C, W), turning, axes) if self.unknowns else None
         found = solve_contact(ContactProblem(start, compliance, known.friction[near], border), status)
         force = np.einsum("ak,kab->kb", found.force.reshape(2, -1), axes).ravel()
-        moved = W[:, 0] + C @ force
-        if border is not None:
-            moved = moved + W[:, 1] * found.extra
-        return found, force + turning.force(moved)
+        return found, force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
 
     def _border(
         self, columns: Floats, free: Floats, near: tuple[Floats, Floats], turning: Turning, axes: Floats
     ) -> Border:
-        """Balance of the bone along y as the extra equation for its travel."""
-        assert self.load is not None
+        """Balance of the bone along the unknowns' axes, as the equations that settle them."""
         C, W = near
-        S_y = self.body.schur[-1]
-        row = S_y[:-2] @ columns
-        pivot = float(S_y[-1] + S_y[:-2] @ free[:, 1])
-        value = float(self.residual[-1] + self.load - S_y[-2] * self.bone[0] - S_y[:-2] @ free[:, 0])
+        axis = [unknown.axis - 2 for unknown in self.unknowns]
+        S = self.body.schur[axis]
+        pushes = np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
+        wanted = np.array([unknown.force for unknown in self.unknowns])
+        row = S[:, :-2] @ columns
+        pivot = S[:, :-2] @ free[:, 1:] - pushes
+        value = self.residual[axis] + wanted - S[:, -2:] @ self.bone - S[:, :-2] @ free[:, 0]
         through = turning.transposed(row)
-        row, pivot, value = (
-            row + through @ C,
-            pivot + float(through @ W[:, 1]),
-            value - float(through @ W[:, 0]),
-        )
-        return Border(_local(axes, W[:, 1:])[:, 0], _local(axes, row[:, None])[:, 0], pivot, value)
+        row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
+        return Border(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,10 +221,11 @@ class Turning:
         change[self.loaded] = self.rate * moved[2 * self.loaded, None]
         return change.ravel()
 
-    def transposed(self, row: Floats) -> Floats:
-        """Row (2 k,) times T."""
-        through = np.zeros_like(row)
-        through[2 * self.loaded] = np.einsum("ak,ak->a", row.reshape(-1, 2)[self.loaded], self.rate)
+    def transposed(self, rows: Floats) -> Floats:
+        """Rows (p, 2 k) times T."""
+        through = np.zeros_like(rows)
+        loaded = rows.reshape(len(rows), -1, 2)[:, self.loaded]
+        through[:, 2 * self.loaded] = np.einsum("pak,ak->pa", loaded, self.rate)
         return through
 
 

@@ -2,9 +2,9 @@ r"""Unilateral contact with Coulomb friction, solved exactly on the dense compli
 candidates.
 
 For k candidates in their local frames (n normal, t tangential), with the contact forces :math:`\lambda` the
-new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d is an optional extra unknown (the
-bone's travel under a prescribed force) with the equation :math:`r\cdot\lambda + \rho\,d = b`. Signorini and
-Coulomb ask, per node, for exactly one of
+new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d are optional extra unknowns (the
+bone's travel under a prescribed force, the squared voltage under a prescribed friction force) with the
+equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
 
 ========  ==========================  =================================================
 status    equations                   stays if
@@ -40,12 +40,14 @@ class ContactNotSolved(ArithmeticError):
 
 @dataclass(frozen=True)
 class Border:
-    """One extra unknown d: `effect` (2 k,) on gaps then slips, `row` (2 k,) . lam + `pivot` d = `value`."""
+    """p extra unknowns d: `effect` (2 k, p) on gaps then slips, `row` (p, 2 k) lam + `pivot` (p, p) d =
+    `value` (p,).
+    """
 
     effect: Floats
     row: Floats
-    pivot: float
-    value: float
+    pivot: Floats
+    value: Floats
 
 
 @dataclass(frozen=True)
@@ -69,13 +71,13 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), statuses (k,), the extra unknown, new gaps and slips (2 k,), and the number
-    of dense solves.
+    """Contact forces (2 k,), statuses (k,), the extra unknowns (p,), new gaps and slips (2 k,), and the
+    number of dense solves.
     """
 
     force: Floats
     status: Ints
-    extra: float
+    extra: Floats
     state: Floats
     solves: int
 
@@ -90,7 +92,7 @@ def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> Con
         force, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ force
         if problem.border is not None:
-            state = state + problem.border.effect * extra
+            state = state + problem.border.effect @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
         changes = np.flatnonzero(wanted != status)
         if not changes.size:
@@ -103,8 +105,8 @@ def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> Con
     raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")
 
 
-def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, float]:
-    """Forces (2 k,) and extra unknown for given statuses: one dense linear system."""
+def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats]:
+    """Forces (2 k,) and extra unknowns (p,) for given statuses: one dense linear system."""
     k, C, border = problem.size, problem.compliance, problem.border
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     # shear force per pressing force of slipping nodes: against the slip
@@ -116,9 +118,9 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, floa
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
     right = -problem.start[rows]
     if border is not None:
-        row = border.row[rows]
-        row[: active.size] += border.row[k + active] * ratio[active]
-        matrix = np.block([[matrix, border.effect[rows, None]], [row[None, :], np.array([[border.pivot]])]])
+        row = border.row[:, rows]
+        row[:, : active.size] += border.row[:, k + active] * ratio[active]
+        matrix = np.block([[matrix, border.effect[rows]], [row, border.pivot]])
         right = np.append(right, border.value)
     try:
         x = np.linalg.solve(matrix, right)
@@ -127,7 +129,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, floa
     force = np.zeros(2 * k)
     force[rows] = x[: rows.size]
     force[k:] += ratio * force[:k]
-    return force, float(x[-1]) if border is not None else 0.0
+    return force, x[rows.size :]
 
 
 def _next_statuses(

@@ -114,7 +114,7 @@ class Dynamics:
         F[..., 1, 1] += 1.0
         return F
 
-    def _arrays(self) -> tuple[Floats, ...]:
+    def _arrays(self) -> tuple[Any, ...]:
         assert self.viscosity is not None
         space = self.space
         return self.viscosity / self.step, space.nodes, space.gradient, space.weight, self._strain0

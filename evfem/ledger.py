@@ -16,8 +16,8 @@ import numpy as np
 from evfem import pad as outline
 from evfem.contact import FORWARD, OPEN, STICK
 from evfem.model import Model
-from evfem.newton import State
 from evfem.result import Frame, Row
+from evfem.state import State
 
 SUMS = ("external_work", "electrostatic_work", "friction_dissipation", "viscous_dissipation")
 

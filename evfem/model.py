@@ -21,6 +21,7 @@ from evfem.mesh import Floats, Mesh
 from evfem.newton import Equilibrium, RigidOutline
 from evfem.plan import plan_on, scene_mesh
 from evfem.scene import Scene
+from evfem.signals import FollowForce
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +101,19 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) ->
         from evfem.mesh import layer_thickness
 
         thickness = layer_thickness(mesh, "stratum_corneum", pad.nodes)
+    if isinstance(scene.voltage, FollowForce):
+        _check_quadratic(scene)
     skin = Layer(np.broadcast_to(thickness, pad.nodes.shape).astype(float), electrical.stratum_corneum_eps_r)
     layers = Layers.of(skin, surface.insulator)
     return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer)
+
+
+def _check_quadratic(scene: Scene) -> None:
+    """The squared voltage can be an unknown only of laws that are proportional to it."""
+    layers = Layers.of(scene.surface.insulator)
+    assert scene.law is not None
+    once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
+    if not np.isclose(twice, 4.0 * once, rtol=1e-9):
+        raise InputError(
+            "electrostatics.law", scene.law, "a law proportional to the squared voltage, to follow a force"
+        )

@@ -17,7 +17,7 @@ residual, gaps, penetration, stick, slip direction and cone all hold at the acce
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -25,74 +25,20 @@ import numpy as np
 from evfem import pad as outline
 from evfem.attraction import Attraction
 from evfem.body import Body
-from evfem.condensed import Candidates, Condensed, Step
+from evfem.condensed import Candidates, Condensed, Motion, Step, Unknown
 from evfem.contact import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
 from evfem.linear import Singular, make_condensation
 from evfem.mesh import Floats, Ints
+from evfem.pins import Pins
+from evfem.state import KILOVOLT, Balance, Record, State, StepFailed, Target
 
 #: renew the factorisation when more iterations than this would be needed with the old one
 PATIENCE = 5
 MAX_ITERATIONS = 40
 SMALLEST_J = 0.05
 SMALLEST_FORCE = 1e-6
-
-
-class StepFailed(ArithmeticError):
-    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong."""
-
-    def __init__(self, reason: str, residuals: list[float]) -> None:
-        super().__init__(reason)
-        self.reason, self.residuals = reason, residuals
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's
-    normal and tangent (P, 2), their statuses (P,), the bone's translation (2,), voltage, attraction on the
-    pad nodes (P, 2), forces on the bone (2,), nodal velocities (N, 2) in mm/s."""
-
-    u: Floats
-    contact_force: Floats
-    status: Ints
-    bone: Floats
-    voltage: float
-    attraction: Floats
-    reaction: Floats
-    velocity: Floats
-
-
-@dataclass(frozen=True)
-class Target:
-    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm);
-    voltage (V); seconds it takes.
-    """
-
-    bone: Floats
-    force: float | None
-    voltage: float
-    duration: float = 0.0
-
-
-@dataclass
-class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start."""
-
-    iterations: int = 0
-    factorisations: int = 0
-    contact_solves: int = 0
-    backend: str = "none"
-    residuals: list[float] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Balance:
-    """Out-of-balance forces of the reduced unknowns (n,), their largest relative to the reaction, the
-    prescribed force on the bone along y.
-    """
-
-    forces: Floats
-    residual: float
-    load: float | None
+#: the voltage is given, at its lower or upper limit, or an unknown settled by the friction force
+NONE, LOW, HIGH, FREE = "none", "low", "high", "free"
 
 
 class Equilibrium:
@@ -125,6 +71,8 @@ class Equilibrium:
         self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
         self._frozen = False
         self._outdated = False
+        self._steering = NONE
+        self._pins = Pins(surface.friction_jumps, pad.nodes.size)
 
     # -- what a state is
     # ----------------------------------------------------------------------------------------------
@@ -166,9 +114,11 @@ class Equilibrium:
         current one if given; iterations begin at `start` (default `old`). Raises `StepFailed`."""
         travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
         self._touching, self._frozen = old.status != OPEN, frozen is not None
-        self.choose_candidates(old, 1.2 * travel)
+        state = self._first_guess(start or old, target)
+        self.choose_candidates(state, 1.2 * travel)
         self._begin(old, target.duration)
-        state = replace(start or old, voltage=target.voltage)
+        self._pins.begin(self.positions(old.u)[:, 0])
+        self._steering = self._first_steering(old, target)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
             state, balance = self._balance(old, state, target, frozen)
@@ -179,16 +129,35 @@ class Equilibrium:
             self.record.residuals = history
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
-            if arrived and balance.residual <= self.tolerance and self.obeys_contact(old, state):
+            if arrived and balance.residual <= self.tolerance and self._accepts(old, state, target):
                 return replace(state, velocity=self.body.velocity(state.u))
             if not arrived:
                 history[-1] = max(history[-1], 1.0)
-            if len(history) > 8 and history[-1] > 1e3 * min(history):
+            if len(history) > 8 and history[-1] > 1e3 * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
             self._renew(state, history)
             state = self._advance(old, state, target, balance)
+            self._pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
+
+    @staticmethod
+    def _first_guess(state: State, target: Target) -> State:
+        """Where iterations begin: the present state, carried along with the bone if nothing touches."""
+        if target.tangential_force is None:
+            state = replace(state, voltage=target.voltage)
+        if target.force is not None or (state.status != OPEN).any():
+            return state
+        return replace(state, u=state.u + (target.bone - state.bone), bone=target.bone.copy())
+
+    @staticmethod
+    def _first_steering(old: State, target: Target) -> str:
+        if target.tangential_force is None:
+            return NONE
+        return LOW if old.voltage == 0.0 else FREE
+
+    def _accepts(self, old: State, state: State, target: Target) -> bool:
+        return self.obeys_contact(old, state) and self._wish_met(old, state, target)
 
     def _begin(self, old: State, duration: float) -> None:
         """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
@@ -209,14 +178,15 @@ class Equilibrium:
         nodal[self.pad.nodes] -= attraction + self.contact_forces(state)
         forces = self.body.reduce(nodal)
         reaction = forces[self.body.bone]
-        load = -target.force if target.force is not None else None
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE)
         sums = np.abs(forces[:-2].reshape(-1, 2).sum(axis=0)).max()
         free = max(np.abs(forces[:-2]).max(), sums)
-        if load is not None:
-            free = max(free, abs(reaction[1] - load))
+        if target.force is not None:
+            free = max(free, abs(reaction[1] + target.force))
+        if self._steering == FREE:
+            free = max(free, abs(reaction[0] - (target.tangential_force or 0.0)))
         return replace(state, attraction=attraction, reaction=reaction), Balance(
-            forces, float(free / largest), load
+            forces, float(free / largest)
         )
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
@@ -232,42 +202,95 @@ class Equilibrium:
         self._factor = None
 
     def _advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """One outer iteration: solve the contact problem of the linearised body, move, shorten where
-        cells would collapse.
-        """
+        """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells
+        would collapse."""
         saved, g = self._factor.forward(-balance.forces)
-        c = self.candidates
-        step = Step(self._condensed, self._describe(old, state), g, target.bone - state.bone, balance.load)
-        try:
-            found = step.solve()
-        except ContactNotSolved as error:
-            raise StepFailed(f"contact: {error}", self.record.residuals) from error
-        self.record.contact_solves += found.solves
-        kept = np.concatenate([found.moved, found.bone])
-        delta = self.body.expand(self._factor.backward(saved, kept))
+        known = self._describe(old, state)
+        bone = target.bone - state.bone
+        unknowns: tuple[Unknown, ...] = ()
+        if target.force is not None:
+            bone = np.array([bone[0], 0.0])
+            unknowns = (Unknown(-self._condensed.schur[:, -1], 1, -target.force),)
+        step = Step(self._condensed, known, g, bone, unknowns)
+        squared = 0.0
+        if self._steering == FREE:
+            found, saved, squared = self._steer(step, state, target, saved)
+        else:
+            found = self._solve(step)
+        if target.force is not None:
+            bone = np.array([bone[0], found.extra[0]])
+        delta = self.body.expand(self._factor.backward(saved, np.concatenate([found.moved, bone])))
         share = self._largest_share(state.u, delta)
+        c = self.candidates
         force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
         force[c], status[c] = found.force, found.status
-        whole = share == 1.0 and balance.load is None
+        whole = share == 1.0 and target.force is None
+        voltage = state.voltage
+        if squared:
+            voltage = KILOVOLT * float(np.sqrt(max((voltage / KILOVOLT) ** 2 + share * squared, 0.0)))
         return replace(
             state,
             u=state.u + share * delta,
             contact_force=state.contact_force + share * (force - state.contact_force),
             status=status,
-            bone=target.bone.copy() if whole else state.bone + share * found.bone,
+            bone=target.bone.copy() if whole else state.bone + share * bone,
+            voltage=voltage,
         )
+
+    def _solve(self, step: Step) -> Motion:
+        try:
+            found = step.solve()
+        except ContactNotSolved as error:
+            raise StepFailed(f"contact: {error}", self.record.residuals) from error
+        self.record.contact_solves += found.solves
+        return found
+
+    def _steer(self, step: Step, state: State, target: Target, saved: Floats) -> tuple[Motion, Floats, float]:
+        """A step with the squared voltage (kV^2) among its unknowns, kept between 0 and the largest allowed;
+        returns the motion, the state for the backward solve and the change of the squared voltage.
+        """
+        assert self.attraction is not None
+        assert target.tangential_force is not None
+        nodal = np.zeros_like(state.u)
+        nodal[self.pad.nodes] = self.attraction.forces(self.positions(state.u), KILOVOLT, self._touching)
+        unit, push = self._factor.forward(self.body.reduce(nodal))
+        steered = replace(step, unknowns=(*step.unknowns, Unknown(push, 0, target.tangential_force)))
+        found = self._solve(steered)
+        now, most = (state.voltage / KILOVOLT) ** 2, (target.voltage / KILOVOLT) ** 2
+        change = float(found.extra[-1])
+        if not 0.0 <= now + change <= most:
+            self._steering = LOW if now + change < 0.0 else HIGH
+            change = (0.0 if self._steering == LOW else most) - now
+            found = self._solve(replace(step, residual=step.residual + change * push))
+        return found, saved + change * unit, change
+
+    def _wish_met(self, old: State, state: State, target: Target) -> bool:
+        """Whether the friction force is as wished, or as near as the voltage's limits allow; if the limit is
+        no longer needed, the voltage becomes an unknown again.
+        """
+        if target.tangential_force is None or self._steering == FREE:
+            return True
+        forward = np.sign(target.bone[0] - old.bone[0]) or 1.0
+        lacking = forward * (target.tangential_force - state.reaction[0])
+        slack = self.tolerance * max(np.abs(state.reaction).max(), SMALLEST_FORCE)
+        if lacking > slack if self._steering == LOW else lacking < -slack:
+            self._steering = FREE
+            return False
+        return True
 
     def _describe(self, old: State, state: State) -> Candidates:
         c = self.candidates
         position = self.positions(state.u)[c]
         frame = outline.frame(self.surface, position)
         softness = self._softness(old)[c]
-        slip = (
-            frame.stretch * (position[:, 0] - self.positions(old.u)[c, 0])
-            - softness[:, 1] * old.contact_force[c, 1]
-        )
-        friction = self._friction(position[:, 0])
+        origin = self._origin(old)[c]
+        slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
+        friction = self._friction(np.where(self._pins.held[c], origin, position[:, 0]))
         return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness)
+
+    def _origin(self, old: State) -> Floats:
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
+        return np.where(self._pins.held, self._pins.x, self.positions(old.u)[:, 0])
 
     def _softness(self, old: State) -> Floats:
         """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
@@ -297,6 +320,9 @@ class Equilibrium:
         present set does not do.
         """
         gap = outline.frame(self.surface, self.positions(state.u)).gap
+        if self.attraction is not None:
+            # open nodes that are pulled hardest belong into the dense system too
+            reach = max(reach, 2.0 * float(gap[self.pad.free].min()))
         needed = self.pad.free & ((gap <= reach) | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
@@ -362,12 +388,15 @@ class Equilibrium:
             self.choose_candidates(state, max(0.0, float(frame.gap[sunk].max())))
             return False
         active = state.status != OPEN
+        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
+        if self._pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
+            return False
         normal, shear = state.contact_force[active].T
-        slip = (frame.stretch * (position[:, 0] - self.positions(old.u)[:, 0]))[active]
+        slip = (frame.stretch * (position[:, 0] - self._origin(old)))[active]
         softness = self._softness(old)[active]
         slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
-        limit = self._friction(position[active, 0]) * normal
-        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
+        x = np.where(self._pins.held, self._pins.x, position[:, 0])[active]
+        limit = self._friction(x) * normal
         status = state.status[active]
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))

@@ -16,7 +16,7 @@ from evfem.materials import split
 from evfem.mesh import Mesh
 from evfem.motion import Hover, VoltageRamp
 from evfem.scene import Scene
-from evfem.signals import VoltageProfile
+from evfem.signals import FollowForce, VoltageProfile
 
 #: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
 RIGID_BELOW = 1e-4
@@ -161,9 +161,13 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
 
 def largest_voltage(scene: Scene) -> float:
     """Largest magnitude of the voltage anywhere in the scene (V)."""
-    own = np.abs(scene.voltage.voltage) if isinstance(scene.voltage, VoltageProfile) else abs(scene.voltage)
+    own: Any = scene.voltage
+    if isinstance(own, VoltageProfile):
+        own = own.voltage
+    elif isinstance(own, FollowForce):
+        own = own.largest_voltage
     ramps = [abs(motion.voltage) for motion in scene.motion if isinstance(motion, VoltageRamp)]
-    return float(max([np.max(own), *ramps]))
+    return float(max([np.abs(own).max(), *ramps]))
 
 
 def _contact(scene: Scene) -> Term:

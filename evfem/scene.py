@@ -15,7 +15,7 @@ from evfem.checks import choice, count, put, real
 from evfem.digest import digest
 from evfem.errors import InputError
 from evfem.motion import HOLDS, Hover, Motion, Press, Slide, VoltageRamp
-from evfem.signals import VoltageProfile
+from evfem.signals import FollowForce, VoltageProfile
 
 __all__ = [
     "CONTACTS",
@@ -236,7 +236,7 @@ class Scene:
     finger: Finger
     surface: Surface
     law: ForceLaw | None = None
-    voltage: float | VoltageProfile = 0.0
+    voltage: float | VoltageProfile | FollowForce = 0.0
     motion: Sequence[Motion] = ()
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
@@ -302,12 +302,12 @@ def _check_electrostatics(scene: Scene) -> None:
     choice("electrostatics.coupling", scene.coupling, COUPLINGS)
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", scene.air_layer, "true or false")
-    if not isinstance(scene.voltage, VoltageProfile):
+    if not isinstance(scene.voltage, (VoltageProfile, FollowForce)):
         allowed = "a voltage in V between -1e6 and 1e6"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
         put(scene, voltage=voltage)
     if scene.law is None:
-        if isinstance(scene.voltage, VoltageProfile) or scene.voltage != 0.0:
+        if scene.voltage != 0.0:
             allowed = "StrongTroxel(), Kaczmarek() or a law of your own"
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
@@ -325,7 +325,7 @@ def _check_motion(scene: Scene) -> None:
         pressed = (pressed or isinstance(motion, Press)) and not isinstance(motion, Hover)
         if isinstance(motion, VoltageRamp) and scene.law is None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
-        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, VoltageProfile):
+        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, (VoltageProfile, FollowForce)):
             raise InputError(key, "a voltage ramp beside a voltage profile", "one of the two")
         if isinstance(motion, (Slide, VoltageRamp)) and motion.hold == "force" and not pressed:
             raise InputError(

@@ -35,7 +35,7 @@ from evfem.scenekeys import (
     shown,
     unknown,
 )
-from evfem.signals import VoltageProfile
+from evfem.signals import FollowForce, VoltageProfile
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
 
 VERSION = 1
@@ -312,6 +312,10 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
             "electrostatics.law", type(scene.law).__name__, f"{' | '.join(FORCE_LAWS)}, for a file"
         )
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
+    if isinstance(scene.voltage, FollowForce):
+        raise InputError(
+            "electrostatics.voltage", "FollowForce", "a number or a VoltageProfile in a scene file"
+        )
     if isinstance(scene.voltage, VoltageProfile):
         rows = zip(scene.voltage.position.tolist(), scene.voltage.voltage.tolist(), strict=True)
         table["voltage_profile"] = [list(row) for row in rows]

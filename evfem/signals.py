@@ -95,6 +95,33 @@ class VoltageProfile:
         return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
 
 
+@dataclass(frozen=True)
+class FollowForce:
+    """A voltage that is not given but found: whatever makes the friction force on the bone follow a wish.
+
+    `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between its rows;
+    during slides the effective voltage stays between 0 and `largest_voltage` (V), elsewhere it stays as it
+    is. For `Scene(voltage=...)`.
+
+    >>> FollowForce([0.0, 1.0], [0.0, 0.02], largest_voltage=2000.0)(0.5)
+    0.01
+    """
+
+    position: Any
+    tangential_force: Any
+    largest_voltage: float = 10_000.0
+
+    def __post_init__(self) -> None:
+        profile = VoltageProfile(self.position, self.tangential_force)
+        above("largest_voltage", self.largest_voltage, 0.0, "a voltage in V above zero")
+        object.__setattr__(self, "position", profile.position)
+        object.__setattr__(self, "tangential_force", profile.voltage)
+
+    def __call__(self, position: Values) -> Values:
+        """Wished force in N/mm at `position` in mm."""
+        return plain(piecewise_linear(self.position, self.tangential_force, position))
+
+
 def carrier_amplitude(effective: Values) -> Values:
     """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage: sqrt(2) U.
 

@@ -15,10 +15,10 @@ from evfem.errors import InputError, NotConverged
 from evfem.ledger import SUMS, Ledger, frame_of
 from evfem.model import Model, make_model
 from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
-from evfem.newton import State, StepFailed, Target
 from evfem.result import Frame, Result, Saved, provenance
 from evfem.scene import Scene
-from evfem.signals import VoltageProfile
+from evfem.signals import FollowForce, VoltageProfile
+from evfem.state import State, StepFailed, Target
 from evfem.stepping import Path, Stepper
 
 ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
@@ -82,6 +82,8 @@ class Run:
     def voltage_at(self, position: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm)."""
         voltage = self.scene.voltage
+        if isinstance(voltage, FollowForce):
+            return 0.0
         return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
 
     # -- from motions to targets
@@ -135,7 +137,10 @@ class Run:
             force = start["applied_force"] if motion.hold == "force" else None
         if isinstance(self.scene.voltage, VoltageProfile):
             voltage = self.voltage_at(position)
-        return Target(self.model.bone(position, indentation), force, voltage)
+        wish = None
+        if isinstance(self.scene.voltage, FollowForce) and isinstance(motion, Slide):
+            wish, voltage = float(self.scene.voltage(position)), self.scene.voltage.largest_voltage
+        return Target(self.model.bone(position, indentation), force, voltage, tangential_force=wish)
 
     def _path(self, start: Target, end: Target, seconds: float) -> Path:
         """Straight from one target to the next; a voltage profile is followed on the way."""
@@ -151,7 +156,10 @@ class Run:
             voltage = start.voltage + share * (end.voltage - start.voltage)
             if isinstance(self.scene.voltage, VoltageProfile):
                 voltage = self.voltage_at(float(bone[0]))
-            return Target(bone, force, voltage, duration)
+            wish = None
+            if isinstance(self.scene.voltage, FollowForce) and end.tangential_force is not None:
+                wish, voltage = float(self.scene.voltage(float(bone[0]))), end.voltage
+            return Target(bone, force, voltage, duration, wish)
 
         return target
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.newton import Equilibrium, State, StepFailed, Target
+from evfem.newton import Equilibrium
+from evfem.state import State, StepFailed, Target
 
 SMALLEST_PART = 1.0 / 1024.0
 EASY = 6

@@ -64,6 +64,21 @@ class _Surface:
         place, mu = np.array(self.friction).T
         return piecewise_linear(place, mu, x)
 
+    @property
+    def friction_jumps(self) -> Array:
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on.
+
+        >>> Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]]).friction_jumps.tolist()
+        [[2.0, 0.5, 0.6]]
+        """
+        if isinstance(self.friction, float):
+            return np.zeros((0, 3))
+        place, mu = np.array(self.friction).T
+        first = np.concatenate([[True], np.diff(place) > 0])
+        last = np.concatenate([np.diff(place) > 0, [True]])
+        jumps = np.stack([place[last], mu[first], mu[last]], axis=1)
+        return jumps[jumps[:, 1] != jumps[:, 2]]
+
     def shifted(self, y: float) -> Self:
         """The same surface with its height shifted by `y` (mm)."""
         moved = copy(self)

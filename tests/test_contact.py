@@ -195,15 +195,20 @@ def punch(k=80, friction=0.2):
     return problem, effect, np.concatenate([np.ones(k), np.zeros(k)])
 
 
+def bordered(effect, row, pivot, value):
+    """One extra unknown."""
+    return Border(effect[:, None], row[None, :], np.array([[pivot]]), np.array([value]))
+
+
 def test_a_prescribed_force_is_reached_and_equals_the_prescribed_travel():
     problem, effect, row = punch()
     k = problem.size
     loaded = ContactProblem(
-        problem.start, problem.compliance, problem.friction, Border(effect, row, 0.0, 0.5)
+        problem.start, problem.compliance, problem.friction, bordered(effect, row, 0.0, 0.5)
     )
     found = solve_contact(loaded, closed(k))
     assert found.force[:k].sum() == pytest.approx(0.5, rel=1e-12)
-    moved = ContactProblem(problem.start + effect * found.extra, problem.compliance, problem.friction)
+    moved = ContactProblem(problem.start + effect * found.extra[0], problem.compliance, problem.friction)
     same = solve_contact(moved, np.full(k, OPEN))
     np.testing.assert_allclose(same.force, found.force, atol=1e-11)
     np.testing.assert_allclose(same.state, found.state, atol=1e-12)
@@ -214,13 +219,13 @@ def test_the_border_may_depend_on_shear_and_on_its_own_unknown():
     k = problem.size
     effect = effect + np.concatenate([np.zeros(k), np.full(k, 0.1)])
     row = row + np.concatenate([np.zeros(k), np.full(k, 0.25)])
-    border = Border(effect, row, 3.0, 0.7)
+    border = bordered(effect, row, 3.0, 0.7)
     found = solve_contact(
         ContactProblem(problem.start, problem.compliance, problem.friction, border), closed(k)
     )
-    assert row @ found.force + 3.0 * found.extra == pytest.approx(0.7, rel=1e-12)
+    assert row @ found.force + 3.0 * found.extra[0] == pytest.approx(0.7, rel=1e-12)
     np.testing.assert_allclose(
-        found.state, problem.start + problem.compliance @ found.force + effect * found.extra, atol=1e-13
+        found.state, problem.start + problem.compliance @ found.force + effect * found.extra[0], atol=1e-13
     )
     assert violation(problem, found.force, found.state) < 1e-11
     assert np.abs(found.force[k:]).sum() > 0.01
