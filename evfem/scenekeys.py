@@ -29,6 +29,8 @@ from evfem.scene import (
 
 
 class Table(BaseModel):
+    """A table whose unknown keys and wrong types are mistakes."""
+
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
@@ -41,6 +43,8 @@ def _required(allowed: str) -> Any:
 
 
 class SceneTable(Table):
+    """The whole file."""
+
     version: int
     finger: dict[str, Any] = _optional("a table [finger]", {})
     surface: dict[str, Any] = _required("a table [surface] with a kind: flat | sinusoid | profile")
@@ -51,6 +55,8 @@ class SceneTable(Table):
 
 
 class MeshTable(Table):
+    """[finger] with a mesh of the user's own."""
+
     mesh: str = _required("the path of a mesh file")
     regions: dict[str, int] | None = _optional("a table name = number")
     materials: dict[str, dict[str, Any]] = _required("a table [finger.materials.NAME] for every region")
@@ -59,6 +65,8 @@ class MeshTable(Table):
 
 
 class ElectricalTable(Table):
+    """[finger.electrical]."""
+
     stratum_corneum_thickness: float | None = _optional("a thickness in mm, up to 10")
     stratum_corneum_eps_r: float = _optional("a relative permittivity, at least 1", 1650.0)
 
@@ -67,23 +75,31 @@ _FRICTION = "a number, not negative, or rows [[x, coefficient], ...]"
 
 
 class FlatTable(Table):
+    """[surface] of the kind flat; the other kinds have its keys too."""
+
     kind: Literal["flat"]
     friction: float | list[list[float]] = _optional(_FRICTION, 0.3)
     y: float | None = _optional("a height in mm")
 
 
 class SinusoidTable(FlatTable):
+    """[surface] of the kind sinusoid."""
+
     kind: Literal["sinusoid"]  # type: ignore[assignment]
     terms: list[list[float]] | None = _optional("rows [[amplitude in mm, wavenumber in 1/mm, phase], ...]")
 
 
 class ProfileTable(FlatTable):
+    """[surface] of the kind profile."""
+
     kind: Literal["profile"]  # type: ignore[assignment]
     file: str | None = _optional("the path of a csv file with the header x,height")
     points: list[list[float]] | None = _optional("rows [[x, height], ...] in mm")
 
 
 class ElectrostaticsTable(Table):
+    """[electrostatics]."""
+
     law: Literal["strong_troxel", "kaczmarek"] = _required("strong_troxel | kaczmarek")
     voltage: float | None = _optional("a voltage in V")
     voltage_file: str | None = _optional("the path of a csv file with the header position,voltage")
@@ -97,6 +113,8 @@ class ElectrostaticsTable(Table):
 
 
 class SolverTable(Table):
+    """[solver]."""
+
     element: str | None = _optional(" | ".join(ELEMENTS))
     dynamics: str = _optional(" | ".join(DYNAMICS), "quasistatic")
     contact: str = _optional(" | ".join(CONTACTS), "exact")
@@ -107,6 +125,8 @@ class SolverTable(Table):
 
 
 class OutputTable(Table):
+    """[output]."""
+
     every: int = _optional("a whole number, at least 1", 1)
 
 
@@ -115,6 +135,8 @@ _SPEED = "a speed in mm/s, larger than 0"
 
 
 class PressTable(Table):
+    """[[motion]] of the kind press."""
+
     kind: Literal["press"]
     force: float | None = _optional("a force in N/mm, not negative")
     indentation: float | None = _optional("an indentation in mm between -200 and 200")
@@ -123,6 +145,8 @@ class PressTable(Table):
 
 
 class SlideTable(Table):
+    """[[motion]] of the kind slide."""
+
     kind: Literal["slide"]
     distance: float = _required("a distance in mm, not 0")
     steps: int = _optional(_STEPS, 100)
@@ -131,12 +155,16 @@ class SlideTable(Table):
 
 
 class HoverTable(Table):
+    """[[motion]] of the kind hover."""
+
     kind: Literal["hover"]
     gap: float = _required("a gap in mm, not negative")
     steps: int = _optional(_STEPS, 1)
 
 
 class VoltageTable(Table):
+    """[[motion]] of the kind voltage."""
+
     kind: Literal["voltage"]
     voltage: float = _required("a voltage in V")
     steps: int = _optional(_STEPS, 10)
@@ -174,6 +202,7 @@ def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
 
 
 def unknown(key: str, name: str, known: list[str]) -> InputError:
+    """The error for a key that does not exist, with the one that may have been meant."""
     close = difflib.get_close_matches(name, known, n=1)
     hint = f"{close[0]}? (" if close else ""
     return InputError(key, "an unknown key", hint + ", ".join(known) + (")" if close else ""))
