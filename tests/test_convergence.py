@@ -99,7 +99,7 @@ def test_no_locking_of_the_projected_elements(element):
 
 @pytest.mark.parametrize("element", ["q1_fbar", "q2p1"])
 def test_users_laws_converge_and_do_not_lock_either(element):
-    """The wrapper's split psi(Fbar) is another discretisation: same order, errors close to the built-in one."""
+    """The wrapper's split psi(Fbar) is another discretisation: same order, nearly the same errors."""
     built_in = errors_of(element, isochoric, 0.4999)[-1]
     for field, nu in ((swell, 0.3), (isochoric, 0.4999)):
         errors = errors_of(element, field, nu, users=True)
