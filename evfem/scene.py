@@ -313,6 +313,9 @@ def _check_electrostatics(scene: Scene) -> None:
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
         allowed = "an object with a method traction(gap, voltage, layers)"
         raise InputError("electrostatics.law", scene.law, allowed)
+    elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
+        allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
+        raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
     elif scene.surface.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)

@@ -280,3 +280,12 @@ def test_the_benchmark_finger_sticks_first_and_slips_fully_later():
     assert 0.0 < ratio[0] < 0.25
     assert (np.diff(ratio) > -1e-9).all()
     np.testing.assert_allclose(ratio[-1], 0.3, rtol=1e-9)
+
+
+def test_the_travel_of_the_bone_does_not_count_as_force():
+    # rounding of 50 mm, times the stiffness, is more than the tolerance allows when nothing presses
+    motion = [Press(indentation=0.2, steps=1), Slide(50.0, steps=2), Press(indentation=-0.2, steps=1)]
+    result = run(Flat(friction=0.0), *motion, body=finger(block(8, 3, sag=0.4), E=17.0))
+    assert result.substeps.tolist() == [1, 1, 1, 1]
+    assert result.normal_force[2] > 1.0
+    assert np.abs(result.applied_force[3]) < 1e-12

@@ -5,6 +5,7 @@ import pytest
 from builders import INSULATOR, balance, benchmark_finger, benchmark_scene, block, finger
 
 from evfem.electrostatics import Kaczmarek, Layer, Layers
+from evfem.errors import InputError
 from evfem.scene import Hover, Press, Scene, Slide, VoltageRamp
 from evfem.signals import VoltageProfile
 from evfem.simulate import simulate
@@ -151,3 +152,19 @@ def test_a_voltage_profile_follows_the_bone():
     assert result.electrostatic_force[:3].tolist() == [0.0, 0.0, 0.0]
     constant = run(Display(), law=Kaczmarek(), voltage=2000.0)
     assert result.electrostatic_force[-1] == pytest.approx(constant.electrostatic_force[-1], rel=0.05)
+
+
+class TractionOnly:
+    """A user's law with the one method it must have."""
+
+    def traction(self, gap, voltage, layers):
+        return 3e-9 * voltage**2 * np.exp(-gap / 0.1)
+
+
+def test_a_law_of_the_user_needs_only_a_traction():
+    result = run(Display(), law=TractionOnly(), voltage=2000.0)
+    assert balance(result).max() < 1e-7
+    # touching skin carries 12 kPa
+    assert (result.electrostatic_force > 3e-9 * 2000.0**2 * result.real_contact_width * 0.9).all()
+    with pytest.raises(InputError, match="potential"):
+        run(Display(), law=TractionOnly(), voltage=2000.0, direction="normal")
