@@ -35,11 +35,13 @@ def test_hertz_line_contact(law):
     x = both_sides(graded(1.125, 1 / 40, 60.0, 1.5))
     mesh = block(x, graded(0.1, 1 / 40, 60.0, 1.5), pad=1.125, lower=parabola(radius))
     largest = HertzLine.from_half_width(1.0, radius, plane_modulus(E, nu))
-    result = press(mesh, law(E, nu), ev.Flat(friction=0.0), ev.Press(force=largest.load, steps=3))
-    for k in range(3):
-        hertz = HertzLine(largest.load * (k + 1) / 3, radius, plane_modulus(E, nu))
+    motion = (ev.Press(indentation=1e-5, steps=1), ev.Press(force=largest.load, steps=2))
+    result = press(mesh, law(E, nu), ev.Flat(friction=0.0), *motion)
+    assert result.applied_force[2] == pytest.approx(largest.load, rel=1e-7)
+    for k in (1, 2):
+        hertz = HertzLine(float(result.applied_force[k]), radius, plane_modulus(E, nu))
         x, _, field = pad_state(result, k)
-        assert result.normal_force[k] == pytest.approx(hertz.load, rel=1e-8)
+        assert result.normal_force[k] == pytest.approx(hertz.load, rel=1e-7)
         assert field["contact_pressure"].max() == pytest.approx(hertz.peak_pressure, rel=0.005)
         assert result.contact_width[k] == pytest.approx(2.0 * hertz.half_width, rel=0.01)
         inside = np.abs(x) < 0.9 * hertz.half_width
@@ -78,8 +80,9 @@ def test_cattaneo_mindlin_stick_zone():
     hertz = HertzLine.from_half_width(half_width, radius, modulus=1.0)
     slide = ev.Slide(distance=1.05 * half_width**2 / radius, steps=3, hold="force")
     law = ev.NeoHookean(E=1.0 - nu**2, nu=nu)  # E* = 1
-    result = press(mesh, law, ev.Flat(friction=mu), ev.Press(force=hertz.load, steps=1), slide)
-    for k, share in ((1, 0.247), (2, 0.490), (3, 0.727)):
+    motion = (ev.Press(indentation=5e-4, steps=1), ev.Press(force=hertz.load, steps=1), slide)
+    result = press(mesh, law, ev.Flat(friction=mu), *motion)
+    for k, share in ((2, 0.247), (3, 0.490), (4, 0.727)):
         ratio = result.tangential_force[k] / (mu * hertz.load)
         assert ratio == pytest.approx(share, abs=0.02)  # the stages the tolerances below are meant for
         mindlin = CattaneoMindlin(hertz, mu, result.tangential_force[k])
@@ -104,7 +107,8 @@ def test_point_sliding_on_a_profile(direction):
     wave = ev.Sinusoid(friction=mu, terms=[[0.05, 3.0, 0.5]])
     slide = ev.Slide(distance=direction * 2.0, steps=20, hold="force")
     law = ev.NeoHookean(E=1.0, nu=0.3)
-    result = press(wedge, law, wave, ev.Press(force=0.01, steps=2), slide)
+    motion = (ev.Press(indentation=1e-4, steps=1), ev.Press(force=0.01, steps=1), slide)
+    result = press(wedge, law, wave, *motion)
     slipping = 0
     for k in range(4, 22):
         frame = result.frames[k]
@@ -112,7 +116,7 @@ def test_point_sliding_on_a_profile(direction):
         assert touching.size == 1
         if frame.contact_status[touching[0]] == 2:
             x = result.mesh.points[touching[0], 0] + frame.displacement[touching[0], 0]
-            ratio = sliding_force_ratio(wave.slope(x), mu, direction)
+            ratio = sliding_force_ratio(0.15 * np.cos(3.0 * x + 0.5), mu, direction)
             assert result.tangential_force[k] / result.normal_force[k] == pytest.approx(ratio, rel=1e-6)
             slipping += 1
     assert slipping > 12
