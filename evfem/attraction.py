@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 
 from evfem import pad as outline
 from evfem.electrostatics import traction_derivative
@@ -56,35 +55,11 @@ class Attraction:
         sideways = -np.bincount(moved, potential[of] * value, weight.size)
         return np.stack([sideways + weight * frame.slope, -weight], axis=1)
 
-    def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
-        component).
+    def fall(self, position: Floats, voltage: float, touching: Any) -> Floats:
+        """How fast the pull of a node falls with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where it
+        touches: there contact holds the gap.
         """
-        size = position.shape[0]
-        frame = outline.frame(self.surface, position)
-        length = self.pad.length(position[:, 0])
+        gap = outline.frame(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
-        gap = np.maximum(frame.gap, 0.0)
-        p = on * self.law.traction(gap, voltage, self.layers)
-        # where the outline touches, the gap is held by contact: the law's steep fall belongs to open nodes
-        # alone
-        rate = np.where(frame.gap > TOUCHING, traction_derivative(self.law, gap, voltage, self.layers), 0.0)
-        dp = on * rate * length
-        of, moved, value = self.pad.length_gradient(position[:, 0])
-        nodes = np.arange(size)
-        rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]
-        columns = [2 * nodes + 1, 2 * nodes, 2 * moved]
-        values = [-dp, dp * frame.slope, -p[of] * value]
-        if self.direction == "normal":
-            w = p * length
-            rows += [2 * nodes, 2 * nodes, 2 * of, 2 * moved, 2 * moved]
-            columns += [2 * nodes + 1, 2 * nodes, 2 * moved, 2 * of + 1, 2 * of]
-            values += [
-                dp * frame.slope,
-                w * frame.curvature - dp * frame.slope**2,
-                (p * frame.slope)[of] * value,
-                -p[of] * value,
-                (p * frame.slope)[of] * value,
-            ]
-        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_matrix(triplets, shape=(2 * size, 2 * size))
+        rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
+        return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)

@@ -1,14 +1,14 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
 it.
 
-With the condensed tangent S, the attraction's stiffness G, the bone's known step b and extra unknowns d (the
+With the condensed tangent S, the bone's known step b and extra unknowns d (the
 bone's travel under a prescribed force, the squared voltage under a prescribed friction force) that push with
 p,
 
-.. math:: (S_{cc} - G)\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
+.. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
           S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
 
-:math:`C = (S_{cc} - G)^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
+:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
 the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness
 changes in every iteration but touches only the nodes near contact, so it is put into their small block alone.
 """
@@ -19,9 +19,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.contact import OPEN, Border, ContactProblem, ContactSolution, solve_contact
+from evfem.contact import OPEN, Border, ContactProblem, ContactSolution, Pull, solve_pulled
 from evfem.mesh import Floats, Ints
 from evfem.pad import Frame
+
+#: an attraction whose feedback on its own node is weaker than this share is left to the next iteration
+WEAK = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +32,8 @@ class Candidates:
     """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,),
     contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
     interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
-    for the penalty variant, which thereby needs no other solver.
+    for the penalty variant, which thereby needs no other solver. `fall` (c,) N/mm per mm: how fast the
+    attraction falls with the gap.
     """
 
     frame: Frame
@@ -38,6 +42,7 @@ class Candidates:
     status: Ints
     friction: Floats
     softness: Floats
+    fall: Floats
 
     @property
     def axes(self) -> Floats:
@@ -68,18 +73,15 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, attraction
-    included.
-    """
+    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates."""
 
     schur: Floats
     compliance: Floats
 
     @classmethod
-    def make(cls, schur: Floats, attraction: Floats | None) -> Condensed:
-        """From S (m, m) and the attraction's stiffness on the candidates (m - 2, m - 2), or None."""
-        inner = schur[:-2, :-2] if attraction is None else schur[:-2, :-2] - attraction
-        return cls(schur, np.asarray(np.linalg.inv(inner), dtype=np.float64))
+    def make(cls, schur: Floats) -> Condensed:
+        """From S (m, m)."""
+        return cls(schur, np.asarray(np.linalg.inv(schur[:-2, :-2]), dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +118,8 @@ class Step:
         normal_gap = self.candidates.frame.normal_gap
         gap = normal_gap + self._along_normal(free[:, 0])
         status, solves = self.candidates.status.copy(), 0
-        near = np.flatnonzero((status != OPEN) | (gap < 0.0))
+        own = np.diagonal(self.body.compliance)[1::2]
+        near = np.flatnonzero((status != OPEN) | (gap < 0.0) | (self.candidates.fall * own > WEAK))
         if not near.size:
             near = np.array([np.argmin(gap)])
         while True:
@@ -166,8 +169,9 @@ class Step:
         compliance = _local(axes, _local(axes, C).T).T
         compliance[np.diag_indices_from(compliance)] += known.softness[near].T.ravel()
         border = self._border(columns, free, (C, W), turning, axes) if self.unknowns else None
-        found = solve_contact(ContactProblem(start, compliance, known.friction[near], border), status)
-        force = np.einsum("ak,kab->kb", found.force.reshape(2, -1), axes).ravel()
+        problem = ContactProblem(start, compliance, known.friction[near], border)
+        found = solve_pulled(problem, Pull(known.fall[near], known.frame.normal_gap[near]), status)
+        force = np.einsum("ak,kab->kb", (found.force + found.relief).reshape(2, -1), axes).ravel()
         return found, force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
 
     def _border(
@@ -184,6 +188,10 @@ class Step:
         value = self.residual[axis] + wanted - S[:, -2:] @ self.bone - S[:, :-2] @ free[:, 0]
         through = turning.transposed(row)
         row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
+        # a body that nothing holds has a zero here, whose rounding may be negative: let it fall, not rise
+        floor = 1e-10 * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
+        own = np.diagonal(pivot)
+        pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
         return Border(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
 
 

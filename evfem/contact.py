@@ -15,6 +15,9 @@ FORWARD   g = 0, lam_t = -mu lam_n    lam_n >= 0 and s >= 0
 BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 ========  ==========================  =================================================
 
+The attraction of an open node falls with its gap: its `relief` is one more unknown there, f = fall (g -
+level). A closed node needs none, its gap is known; so a thin insulator's steep law acts only where it can.
+
 A warm-started active set changes all violated nodes at once: open -> slip the way it is moving when the gap
 closes, slip -> open when it pulls, stick -> slip with the sign of its force when it leaves the cone, slip ->
 stick (never straight to the other slip) when it moves along its own friction. A node passes through slip
@@ -25,13 +28,15 @@ converged is never used.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from evfem.mesh import Floats, Ints
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
+#: feedback that an attraction is reduced to where its own fall cannot be held
+STABLE = 0.9
 
 
 class ContactNotSolved(ArithmeticError):
@@ -51,6 +56,16 @@ class Border:
 
 
 @dataclass(frozen=True)
+class Pull:
+    """An attraction of open nodes that falls by `fall` (k,) per unit of gap from its value at the gap
+    `level` (k,).
+    """
+
+    fall: Floats
+    level: Floats
+
+
+@dataclass(frozen=True)
 class ContactProblem:
     """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients (k,),
     optional border.
@@ -62,6 +77,7 @@ class ContactProblem:
     compliance: Floats
     friction: Floats
     border: Border | None = None
+    pull: Pull | None = None
 
     @property
     def size(self) -> int:
@@ -71,11 +87,12 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), statuses (k,), the extra unknowns (p,), new gaps and slips (2 k,), and the
-    number of dense solves.
+    """Contact forces (2 k,), what open nodes are pulled less (2 k,), statuses (k,), the extra unknowns (p,),
+    new gaps and slips (2 k,), and the number of dense solves.
     """
 
     force: Floats
+    relief: Floats
     status: Ints
     extra: Floats
     state: Floats
@@ -83,20 +100,30 @@ class ContactSolution:
 
 
 def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> ContactSolution:
-    """Signorini-Coulomb on the candidates, started from `status` (k,); raises `ContactNotSolved` after
-    `limit` solves.
+    """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from all nodes
+    sticking or all open; raises `ContactNotSolved` when none of them ends within `limit` solves and one per
+    node.
     """
+    for start in (status, np.full(problem.size, STICK)):
+        try:
+            return _active_set(problem, start, limit)
+        except ContactNotSolved:
+            continue
+    return _active_set(problem, np.full(problem.size, OPEN), limit)
+
+
+def _active_set(problem: ContactProblem, status: Ints, limit: int) -> ContactSolution:
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
     seen: set[bytes] = set()
     for solves in range(1, limit + problem.size + 1):
-        force, extra = _solve_statuses(problem, status)
-        state = problem.start + problem.compliance @ force
+        force, relief, extra = _solve_statuses(problem, status)
+        state = problem.start + problem.compliance @ (force + relief)
         if problem.border is not None:
             state = state + problem.border.effect @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
         changes = np.flatnonzero(wanted != status)
         if not changes.size:
-            return ContactSolution(force, status, extra, state, solves)
+            return ContactSolution(force, relief, status, extra, state, solves)
         if status.tobytes() in seen or solves > limit // 3:
             changes = changes[[np.argmax(violation[changes])]] if solves < limit else changes[:1]
         seen.add(status.tobytes())
@@ -105,18 +132,62 @@ def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> Con
     raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")
 
 
-def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats]:
-    """Forces (2 k,) and extra unknowns (p,) for given statuses: one dense linear system."""
+def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints) -> ContactSolution:
+    """Contact of a pad whose open nodes are attracted. Where the body could not hold the attraction's fall
+    (the pad snaps) the linearised problem has no solution or the wrong one; then the fall is reduced to what
+    it can hold.
+    """
+    if not pull.fall.any():
+        return solve_contact(problem, status)
+    k = problem.size
+    root = np.sqrt(pull.fall)
+    gain = root[:, None] * problem.compliance[:k, :k] * root
+    if np.abs(gain).sum(axis=1).max() < STABLE:
+        return solve_contact(replace(problem, pull=pull), status)
+    try:
+        found = solve_contact(replace(problem, pull=pull), status)
+        if _feedback(problem, pull, found.status) < 1.0:
+            return found
+    except ContactNotSolved:
+        pass
+    reduced = pull.fall * (STABLE / max(_feedback(problem, pull, np.full(k, OPEN)), STABLE))
+    return solve_contact(replace(problem, pull=replace(pull, fall=reduced)), status)
+
+
+def _feedback(problem: ContactProblem, pull: Pull, status: Ints) -> float:
+    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held."""
+    k, C = problem.size, problem.compliance
+    free, closed = np.flatnonzero((status == OPEN) & (pull.fall > 0.0)), np.flatnonzero(status != OPEN)
+    held = C[np.ix_(free, free)]
+    if closed.size:
+        rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
+        held = held - C[np.ix_(free, rows)] @ np.linalg.solve(C[np.ix_(rows, rows)], C[np.ix_(rows, free)])
+    root = np.sqrt(pull.fall[free])
+    gain = root[:, None] * held * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T)).max(initial=0.0))
+
+
+def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
+    """Contact forces (2 k,), relief of the pull (2 k,) and extra unknowns (p,) for given statuses: one dense
+    linear system.
+    """
     k, C, border = problem.size, problem.compliance, problem.border
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     # shear force per pressing force of slipping nodes: against the slip
     ratio = problem.friction * ((status == BACKWARD).astype(float) - (status == FORWARD))
-    rows = np.concatenate([active, k + stick])
+    pulled = np.zeros(0, dtype=np.int64)
+    if problem.pull is not None:
+        pulled = np.flatnonzero((status == OPEN) & (problem.pull.fall > 0.0))
+    rows = np.concatenate([active, k + stick, pulled])
     matrix = C[np.ix_(rows, rows)]
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
     right = -problem.start[rows]
+    if problem.pull is not None:
+        own = np.arange(rows.size - pulled.size, rows.size)
+        matrix[own, own] -= 1.0 / problem.pull.fall[pulled]
+        right[own] += problem.pull.level[pulled]
     if border is not None:
         row = border.row[:, rows]
         row[:, : active.size] += border.row[:, k + active] * ratio[active]
@@ -126,10 +197,12 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         x = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
         raise ContactNotSolved(str(error)) from error
-    force = np.zeros(2 * k)
-    force[rows] = x[: rows.size]
+    force, relief = np.zeros(2 * k), np.zeros(2 * k)
+    contact = rows.size - pulled.size
+    force[rows[:contact]] = x[:contact]
+    relief[pulled] = x[contact : rows.size]
     force[k:] += ratio * force[:k]
-    return force, x[rows.size :]
+    return force, relief, x[rows.size :]
 
 
 def _next_statuses(

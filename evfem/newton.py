@@ -5,14 +5,14 @@ At the iterate u with contact forces lam and attraction f the out-of-balance for
 lam. With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and the
 bone b,
 
-.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b - G\,\Delta u_c = g_c + \lambda^+ - \lambda, \qquad
-          S_{yc}\,\Delta u_c + S_{yy}\,\Delta u_y = g_y - F - ... ,
+.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b = g_c + \lambda^+ - \lambda + \Delta f, \qquad
+          S_{bc}\,\Delta u_c + S_{bb}\,\Delta u_b = g_b + F_b .
 
-where G is the attraction's stiffness. The compliance :math:`C' = (S_{cc} - G)^{-1}` turns this into a contact
-problem for the new forces (`evfem.contact`); a prescribed force makes the bone's travel its extra unknown.
-Then the interior follows by the backward solve. The factorisation is kept across iterations and steps and
-renewed when the residual stalls or the iterations it would save cost more. A step is accepted only if
-residual, gaps, penetration, stick, slip direction and cone all hold at the accepted positions.
+The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the new forces (`evfem.contact`),
+in which the attraction falls with the gap of open nodes; a prescribed force makes the bone's travel an extra
+unknown. Then the interior follows by the backward solve. The factorisation is kept across iterations and
+steps and renewed when the residual stalls or the iterations it would save cost more. A step is accepted only
+if residual, gaps, penetration, stick, slip direction and cone all hold at the accepted positions.
 """
 
 from __future__ import annotations
@@ -66,6 +66,10 @@ class Equilibrium:
                 )
             )
         )
+        # attraction that falls more slowly than this share of the pad's foundation modulus is left to
+        # iterations
+        depth = float(np.ptp(self.points[:, 1]))
+        self.soft = 0.02 * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
         self._factor: Any = None
         self._condensed: Any = None
         self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
@@ -286,7 +290,8 @@ class Equilibrium:
         origin = self._origin(old)[c]
         slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
         friction = self._friction(np.where(self._pins.held[c], origin, position[:, 0]))
-        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness)
+        fall = self._fall(state)[c]
+        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness, fall)
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
@@ -320,10 +325,8 @@ class Equilibrium:
         present set does not do.
         """
         gap = outline.frame(self.surface, self.positions(state.u)).gap
-        if self.attraction is not None:
-            # open nodes that are pulled hardest belong into the dense system too
-            reach = max(reach, 2.0 * float(gap[self.pad.free].min()))
-        needed = self.pad.free & ((gap <= reach) | (state.status != OPEN))
+        steep = self._fall(state) > self.soft * self.pad.length(self.positions(state.u)[:, 0])
+        needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
         if needed[self.candidates].sum() != needed.sum():
@@ -348,30 +351,22 @@ class Equilibrium:
             self._factor.factorise(self.body.tangent(state.u))
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", history) from error
-        self._condensed = Condensed.make(self._factor.schur, self._attraction_stiffness(state))
+        self._condensed = Condensed.make(self._factor.schur)
         self.record.factorisations += 1
 
     def _stale(self, history: list[float]) -> bool:
         if len(history) < 2:
             return False
-        now, rate = history[-1], history[-1] / history[-2]
+        now, rate = history[-1], history[-1] / max(history[-2], self.tolerance)
         if now > 0.1 or rate > 0.5:
             return True
         return bool(np.log(self.tolerance / now) / np.log(rate) > PATIENCE)
 
-    def _attraction_stiffness(self, state: State) -> Floats | None:
+    def _fall(self, state: State) -> Floats:
+        """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""
         if self.attraction is None or state.voltage == 0.0 or self._frozen:
-            return None
-        whole = self.attraction.stiffness(self.positions(state.u), state.voltage, self._touching)
-        unknowns = (2 * self.candidates[:, None] + np.array([0, 1])).ravel()
-        rows = whole[unknowns]
-        inner = np.asarray(rows[:, unknowns].toarray())
-        # nodes beyond the candidates move along with their neighbours, so that sliding changes no tributary
-        # length
-        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
-        index = np.arange(unknowns.size)
-        inner[index, 2 * (index // 2)] += beyond
-        return inner
+            return np.zeros(self.pad.nodes.size)
+        return self.attraction.fall(self.positions(state.u), state.voltage, self._touching)
 
     # -- acceptance
     # -----------------------------------------------------------------------------------------------------
