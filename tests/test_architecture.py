@@ -29,7 +29,8 @@ FLOORS = {
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm"},
-        "motion scene scenekeys scenefile result plan stepping model ledger simulate",
+        "motion scene scenekeys scenefile result plan stepping model ledger simulate "
+        "rendering",
     ),
     "edges": ({"numpy", "meshio", "matplotlib"}, "export plotting report runfolder cli"),
 }
