@@ -354,10 +354,12 @@ class Equilibrium:
     def _stale(self, history: list[float]) -> bool:
         if len(history) < 2:
             return False
-        now, rate = history[-1], history[-1] / history[-2]
-        if now > 0.1 or rate > 0.5:
+        before, now = history[-2:]
+        if now > 0.1 or now > 0.5 * before:
             return True
-        return bool(np.log(self.tolerance / now) / np.log(rate) > PATIENCE)
+        if now <= self.tolerance:
+            return False
+        return bool(np.log(self.tolerance / now) / np.log(now / before) > PATIENCE)
 
     def _attraction_stiffness(self, state: State) -> Floats | None:
         if self.attraction is None or state.voltage == 0.0 or self._frozen:
