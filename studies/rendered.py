@@ -74,8 +74,8 @@ class Case:
 STEP = Case()
 TEXTURE = Case(friction=0.1, steps=200, path=4.0, viscosity=5e-4, dynamics="inertial")
 #: quick versions: coarse pads, few steps
-QUICK_STEP = replace(STEP, resolution="coarse", steps=20)
-QUICK_TEXTURE = replace(TEXTURE, resolution="coarse", steps=40, path=1.2)
+QUICK_STEP = replace(STEP, resolution="coarse", steps=16)
+QUICK_TEXTURE = replace(TEXTURE, resolution="coarse", steps=31, path=0.93)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +136,7 @@ def pad(case: Case) -> FingerPad:
 
 def reference_scene(case: Case, every: int = 1_000_000) -> Scene:
     """The reference of a case, with fields of every `every`-th step."""
-    surface = Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
+    surface: Flat | Sinusoid = Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
     if case.friction is not None:
         surface = Sinusoid(friction=case.friction)
     slide = Slide(case.path, steps=case.steps, hold=case.hold, speed=case.speed)
