@@ -30,6 +30,13 @@ PAPER = {
     "sinusoid.pearson": 0.988,
     "sinusoid.voltage_max_V": 1911.12,
 }
+INSIGHTS = {
+    "1911.12 V": "that is (20a) for an apparent friction of 0.0887 on 0.072, below the texture's 0.1: one "
+    "instant, not the largest voltage; while all nodes slip forward the mean over a period is 0.0997 or more "
+    "(work of friction on the profile), which makes the largest voltage on 0.072 more than 2460 V",
+    "out of reach": "steps at 0 V where the display still has more friction force than wished: at the start, "
+    "where the finger sticks, and at the smallest friction, where its load is not that of the reference",
+}
 #: prefix of the keys -> what is simulated; the first pad is the paper's
 PADS = {"": True, "without_ridges.": False}
 SCENES = {"transition": STEP, "sinusoid": TEXTURE}
@@ -190,7 +197,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         numbers |= _variation_numbers(varied) | _mesh_numbers(shown, varied)
     costs = {key: outcome.costs for key, outcome in outcomes.items()}
     study = Study(
-        "fig12", numbers, PAPER, ASSUMPTIONS, _series(shown), lambda: draw(shown, numbers), {"costs": costs}
+        "fig12",
+        numbers,
+        PAPER,
+        ASSUMPTIONS | INSIGHTS,
+        _series(shown),
+        lambda: draw(shown, numbers),
+        {"costs": costs},
     )
     return study.finish(out, quick)
 
