@@ -38,6 +38,7 @@ _MODULES = (
     "meshfile",
     "plotting",
     "reference",
+    "rendering",
     "result",
     "scenefile",
     "signals",

@@ -69,6 +69,7 @@ class Equilibrium:
         # attraction that falls more slowly than this share of the pad's foundation modulus is left to
         # iterations
         depth = float(np.ptp(self.points[:, 1]))
+        self.stride = 0.05 * depth
         self.soft = 0.02 * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
         self._factor: Any = None
         self._condensed: Any = None
@@ -76,6 +77,7 @@ class Equilibrium:
         self._frozen = False
         self._outdated = False
         self._steering = NONE
+        self._stiffest = 0.0
         self._pins = Pins(surface.friction_jumps, pad.nodes.size)
 
     # -- what a state is
@@ -95,7 +97,8 @@ class Equilibrium:
             np.zeros(2),
             np.zeros_like(u),
         )
-        return replace(state, attraction=self.attraction_at(state, state, voltage))
+        attraction = self.attraction_at(state, state, voltage)
+        return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2)."""
@@ -182,7 +185,7 @@ class Equilibrium:
         nodal[self.pad.nodes] -= attraction + self.contact_forces(state)
         forces = self.body.reduce(nodal)
         reaction = forces[self.body.bone]
-        largest = max(np.abs(reaction).max(), SMALLEST_FORCE)
+        largest = max(np.abs(reaction).max(), SMALLEST_FORCE, self._rounding(state) / self.tolerance)
         sums = np.abs(forces[:-2].reshape(-1, 2).sum(axis=0)).max()
         free = max(np.abs(forces[:-2]).max(), sums)
         if target.force is not None:
@@ -192,6 +195,12 @@ class Equilibrium:
         return replace(state, attraction=attraction, reaction=reaction), Balance(
             forces, float(free / largest)
         )
+
+    def _rounding(self, state: State) -> float:
+        """Forces (N/mm) below which the balance is rounding of displacements that contain the bone's
+        travel.
+        """
+        return 4.0 * float(np.finfo(float).eps) * self._stiffest * float(np.abs(state.bone).max())
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from
@@ -223,6 +232,10 @@ class Equilibrium:
             found = self._solve(step)
         if target.force is not None:
             bone = np.array([bone[0], found.extra[0]])
+            if abs(bone[1]) > self.stride:
+                # too far for a linear step, which may rest on a single node: go part of the way
+                bone[1] = np.copysign(self.stride, bone[1])
+                found = self._solve(replace(step, bone=bone, unknowns=()))
         delta = self.body.expand(self._factor.backward(saved, np.concatenate([found.moved, bone])))
         share = self._largest_share(state.u, delta)
         c = self.candidates
@@ -348,19 +361,23 @@ class Equilibrium:
             )
             self.record.backend = type(self._factor).__name__
         try:
-            self._factor.factorise(self.body.tangent(state.u))
+            upper = self.body.tangent(state.u)
+            self._factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", history) from error
         self._condensed = Condensed.make(self._factor.schur)
+        self._stiffest = float(upper[self.body.pattern.diagonal].max())
         self.record.factorisations += 1
 
     def _stale(self, history: list[float]) -> bool:
         if len(history) < 2:
             return False
-        now, rate = history[-1], history[-1] / max(history[-2], self.tolerance)
-        if now > 0.1 or rate > 0.5:
+        before, now = history[-2:]
+        if now > 0.1 or now > 0.5 * before:
             return True
-        return bool(np.log(self.tolerance / now) / np.log(rate) > PATIENCE)
+        if now <= self.tolerance:
+            return False
+        return bool(np.log(self.tolerance / now) / np.log(now / before) > PATIENCE)
 
     def _fall(self, state: State) -> Floats:
         """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""

@@ -142,19 +142,39 @@ def applied_voltage(effective: Values) -> Values:
 
 @dataclass(frozen=True)
 class Amplifier:
-    """What a display's amplifier can do: `voltage_max` in V.
+    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
 
     >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
     [0.0, 200.0, 200.0]
+    >>> jump = VoltageProfile([0.0, 1.0, 1.0, 9.0], [0.0, 0.0, 100.0, 100.0])
+    >>> slow = Amplifier(voltage_max=200.0, slew=500.0).limit(jump, speed=10.0)
+    >>> slow.position.tolist(), slow.voltage.tolist()
+    ([0.0, 1.0, 3.0, 9.0], [0.0, 0.0, 100.0, 100.0])
     """
 
     voltage_max: float
+    slew: float | None = None
 
     def __post_init__(self) -> None:
         above("voltage_max", self.voltage_max, 0.0, "a voltage in V above zero")
+        if self.slew is not None:
+            above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
 
-    def limit(self, profile: VoltageProfile) -> VoltageProfile:
-        """The profile cut off at +-voltage_max, exactly: rows are added where it crosses the limit."""
+    def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
+        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s).
+
+        Both are exact: rows are added where the profile crosses the limit, and where the amplifier, which
+        moves towards the wish as fast as it can, catches up with it. Raises InputError for a slew without
+        a speed.
+        """
+        cut = self._clipped(profile)
+        if self.slew is None:
+            return cut
+        if speed is None:
+            raise InputError("speed", "nothing", "a speed in mm/s, needed with a slew")
+        return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
+
+    def _clipped(self, profile: VoltageProfile) -> VoltageProfile:
         x, u = profile.position, profile.voltage
         parts_x, parts_u = [x[:1]], [u[:1]]
         for i in range(x.size - 1):
@@ -169,3 +189,24 @@ class Amplifier:
             parts_u.append(u[i] + share * (u[i + 1] - u[i]))
         voltage = np.clip(np.concatenate(parts_u), -self.voltage_max, self.voltage_max)
         return VoltageProfile(np.concatenate(parts_x), voltage)
+
+
+def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
+    """What follows the profile from its first row on with a slope of at most `steepest` (V/mm)."""
+    now = float(profile.voltage[0])
+    rows = [(float(profile.position[0]), now)]
+    for i in np.flatnonzero(np.diff(profile.position) > 0):
+        (x, end), (wish, last) = profile.position[i : i + 2], profile.voltage[i : i + 2]
+        slope, lag = (last - wish) / (end - x), now - wish
+        side = np.sign(lag)
+        closing = steepest + side * slope
+        if lag != 0.0 and abs(lag) >= closing * (end - x):  # never catches up on this piece
+            now -= side * steepest * (end - x)
+        else:
+            if lag != 0.0:
+                x += abs(lag) / closing
+                now = wish + abs(lag) / closing * slope
+                rows.append((x, now))
+            now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
+        rows.append((end, now))
+    return VoltageProfile(*np.array(rows).T)

@@ -101,7 +101,7 @@ class Run:
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
                 begin, end = (self._target(motion, start, j / motion.steps) for j in (k - 1, k))
                 if first + k == 1 and not isinstance(self.scene.voltage, VoltageProfile):
-                    # the first step has its full voltage; only if it must be cut is the voltage raised on the way
+                    # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, voltage=0.0)
                 seconds = _duration(motion, start)
                 yield Request(first + k, index, motion.kind, self._path(begin, end, seconds), seconds)

@@ -1,6 +1,7 @@
 """Small bodies and scenes that several tests share."""
 
 import numpy as np
+from evfem.studies.benchmark import benchmark_mesh
 
 from evfem.electrostatics import Kaczmarek, Layer
 from evfem.fingerpad import Electrical, MeshedFinger
@@ -8,7 +9,6 @@ from evfem.materials import NeoHookean
 from evfem.mesh import Mesh
 from evfem.scene import Output, Press, Scene, Slide, Solver
 from evfem.surfaces import Display
-from evfem.studies.benchmark import benchmark_mesh
 
 BENCHMARK_LAWS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
 SKIN = Electrical(stratum_corneum_thickness=0.38, stratum_corneum_eps_r=1650.0)

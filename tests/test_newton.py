@@ -289,3 +289,10 @@ def test_the_travel_of_the_bone_does_not_count_as_force():
     assert result.substeps.tolist() == [1, 1, 1, 1]
     assert result.normal_force[2] > 1.0
     assert np.abs(result.applied_force[3]) < 1e-12
+
+
+@pytest.mark.parametrize("history", [[0.0, 0.04], [0.0, 0.0], [1e-3, 0.0]])
+def test_residuals_of_exactly_zero_are_numbers_like_others(history):
+    """A balanced start, contact not settled: the factorisation is renewed only if the residual grew."""
+    model, _ = pressed(Display())
+    assert model.equilibrium._stale(history) == (history[1] > 0.0)

@@ -84,3 +84,38 @@ def test_missing_file_and_bad_arrays_are_refused(tmp_path):
         JUMP.rms(1.0, 1.0)
     with pytest.raises(InputError, match="voltage_max"):
         Amplifier(0.0)
+
+
+def test_amplifier_follows_no_faster_than_its_slew():
+    # 100 V/mm: the wish rises by 300 in 1 mm and stays; caught up with after 3 mm
+    rise = VoltageProfile([0.0, 1.0, 8.0], [0.0, 300.0, 300.0])
+    slow = Amplifier(1000.0, slew=2000.0).limit(rise, speed=20.0)
+    np.testing.assert_allclose(
+        slow([0.5, 1.0, 2.5, 3.0, 5.0]), [50.0, 100.0, 250.0, 300.0, 300.0], rtol=1e-14
+    )
+    # a fall that begins before it has caught up: 250 at 2.5 mm is met by 400 - 50 (x - 1) ... at x = 3
+    fall = VoltageProfile([0.0, 1.0, 9.0], [0.0, 400.0, 0.0])
+    slow = Amplifier(1000.0, slew=2000.0).limit(fall, speed=20.0)
+    np.testing.assert_allclose(slow([1.0, 3.0, 5.0, 9.0]), [100.0, 300.0, 200.0, 0.0], rtol=1e-14, atol=1e-12)
+    # never steeper, and where it departs from the wish it goes towards it at full speed
+    random = np.random.default_rng(3)
+    wish = VoltageProfile(np.sort(random.uniform(0.0, 5.0, 40)), random.uniform(0.0, 900.0, 40))
+    slow = Amplifier(800.0, slew=3000.0).limit(wish, speed=2.0)
+    assert slow.steepest() == pytest.approx(1500.0, rel=1e-9)
+    x = np.linspace(wish.position[0], wish.position[-1], 20_001)
+    behind = np.clip(wish(x), 0.0, 800.0) - slow(x)
+    towards = np.gradient(slow(x), x) * np.sign(behind)
+    lags = np.abs(behind) > 2.0
+    assert np.mean(np.isclose(towards[lags], 1500.0, rtol=1e-6)) > 0.99
+    assert np.max(np.abs(Amplifier(1e4, slew=1e9).limit(wish, speed=1.0)(x) - wish(x))) < 1e-9
+
+
+def test_a_jump_is_climbed_and_a_slew_needs_a_speed():
+    slow = Amplifier(1000.0, slew=90.0).limit(JUMP, speed=1.0)
+    # from 10 V at the jump at 2 mm with 90 V/mm towards 100 - 25 (x - 2): met after 90 / 115 mm
+    meets = 2.0 + 90.0 / 115.0
+    np.testing.assert_allclose(slow([2.0, 2.5, meets, 4.0]), [10.0, 55.0, 10.0 + 90.0 * (meets - 2.0), 50.0])
+    with pytest.raises(InputError, match="needed with a slew"):
+        Amplifier(1000.0, slew=90.0).limit(JUMP)
+    with pytest.raises(InputError, match="slew"):
+        Amplifier(1000.0, slew=0.0)

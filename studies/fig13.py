@@ -1,0 +1,175 @@
+"""Fig. 13: the pad on the texture and on the display that renders it, at the instant of the largest voltage.
+
+The slide of Fig. 12 [b]: von Mises stress of the deformed pad with ridges on the sinusoid (25) and, at the
+same position, on the display under (20a). Expected (the paper): 1911.12 V in the instant shown. Beside the
+figure the fields of both go to ParaView: fig13_reference.pvd and fig13_display.pvd.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem.electrostatics import Kaczmarek
+from evfem.export import paraview
+from evfem.mesh import Mesh
+from evfem.model import placed
+from evfem.plotting import deformed
+from evfem.rendering import Recording, apparent_friction, record, replay, voltage_for
+from evfem.result import Frame, Result
+from evfem.scene import Output, Slide
+from evfem.surfaces import Display
+
+from .common import COLOURS, Floats, Series, Study, make_folder, new_figure
+from .rendered import (
+    ASSUMPTIONS,
+    QUICK_TEXTURE,
+    TEXTURE,
+    Case,
+    display_encoding,
+    display_friction,
+    reference_scene,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PAPER = {"voltage_V": 1911.12}
+NEAR = 1.0  # mm from the contact
+#: half width of the close-ups, depth below and height above the surface that they show (mm)
+HALF, BELOW, ABOVE = 1.6, 0.25, 1.2
+TITLES = {"reference": "on the sinusoid", "display": "on the display"}
+
+
+@dataclass(frozen=True, eq=False)
+class Instant:
+    """One step of a run: a result with that step's fields alone, and the surface where it lay."""
+
+    result: Result
+    surface: Any
+
+    @property
+    def frame(self) -> Frame:
+        """The fields."""
+        return self.result.frames[0]
+
+    @property
+    def position(self) -> Floats:
+        """Current positions of all nodes (N, 2) in mm."""
+        return self.result.mesh.points + self.frame.displacement
+
+    @property
+    def touching(self) -> Floats:
+        """Current positions of the nodes in contact (C, 2) in mm."""
+        return self.position[self.frame.contact_status > 0]
+
+    def near(self) -> Any:
+        """Which cells lie within 1 mm of the contact: by their middle and the nearest touching node."""
+        middle = self.position[self.result.mesh.cells].mean(axis=1)
+        distance = np.hypot(*(middle[:, None] - self.touching[None]).transpose(2, 0, 1))
+        return distance.min(axis=1) <= NEAR
+
+
+def _instant(recording: Recording, step: int) -> Instant:
+    """The state of a recording after `step` steps, which must be one of its frames."""
+    (frame,) = (frame for frame in recording.result.frames if frame.step == step)
+    mesh: Mesh = recording.result.mesh
+    surface, _ = placed(recording.scene.surface, mesh.points[mesh.node_sets["pad"]])
+    return Instant(replace(recording.result, frames=[frame]), surface)
+
+
+def instants(case: Case) -> dict[str, Instant]:
+    """Reference and display in the step of the slide with the largest voltage by (20a)."""
+    reference = record(reference_scene(case, every=1))
+    felt = apparent_friction(reference.result)
+    full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
+    _, friction = display_friction(case, felt, full_slip)
+    signal = voltage_for(felt, display_encoding(friction))
+    number = int(np.argmax(signal.profile.voltage[1:])) + 1
+    press, slide = reference.scene.motion
+    assert isinstance(slide, Slide)
+    short = replace(slide, distance=slide.distance * number / slide.steps, steps=number)
+    scene = replace(reference.scene, motion=(press, short), output=Output(every=1_000_000))
+    display = replay(replace(reference, scene=scene), Display(friction=friction), Kaczmarek(), signal.profile)
+    step = press.steps + number
+    return {"reference": _instant(reference, step), "display": _instant(display, step)}
+
+
+def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+    """Both pads in the instant of the largest voltage, their stresses, the figure, the fields."""
+    found = instants(QUICK_TEXTURE if quick else TEXTURE)
+    numbers = _numbers(found)
+    study = Study("fig13", numbers, PAPER, ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
+    result = study.finish(out, quick)
+    if out is not None:
+        for name, instant in found.items():
+            paraview(instant.result, make_folder(out) / f"fig13_{name}.pvd")
+    return result
+
+
+def _numbers(found: dict[str, Instant]) -> dict[str, float]:
+    row = found["display"].frame.step - 1
+    numbers = {"voltage_V": float(found["display"].result.voltage[row])}
+    for name, instant in found.items():
+        stress, result = instant.frame.von_mises[instant.near()], instant.result
+        numbers[f"{name}.von_mises_max_MPa"] = float(stress.max())
+        numbers[f"{name}.von_mises_mean_MPa"] = float(stress.mean())
+        numbers[f"{name}.tangential_force_N_per_mm"] = float(result.applied_tangential_force[row])
+        numbers[f"{name}.load_N_per_mm"] = float(result.applied_force[row])
+        numbers[f"{name}.real_contact_width_mm"] = float(result.real_contact_width[row])
+    return numbers | {"position_mm": found["display"].frame.position}
+
+
+def _series(found: dict[str, Instant]) -> list[Series]:
+    """Contact pressure and largest stress in the skin along x, as far as the pad touches."""
+    series = []
+    for name, instant in found.items():
+        touching = instant.frame.contact_status > 0
+        order = np.argsort(instant.touching[:, 0])
+        x = instant.touching[order, 0]
+        for quantity in ("contact_pressure", "shear_traction"):
+            series.append(
+                Series(f"{name}.{quantity}", x, getattr(instant.frame, quantity)[touching][order], "MPa")
+            )
+    return series
+
+
+def draw(found: dict[str, Instant], numbers: dict[str, float]) -> Figure:
+    """Whole pads above, close-ups of the contact below, one scale of stress for all."""
+    figure = new_figure(6.0, 10.0)
+    axes = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
+    x, y = found["reference"].touching.mean(axis=0)
+    highest = max(numbers[f"{name}.von_mises_max_MPa"] for name in found)
+    for column, (name, instant) in zip(axes.T, found.items(), strict=True):
+        for ax in column:
+            mapped = _draw_pad(ax, instant, highest)
+        column[1].set_xlim(x - HALF, x + HALF)
+        column[1].set_ylim(y - BELOW, y + ABOVE)
+        column[0].set_title(TITLES[name], fontsize="medium")
+        column[1].set_title(f"bone at x = {instant.frame.position:.2f} mm", fontsize="medium")
+    axes[1, 1].set_title(f"{numbers['voltage_V']:.0f} V (paper {PAPER['voltage_V']:g} V)", fontsize="medium")
+    for ax, letter in zip((axes[0, 0], axes[1, 0], axes[1, 1]), "abc", strict=True):
+        ax.annotate(f"[{letter}]", (0.0, 1.02), xycoords="axes fraction", ha="left", va="bottom")
+    figure.colorbar(mapped, ax=axes, label="von Mises stress (MPa)", shrink=0.7, extend="max")
+    return figure
+
+
+def _draw_pad(ax: Axes, instant: Instant, highest: float) -> Any:
+    """The deformed pad, coloured from 0 to `highest` MPa, over the rigid surface."""
+    deformed(instant.result, ax=ax)
+    mapped = ax.collections[0]
+    mapped.set_clim(0.0, highest)
+    assert mapped.colorbar is not None
+    mapped.colorbar.remove()
+    left, right = instant.position[:, 0].min() - 0.5, instant.position[:, 0].max() + 0.5
+    x = np.linspace(left, right, 3000)
+    height = instant.surface.height(x) + instant.surface.y
+    ax.fill_between(x, height, height.min() - 0.8, color=COLOURS["neutral"], alpha=0.35, linewidth=0)
+    ax.plot(x, height, color="black", linewidth=0.8)
+    ax.set_xlim(left, right)
+    ax.set_ylim(height.min() - 0.8, instant.position[:, 1].max() + 0.3)
+    return mapped
