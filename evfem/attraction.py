@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sparse
 
 from evfem import pad as outline
 from evfem.electrostatics import traction_derivative
@@ -63,3 +64,32 @@ class Attraction:
         on = 1.0 if self.air_layer else touching.astype(float)
         rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
         return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
+
+    def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
+        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
+        component).
+        """
+        size = position.shape[0]
+        frame = outline.frame(self.surface, position)
+        length = self.pad.length(position[:, 0])
+        on = 1.0 if self.air_layer else touching.astype(float)
+        p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
+        dp = -self.fall(position, voltage, touching)
+        of, moved, value = self.pad.length_gradient(position[:, 0])
+        nodes = np.arange(size)
+        rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]
+        columns = [2 * nodes + 1, 2 * nodes, 2 * moved]
+        values = [-dp, dp * frame.slope, -p[of] * value]
+        if self.direction == "normal":
+            w = p * length
+            rows += [2 * nodes, 2 * nodes, 2 * of, 2 * moved, 2 * moved]
+            columns += [2 * nodes + 1, 2 * nodes, 2 * moved, 2 * of + 1, 2 * of]
+            values += [
+                dp * frame.slope,
+                w * frame.curvature - dp * frame.slope**2,
+                (p * frame.slope)[of] * value,
+                -p[of] * value,
+                (p * frame.slope)[of] * value,
+            ]
+        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sparse.csr_matrix(triplets, shape=(2 * size, 2 * size))

@@ -73,15 +73,18 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Condensed:
-    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates."""
+    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, coupled by
+    the attraction.
+    """
 
     schur: Floats
     compliance: Floats
 
     @classmethod
-    def make(cls, schur: Floats) -> Condensed:
-        """From S (m, m)."""
-        return cls(schur, np.asarray(np.linalg.inv(schur[:-2, :-2]), dtype=np.float64))
+    def make(cls, schur: Floats, coupling: Floats | None) -> Condensed:
+        """From S (m, m) and the attraction's stiffness between nodes (m - 2, m - 2), or None."""
+        inner = schur[:-2, :-2] if coupling is None else schur[:-2, :-2] - coupling
+        return cls(schur, np.asarray(np.linalg.inv(inner), dtype=np.float64))
 
 
 @dataclass(frozen=True, eq=False)

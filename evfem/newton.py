@@ -232,9 +232,13 @@ class Equilibrium:
             found = self._solve(step)
         if target.force is not None:
             bone = np.array([bone[0], found.extra[0]])
-            if abs(bone[1]) > self.stride:
-                # too far for a linear step, which may rest on a single node: go part of the way
-                bone[1] = np.copysign(self.stride, bone[1])
+            missing = -target.force - state.reaction[1]
+            flies = not found.status.any() and bone[1] * missing < 0.0
+            if abs(bone[1]) > self.stride or flies:
+                # too far for a linear step, which may rest on a single node, or an attracted body that
+                # nothing holds:
+                # go part of the way, the way the missing force pushes
+                bone[1] = np.copysign(self.stride, missing if flies else bone[1])
                 found = self._solve(replace(step, bone=bone, unknowns=()))
         delta = self.body.expand(self._factor.backward(saved, np.concatenate([found.moved, bone])))
         share = self._largest_share(state.u, delta)
@@ -365,7 +369,7 @@ class Equilibrium:
             self._factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", history) from error
-        self._condensed = Condensed.make(self._factor.schur)
+        self._condensed = Condensed.make(self._factor.schur, self._coupling(state))
         self._stiffest = float(upper[self.body.pattern.diagonal].max())
         self.record.factorisations += 1
 
@@ -384,6 +388,27 @@ class Equilibrium:
         if self.attraction is None or state.voltage == 0.0 or self._frozen:
             return np.zeros(self.pad.nodes.size)
         return self.attraction.fall(self.positions(state.u), state.voltage, self._touching)
+
+    def _coupling(self, state: State) -> Floats | None:
+        """The attraction's stiffness on the candidates but for its fall with a node's own gap, which belongs
+        to the contact problem: what is left are changes of tributary lengths. None without attraction.
+        """
+        if self.attraction is None or state.voltage == 0.0 or self._frozen:
+            return None
+        position, c = self.positions(state.u), self.candidates
+        whole = self.attraction.stiffness(position, state.voltage, self._touching)
+        unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
+        rows = whole[unknowns]
+        inner = np.asarray(rows[:, unknowns].toarray())
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes no length
+        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
+        index = np.arange(unknowns.size)
+        inner[index, 2 * (index // 2)] += beyond
+        normal = outline.normals(outline.frame(self.surface, position[c]))
+        own = self._fall(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        blocks = inner.reshape(c.size, 2, c.size, 2)
+        blocks[np.arange(c.size), :, np.arange(c.size)] -= own
+        return inner
 
     # -- acceptance
     # -----------------------------------------------------------------------------------------------------

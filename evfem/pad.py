@@ -121,3 +121,8 @@ def frame(surface: Any, position: Floats) -> Frame:
         zero = np.zeros_like(x)
         return Frame(position[:, 1] - surface.y, zero, zero)
     return Frame(position[:, 1] - surface.y - surface.height(x), surface.slope(x), surface.curvature(x))
+
+
+def normals(frame: Frame) -> Floats:
+    """Unit normals of the profile at the nodes (P, 2), pointing towards the finger."""
+    return np.stack([-frame.slope, np.ones_like(frame.slope)], axis=1) / frame.stretch[:, None]

@@ -136,7 +136,11 @@ def _holding(hold):
 
 
 def energy_error(result):
-    """Energy that is put in but neither stored nor dissipated, relative to what is put in."""
+    """Energy that is put in but neither stored nor dissipated, relative to what is put in.
+
+    A voltage that is there from the start pulls the touching pad in one jump, whose energy no step size resolves:
+    it is counted from the first row on.
+    """
     put_in = result.external_work + result.electrostatic_work
     kept = (
         result.stored_energy
@@ -144,7 +148,9 @@ def energy_error(result):
         + result.viscous_dissipation
         + result.kinetic_energy
     )
-    return float((put_in - kept)[-1] / np.abs(put_in).max())
+    lost = put_in - kept
+    jump = lost[0] if result.voltage[0] else 0.0
+    return float((lost[-1] - jump) / np.abs(put_in).max())
 
 
 @pytest.mark.parametrize("name", ["flat", "vertical", "normal", "steep"])
