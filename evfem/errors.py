@@ -5,6 +5,8 @@ The command line maps them to its exit status: `InputError` 2, `NotConverged` 3,
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class EvfemError(Exception):
     """Base of every exception that evfem raises on purpose."""
@@ -23,6 +25,10 @@ class InputError(EvfemError, ValueError):
         text = given if isinstance(given, str) else repr(given)
         super().__init__(f"{key}: given {text}; allowed: {allowed}")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, so that the error reaches another process."""
+        return type(self), (self.key, self.given, self.allowed)
+
 
 class NotConverged(EvfemError, RuntimeError):
     """A step was not solved; everything up to the last good step is kept in `result`.
@@ -34,6 +40,10 @@ class NotConverged(EvfemError, RuntimeError):
         self.step, self.residuals, self.advice, self.result = step, residuals, advice, result
         tail = ", ".join(f"{r:.1e}" for r in residuals[-4:])
         super().__init__(f"step {step} did not converge (last residuals: {tail}); {advice}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, so that the error reaches another process."""
+        return type(self), (self.step, self.residuals, self.advice, self.result)
 
 
 class StorageError(EvfemError, OSError):

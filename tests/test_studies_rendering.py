@@ -3,12 +3,14 @@
 import importlib
 import importlib.util
 import math
+import os
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from evfem.errors import InputError
+from evfem.errors import InputError, NotConverged
 from evfem.rendering import ApparentFriction
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
@@ -149,5 +151,15 @@ def test_variations_change_one_thing_at_a_time():
 def test_processes_keep_the_order_and_pass_errors_on():
     assert parallel.side_by_side(math.sqrt, [4.0, 9.0, 16.0]) == [2.0, 3.0, 4.0]
     assert parallel.side_by_side(math.sqrt, [4.0, 9.0], workers=1) == [2.0, 3.0]
+    others = parallel.side_by_side(eval, ["__import__('os').getpid()"] * 2)
+    assert os.getpid() not in others
     with pytest.raises(InputError, match="study"):
         parallel.side_by_side(studies.run, ["fig98", "fig99"])
+
+
+def test_errors_reach_another_process_whole():
+    refused = pickle.loads(pickle.dumps(InputError("study", 3, "a name")))
+    assert (refused.key, refused.given, refused.allowed) == ("study", 3, "a name")
+    stuck = pickle.loads(pickle.dumps(NotConverged(7, [1.0, 0.5], "smaller steps", None)))
+    assert (stuck.step, stuck.residuals, stuck.advice) == (7, [1.0, 0.5], "smaller steps")
+    assert str(stuck) == str(NotConverged(7, [1.0, 0.5], "smaller steps"))

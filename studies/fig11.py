@@ -1,0 +1,307 @@
+"""Fig. 11: what the air layer around the contact adds to the attraction, with and without fingerprint ridges.
+
+Press to ten loads of 0.01 to 0.1 N/mm, then 1000 V with the load held. (9b) counts every node at its gap,
+(10) only what touches; their relative difference is fitted by (11), alpha F_n^-beta, F_n in N/mm. The crest
+of the ridges is calibrated on Adams' ratio of ridge to gross contact area (Fig. 6b), not on this figure.
+Expected (the paper, its caption's order corrected): 0.17 and 0.49 with ridges, 0.03 and 0.65 without.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem import data
+from evfem.encoding import AreaLaw, PowerFit, fit_power
+
+from . import fig11_panels
+from .common import LAWS, Floats, Series, Study, table2_layers
+from .fig11_panels import PAPER_FIT
+from .pressing import Case, Pad, Pressed, phases, run_all
+
+VOLTAGE = 1000.0
+DEPTH = 10.0  # mm out of plane, for what is measured in N
+LOADS = tuple(round(0.01 * i, 3) for i in range(1, 11))
+QUICK_LOADS = (0.01, 0.05, 0.1)
+#: Adams' areas on which (7) is drawn in panel b, and where
+AREA_LINES = ("gross", "ridge")
+PLATE_LOADS = np.linspace(0.004, 0.1, 25)
+PADS = {"with_ridges": True, "without_ridges": False}
+PAPER = {
+    f"{pad}.{name}": value
+    for pad, fit in PAPER_FIT.items()
+    for name, value in zip(("alpha", "beta"), fit, strict=True)
+} | {"with_ridges.air_share_at_0.05": 0.40, "without_ridges.air_share_at_0.05": 0.15}
+
+ASSUMPTIONS: dict[str, Any] = {}
+
+
+#: crest exponent 7: calibrated, see `calibration.*` in the numbers
+TABLE_2_PAD = Pad(exponent=7.0)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to ask the question: the pad (its `ridges` are set per question), the run, the evaluation."""
+
+    label: str
+    pad: Pad = TABLE_2_PAD
+    law: str = "kaczmarek"
+    friction: float = 0.0
+    voltage_first: bool = False
+    area: str = "projected"
+    thickness: float | None = None
+    nodal: bool = False
+    relative: bool = True
+
+    def cases(self, ridges: bool, loads: tuple[float, ...]) -> list[tuple[Case, Case]]:
+        """Runs without and with voltage, per ridge phase."""
+        found = []
+        for pad in phases(replace(self.pad, ridges=ridges)):
+            rest = Case(pad, loads, friction=self.friction)
+            on = replace(rest, voltage=VOLTAGE, law=self.law, voltage_first=self.voltage_first)
+            found.append((rest, on))
+        return found
+
+
+BASE = Variant("base")
+CRESTS = {
+    "crest_exponent_5": Variant("crest exponent 5", Pad(exponent=5.0)),
+    "crest_exponent_6": Variant("crest exponent 6", Pad(exponent=6.0)),
+    "crest_exponent_8": Variant("crest exponent 8", Pad(exponent=8.0)),
+    "flat_crest": Variant("flat crests, half the pitch", Pad(crest=0.5, groove=0.1)),
+}
+MESHES = {
+    "mesh_coarse": Variant("12 nodes per ridge", Pad(resolution="coarse")),
+    "mesh_fine": Variant("48 nodes per ridge", Pad(resolution="fine")),
+    "nodal_edge": Variant("edge not interpolated", nodal=True),
+    "nodal_edge_coarse": Variant("the same, 12 per ridge", Pad(resolution="coarse"), nodal=True),
+    "nodal_edge_fine": Variant("the same, 48 per ridge", Pad(resolution="fine"), nodal=True),
+}
+PHYSICS = {
+    "area_current": Variant("A: current arc", area="current"),
+    "area_reference": Variant("A: reference arc", area="reference"),
+    "strong_troxel": Variant("Strong-Troxel", law="strong_troxel"),
+    "d_sc_constant": Variant("$d^{sc}$ = 0.38 mm everywhere", thickness=0.38),
+    "friction_0.3": Variant("friction 0.3", friction=0.3),
+    "friction_0.3_voltage_first": Variant("friction 0.3, voltage first", friction=0.3, voltage_first=True),
+    "E_sc_0.3": Variant("$E^{sc}$ = 0.3 MPa", Pad(stratum_corneum_E=0.3)),
+    "E_sc_5": Variant("$E^{sc}$ = 5 MPa", Pad(stratum_corneum_E=5.0)),
+    "stiffness_0.5": Variant("stiffness 0.5", Pad(stiffness=0.5)),
+    "least_squares": Variant("fit of absolute errors", relative=False),
+}
+VARIANTS = MESHES | CRESTS | PHYSICS
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Forces by (9b) and (10) in N/mm, averaged over the phases, and the fit of (11)."""
+
+    total: Floats
+    contact: Floats
+    fit: PowerFit
+
+    @property
+    def ratio(self) -> Floats:
+        """Left side of (11)."""
+        return self.total / self.contact - 1.0
+
+
+Runs = Mapping[Case, Pressed]
+
+
+def answer(
+    variant: Variant, ridges: bool, runs: Runs, loads: tuple[float, ...], phase: int | None = None
+) -> Answer:
+    """Evaluate a variant from its runs, averaged over the ridge phases or for one of them."""
+    totals, contacts = [], []
+    pairs = variant.cases(ridges, loads)
+    for rest, on in pairs if phase is None else pairs[phase : phase + 1]:
+        of_solver = variant.area == "projected" and variant.thickness is None
+        how = (VOLTAGE, variant.law, variant.area, variant.thickness)
+        totals.append(runs[on].force if of_solver else runs[on].total(*how))
+        contacts.append(runs[rest].contact_only(*how, nodal=variant.nodal))
+    total, contact = np.mean(totals, axis=0), np.mean(contacts, axis=0)
+    fit = fit_power(loads, total / contact - 1.0, relative=variant.relative)
+    return Answer(total, contact, fit)
+
+
+def area_ratio(pad: Pad, runs: Runs, loads: tuple[float, ...]) -> Floats:
+    """Width of touching ridges over the gross width of contact, without voltage, averaged over the phases."""
+    widths = [runs[Case(one, loads)].widths() for one in phases(pad)]
+    return np.sum([real for real, _ in widths], axis=0) / np.sum([gross for _, gross in widths], axis=0)
+
+
+def adams_ratio(loads: Sequence[float]) -> Floats:
+    """The same of Adams' power laws (Fig. 6b), for loads in N/mm over the depth."""
+    laws = data.load("area_laws")
+    ridge, gross = (AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in ("ridge", "gross"))
+    force = DEPTH * np.asarray(loads)
+    return np.asarray(ridge(force)) / np.asarray(gross(force))
+
+
+def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+    """The four forces over the load, alpha and beta; in full also calibration, mesh and sensitivities."""
+    loads = QUICK_LOADS if quick else LOADS
+    base = replace(BASE, pad=Pad(resolution="coarse")) if quick else BASE
+    variants = {} if quick else VARIANTS
+    runs, seconds = _run(base, variants, loads, processes=1 if quick else min(2, os.cpu_count() or 1))
+    shown = _evaluate(base, variants, runs, loads)
+    numbers = _numbers(shown.answers, loads) | _ratio_numbers(shown.ratios, loads)
+    for i in (0, 1):
+        fit = answer(base, True, runs, loads, phase=i).fit
+        numbers |= {
+            f"with_ridges.phase_{0.5 * i:g}.alpha": fit.k,
+            f"with_ridges.phase_{0.5 * i:g}.beta": -fit.m,
+        }
+    numbers |= _varied_numbers(shown.answers, shown.varied, loads)
+    numbers |= {"runs": len(runs), "newton_iterations": sum(one.iterations for one in runs.values())}
+    parameters = {"U_V": VOLTAGE, "loads_N_per_mm": loads, "resolution": base.pad.resolution}
+    parameters |= {"ridge_exponent": base.pad.exponent, "wall_seconds": seconds}
+    study = Study(
+        "fig11", numbers, PAPER, ASSUMPTIONS, _series(shown), lambda: fig11_panels.draw(shown), parameters
+    )
+    return study.finish(out, quick)
+
+
+def _run(
+    base: Variant, variants: Mapping[str, Variant], loads: tuple[float, ...], processes: int
+) -> tuple[Runs, dict[str, float]]:
+    """All runs, those of the paper's panels first, and the wall time of both parts."""
+    started = time.perf_counter()
+    runs = run_all(_cases([base], loads), processes)
+    seconds = {"main_part": time.perf_counter() - started}
+    started = time.perf_counter()
+    more = [case for case in _cases(variants.values(), loads) if case not in runs]
+    runs |= run_all(more, processes) if more else {}
+    seconds["sensitivities"] = time.perf_counter() - started
+    return runs, seconds
+
+
+def _evaluate(
+    base: Variant, variants: Mapping[str, Variant], runs: Runs, loads: tuple[float, ...]
+) -> fig11_panels.Shown:
+    varied = {
+        (name, pad): answer(variant, ridges, runs, loads)
+        for name, variant in variants.items()
+        for pad, ridges in PADS.items()
+        if ridges or name not in CRESTS
+    }
+    crests = {"base": base} | {name: variant for name, variant in variants.items() if name in CRESTS}
+    return fig11_panels.Shown(
+        loads,
+        {pad: answer(base, ridges, runs, loads) for pad, ridges in PADS.items()},
+        varied,
+        {name: variant.label for name, variant in variants.items()},
+        {name: area_ratio(variant.pad, runs, loads) for name, variant in crests.items()},
+        adams_ratio(loads),
+        PLATE_LOADS,
+        {name: _plate(name) for name in AREA_LINES},
+    )
+
+
+def _cases(variants: Any, loads: tuple[float, ...]) -> list[Case]:
+    """All runs that these variants need, crests only with ridges."""
+    crests = list(CRESTS.values())
+    return [
+        case
+        for variant in variants
+        for ridges in PADS.values()
+        if ridges or variant not in crests
+        for pair in variant.cases(ridges, loads)
+        for case in pair
+    ]
+
+
+def _at(loads: tuple[float, ...], values: Floats, load: float = 0.05) -> float:
+    return float(values[loads.index(load)])
+
+
+def _over_paper(pad: str, found: Answer, loads: tuple[float, ...]) -> dict[str, float]:
+    """The relative contribution over that of the paper's fit: geometric mean and extremes over the loads."""
+    alpha, beta = PAPER_FIT[pad]
+    over = found.ratio / (alpha * np.asarray(loads) ** -beta)
+    mean = float(np.exp(np.mean(np.log(over))))
+    return {"over_paper_mean": mean, "over_paper_min": over.min(), "over_paper_max": over.max()}
+
+
+def _numbers(answers: Mapping[str, Answer], loads: tuple[float, ...]) -> dict[str, float]:
+    numbers: dict[str, float] = {}
+    for pad, found in answers.items():
+        numbers |= {
+            f"{pad}.alpha": found.fit.k,
+            f"{pad}.beta": -found.fit.m,
+            f"{pad}.air_share_at_0.05": _at(loads, 1.0 - found.contact / found.total),
+            f"{pad}.alpha_standard_error": found.fit.k_error,
+            f"{pad}.beta_standard_error": found.fit.m_error,
+            f"{pad}.attraction_at_0.05_mN_per_mm": 1e3 * _at(loads, found.total),
+        }
+        numbers |= {f"verdict.{pad}.{key}": value for key, value in _over_paper(pad, found, loads).items()}
+    return numbers
+
+
+def _ratio_numbers(ratios: Mapping[str, Floats], loads: tuple[float, ...]) -> dict[str, float]:
+    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it would be least."""
+    adams = adams_ratio(loads)
+    misfit = {name: np.sqrt(np.mean(np.log(ratio / adams) ** 2)) for name, ratio in ratios.items()}
+    numbers = {f"calibration.{name}.rms_log_misfit": value for name, value in misfit.items()}
+    for name, ratio in {**ratios, "adams": adams}.items():
+        numbers |= {
+            f"calibration.{name}.ratio_at_{load:g}": _at(loads, ratio, load) for load in (0.01, 0.05, 0.1)
+        }
+    if "crest_exponent_6" in misfit:
+        near = [misfit["crest_exponent_6"] ** 2, misfit["base"] ** 2, misfit["crest_exponent_8"] ** 2]
+        c = np.polyfit([6.0, 7.0, 8.0], near, 2)
+        numbers["calibration.best_exponent"] = -0.5 * c[1] / c[0]
+    return numbers
+
+
+def _varied_numbers(
+    answers: Mapping[str, Answer], varied: Mapping[tuple[str, str], Answer], loads: tuple[float, ...]
+) -> dict[str, float]:
+    numbers: dict[str, float] = {}
+    for (name, pad), found in varied.items():
+        numbers |= {
+            f"sensitivity.{name}.{pad}.alpha": found.fit.k,
+            f"sensitivity.{name}.{pad}.beta": -found.fit.m,
+            f"sensitivity.{name}.{pad}.air_share_at_0.05": _at(loads, 1.0 - found.contact / found.total),
+        }
+        over = _over_paper(pad, found, loads)
+        numbers |= {f"sensitivity.{name}.{pad}.{key}": value for key, value in over.items()}
+    for name in (name for name in ("mesh_coarse", "mesh_fine") if (name, "with_ridges") in varied):
+        for pad, base in answers.items():
+            other = varied[name, pad]
+            numbers |= {
+                f"{name}.{pad}.alpha_change_percent": 100.0 * (other.fit.k / base.fit.k - 1.0),
+                f"{name}.{pad}.beta_change_percent": 100.0 * (other.fit.m / base.fit.m - 1.0),
+            }
+    return numbers
+
+
+def _series(shown: fig11_panels.Shown) -> list[Series]:
+    found: list[Series] = []
+    loads = shown.loads
+    every = {("base", pad): one for pad, one in shown.answers.items()} | dict(shown.varied)
+    for (name, pad), one in every.items():
+        found.append(Series(f"{name} {pad} relative contribution", loads, one.ratio, "1 over N/mm"))
+        found.append(Series(f"{name} {pad} with air (9b)", loads, one.total, "N/mm over N/mm"))
+        found.append(Series(f"{name} {pad} contact only (10)", loads, one.contact, "N/mm over N/mm"))
+    for name, ratio in {**shown.ratios, "Adams": shown.adams}.items():
+        found.append(Series(f"ridge over gross {name}", loads, ratio, "1 over N/mm"))
+    for name, force in shown.plates.items():
+        found.append(Series(f"(7) {name} area", shown.plate_loads, force, "N/mm over N/mm"))
+    return found
+
+
+def _plate(name: str) -> Floats:
+    """(7) at zero gap on Adams' gross or ridge area over `PLATE_LOADS`, N/mm of the depth."""
+    laws = data.load("area_laws")
+    area = AreaLaw(laws.value(name, "k"), laws.value(name, "m"))
+    pressure = LAWS["kaczmarek"].traction(0.0, VOLTAGE, table2_layers())
+    return np.asarray(area(DEPTH * PLATE_LOADS)) * pressure / DEPTH

@@ -1,0 +1,238 @@
+"""A pad pressed to a series of loads, with and without voltage: the runs, and what its outline tells."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from evfem import data
+from evfem.contactedge import contact_spans, outline_nodes
+from evfem.electrostatics import Layer, Layers
+from evfem.fingerpad import TABLE_2, FingerPad
+from evfem.materials import NeoHookean
+from evfem.mesh import layer_thickness
+from evfem.motion import Press, VoltageRamp
+from evfem.result import Frame, Result, Saved
+from evfem.scene import Scene
+from evfem.simulate import simulate
+from evfem.surfaces import Display
+
+from .common import LAWS, Floats
+from .parallel import side_by_side
+
+#: which length of the outline stands for A_j: its projection now, its arc now, its arc before deformation
+AREAS = ("projected", "current", "reference")
+
+
+@dataclass(frozen=True)
+class Pad:
+    """What a study varies of the finger; `stiffness` multiplies the moduli of all soft layers."""
+
+    ridges: bool = True
+    phase: float = 0.0
+    exponent: float = 7.0
+    crest: float = 0.0
+    groove: float = 0.0
+    resolution: str = "medium"
+    stiffness: float = 1.0
+    stratum_corneum_E: float = TABLE_2["stratum_corneum"][0]
+
+    def finger(self) -> FingerPad:
+        """The pad with these values, else Table 2."""
+        soft = {
+            name: (self.stiffness * (self.stratum_corneum_E if name == "stratum_corneum" else E), nu)
+            for name, (E, nu) in TABLE_2.items()
+            if name != "nail"
+        }
+        return FingerPad(
+            ridges=self.ridges,
+            ridge_phase=self.phase,
+            ridge_exponent=self.exponent,
+            ridge_crest=self.crest,
+            ridge_groove=self.groove,
+            resolution=self.resolution,
+            materials={name: NeoHookean(E=E, nu=nu) for name, (E, nu) in soft.items()},
+        )
+
+
+@dataclass(frozen=True)
+class Case:
+    """One run through the loads (N/mm). Without friction the order of load and voltage does not matter, and
+    the voltage is there from the start; with friction it comes on under each load, unless `voltage_first`.
+    """
+
+    pad: Pad
+    loads: tuple[float, ...]
+    voltage: float = 0.0
+    law: str = "kaczmarek"
+    friction: float = 0.0
+    voltage_first: bool = False
+
+    def scene(self, *motion: Any, voltage: float) -> Scene:
+        """The scene of some motions, at a voltage from the start."""
+        table = data.load("table2")
+        film = Layer(table.value("d_i"), table.value("eps_i"))
+        display = Display(insulator=film, friction=self.friction)
+        return Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
+
+
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """The outline at every load: L loads, P nodes in the order of `outline_nodes`.
+
+    `points` (P, 2) before deformation, `thickness` (P,) of the stratum corneum, `x`, `gap`, `touching` (L,
+    P), and the solver's attraction `force` (L,) in N/mm (zero without voltage).
+    """
+
+    case: Case
+    points: Floats
+    thickness: Floats
+    x: Floats
+    gap: Floats
+    touching: Any
+    force: Floats
+    nodes: int
+    iterations: int
+
+    def spans(self, load: int) -> Floats:
+        """Interpolated begins and ends of contact at a load, fractional indices (K, 2)."""
+        return contact_spans(self.x[load], self.gap[load], self.touching[load])
+
+    def widths(self) -> tuple[Floats, Floats]:
+        """Width of real contact, and from its outermost left to its outermost right end, per load (mm)."""
+        real, gross = [], []
+        for load, x in enumerate(self.x):
+            ends = np.interp(self.spans(load), np.arange(x.size), x)
+            real.append(float(np.sum(ends[:, 1] - ends[:, 0])))
+            gross.append(float(np.ptp(ends)))
+        return np.array(real), np.array(gross)
+
+    def line(self, load: int, area: str) -> Floats:
+        """Coordinate along the outline whose differences are the lengths of an area convention (P,), mm."""
+        if area == "projected":
+            return self.x[load]
+        if area == "reference":
+            step = np.hypot(*np.diff(self.points, axis=0).T)
+        else:
+            step = np.hypot(np.diff(self.x[load]), np.diff(self.gap[load]))
+        return np.concatenate([[0.0], np.cumsum(step)])
+
+    def pressure(self, gap: Any, voltage: float, law: str, thickness: Any = None) -> Floats:
+        """Attraction in MPa of every outline node at a gap."""
+        table = data.load("table2")
+        d = self.thickness if thickness is None else np.full_like(self.thickness, thickness)
+        layers = Layers.of(Layer(d, table.value("eps_sc")), Layer(table.value("d_i"), table.value("eps_i")))
+        return np.asarray(LAWS[law].traction(gap, voltage, layers))
+
+    def shares(self, load: int, area: str) -> Floats:
+        """Length of outline per node as (9b) needs it: 1/6, 4/6, 1/6 of every quadratic edge (P,), mm."""
+        line = self.line(load, area)
+        edge = np.maximum(line[2::2] - line[:-2:2], 0.0)
+        share = np.zeros_like(line)
+        share[:-2:2] += edge / 6.0
+        share[1::2] += edge * (4.0 / 6.0)
+        share[2::2] += edge / 6.0
+        return share
+
+    def total(self, voltage: float, law: str, area: str = "projected", thickness: Any = None) -> Floats:
+        """(9a), (9b): attraction of all nodes at their gaps, per load (N/mm)."""
+        return np.array(
+            [
+                self.pressure(np.maximum(gap, 0.0), voltage, law, thickness) @ self.shares(load, area)
+                for load, gap in enumerate(self.gap)
+            ]
+        )
+
+    def contact_only(
+        self, voltage: float, law: str, area: str = "projected", thickness: Any = None, nodal: bool = False
+    ) -> Floats:
+        """(10): attraction of what touches, per load (N/mm), between the interpolated ends of contact.
+
+        `nodal` takes the touching nodes with their shares instead, as the sum in (10) is written.
+        """
+        pressure = self.pressure(0.0, voltage, law, thickness)
+        found = []
+        for load in range(len(self.x)):
+            if nodal:
+                found.append(float(pressure @ (self.shares(load, area) * self.touching[load])))
+                continue
+            line = self.line(load, area)
+            steps = 0.5 * (pressure[1:] + pressure[:-1]) * np.diff(line)
+            integral = np.concatenate([[0.0], np.cumsum(steps)])
+            ends = np.interp(self.spans(load), np.arange(line.size), integral)
+            found.append(float(np.sum(ends[:, 1] - ends[:, 0])))
+        return np.array(found)
+
+
+def run(case: Case) -> Pressed:
+    """Press through the loads as the case says."""
+    motion = [Press(force=load, steps=1) for load in case.loads]
+    if case.voltage and case.friction and not case.voltage_first:
+        return _bundle(case, *_branches(case, motion))
+    result = simulate(case.scene(*motion, voltage=case.voltage))
+    return _bundle(case, result, result.frames, result.electrostatic_force, result.newton_iterations)
+
+
+class _Keeper:
+    """Observer that keeps what is needed to go on from every step."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict[str, Any]] = []
+        self.arrays: list[dict[str, Any]] = []
+
+    def step(self, row: dict[str, Any], _: Frame | None, checkpoint: Any) -> None:
+        """Called after every converged step."""
+        self.rows.append(row)
+        self.arrays.append({name: np.copy(array) for name, array in checkpoint().items()})
+
+
+def _branches(case: Case, motion: list[Press]) -> tuple[Result, list[Frame], Floats, Any]:
+    """Press once without voltage; from every load on, switch the voltage on with the load held."""
+    kept = _Keeper()
+    result = simulate(case.scene(*motion, voltage=0.0), observers=[kept])
+    frames, forces, iterations = [], [], [result.newton_iterations.sum()]
+    for k, arrays in enumerate(kept.arrays):
+        switch_on = VoltageRamp(case.voltage, steps=1, hold="force")
+        branch = simulate(
+            case.scene(*motion[: k + 1], switch_on, voltage=0.0), resume=Saved(arrays, kept.rows[: k + 1])
+        )
+        frames.append(branch.frames[-1])
+        forces.append(branch.electrostatic_force[-1])
+        iterations.append(branch.newton_iterations[-1])
+    return result, frames, np.array(forces), np.array(iterations)
+
+
+def _bundle(case: Case, result: Result, frames: list[Frame], force: Floats, iterations: Any) -> Pressed:
+    mesh = result.mesh
+    nodes = outline_nodes(mesh)
+    points = mesh.points[nodes]
+    return Pressed(
+        case,
+        points,
+        layer_thickness(mesh, "stratum_corneum", nodes),
+        np.stack([points[:, 0] + frame.displacement[nodes, 0] for frame in frames]),
+        np.stack([frame.gap[nodes] for frame in frames]),
+        np.stack([frame.contact_status[nodes] > 0 for frame in frames]),
+        np.asarray(force, dtype=float),
+        len(mesh.points),
+        int(np.sum(iterations)),
+    )
+
+
+def run_all(cases: Iterable[Case], processes: int = 1) -> dict[Case, Pressed]:
+    """Every case once, the dearest first, in this process or in several."""
+    wanted = sorted(set(cases), key=_cost, reverse=True)
+    return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
+
+
+def _cost(case: Case) -> float:
+    size = {"coarse": 1.0, "medium": 4.0, "paper": 9.0, "fine": 20.0}[case.pad.resolution]
+    return size * (2.0 if case.friction else 1.0) * (1.2 if case.voltage else 1.0)
+
+
+def phases(pad: Pad) -> list[Pad]:
+    """The two ridge phases that a result is averaged over; a smooth pad has but one."""
+    return [replace(pad, phase=0.0), replace(pad, phase=0.5)] if pad.ridges else [pad]
