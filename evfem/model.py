@@ -70,7 +70,7 @@ def make_model(scene: Scene) -> Model:
     equilibrium = solve(body, pad, surface, attraction, solver.tolerance, solver.threads)
     if solver.contact == "penalty":
         normal = float(solver.penalty_normal or 0.0)
-        equilibrium.penalties = (normal, solver.penalty_tangential or normal)
+        equilibrium.interface.penalties = (normal, solver.penalty_tangential or normal)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 

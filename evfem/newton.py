@@ -25,18 +25,17 @@ import numpy as np
 from evfem import pad as outline
 from evfem.attraction import Attraction
 from evfem.body import Body
-from evfem.condensed import Candidates, Condensed, Motion, Step, Unknown
-from evfem.contact import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
+from evfem.condensed import Condensed, Motion, Step, Unknown
+from evfem.contact import OPEN, ContactNotSolved
+from evfem.interface import Interface
 from evfem.linear import Singular, make_condensation
 from evfem.mesh import Floats, Ints
-from evfem.pins import Pins
-from evfem.state import KILOVOLT, Balance, Record, State, StepFailed, Target
+from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Record, State, StepFailed, Target
 
 #: renew the factorisation when more iterations than this would be needed with the old one
 PATIENCE = 5
 MAX_ITERATIONS = 40
 SMALLEST_J = 0.05
-SMALLEST_FORCE = 1e-6
 #: the voltage is given, at its lower or upper limit, or an unknown settled by the friction force
 NONE, LOW, HIGH, FREE = "none", "low", "high", "free"
 
@@ -55,17 +54,10 @@ class Equilibrium:
     ) -> None:
         self.body, self.pad, self.surface, self.attraction = body, pad, surface, attraction
         self.tolerance, self.threads = tolerance, threads
-        self.penalties: tuple[float, float] | None = None
+        self.interface = Interface(pad, body.space.mesh.points, surface, tolerance)
         self.record = Record()
         self.points = body.space.mesh.points
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
-        self.length = float(
-            np.median(
-                np.hypot(
-                    *(self.points[pad.nodes[pad.edges[:, 0]]] - self.points[pad.nodes[pad.edges[:, 1]]]).T
-                )
-            )
-        )
         # attraction that falls more slowly than this share of the pad's foundation modulus is left to
         # iterations
         depth = float(np.ptp(self.points[:, 1]))
@@ -78,10 +70,8 @@ class Equilibrium:
         self._outdated = False
         self._steering = NONE
         self._stiffest = 0.0
-        self._pins = Pins(surface.friction_jumps, pad.nodes.size)
 
     # -- what a state is
-    # ----------------------------------------------------------------------------------------------
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone`."""
@@ -102,17 +92,13 @@ class Equilibrium:
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2)."""
-        return self.points[self.pad.nodes] + u[self.pad.nodes]
+        return self.interface.positions(u)
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        frame = outline.frame(self.surface, self.positions(state.u))
-        normal, shear = state.contact_force.T
-        slope, stretch = frame.slope, frame.stretch
-        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+        return self.interface.contact_forces(state)
 
     # -- one step
-    # -------------------------------------------------------------------------------------------------------
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
@@ -124,7 +110,7 @@ class Equilibrium:
         state = self._first_guess(start or old, target)
         self.choose_candidates(state, 1.2 * travel)
         self._begin(old, target.duration)
-        self._pins.begin(self.positions(old.u)[:, 0])
+        self.interface.pins.begin(self.positions(old.u)[:, 0])
         self._steering = self._first_steering(old, target)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
@@ -144,7 +130,7 @@ class Equilibrium:
                 raise StepFailed("the residual grows", history)
             self._renew(state, history)
             state = self._advance(old, state, target, balance)
-            self._pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
+            self.interface.pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
 
@@ -218,7 +204,7 @@ class Equilibrium:
         """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells
         would collapse."""
         saved, g = self._factor.forward(-balance.forces)
-        known = self._describe(old, state)
+        known = self.interface.describe(old, state, self.candidates, self._fall(state))
         bone = target.bone - state.bone
         unknowns: tuple[Unknown, ...] = ()
         if target.force is not None:
@@ -299,33 +285,6 @@ class Equilibrium:
             return False
         return True
 
-    def _describe(self, old: State, state: State) -> Candidates:
-        c = self.candidates
-        position = self.positions(state.u)[c]
-        frame = outline.frame(self.surface, position)
-        softness = self._softness(old)[c]
-        origin = self._origin(old)[c]
-        slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
-        friction = self._friction(np.where(self._pins.held[c], origin, position[:, 0]))
-        fall = self._fall(state)[c]
-        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness, fall)
-
-    def _origin(self, old: State) -> Floats:
-        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
-        return np.where(self._pins.held, self._pins.x, self.positions(old.u)[:, 0])
-
-    def _softness(self, old: State) -> Floats:
-        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
-        exact.
-        """
-        if self.penalties is None:
-            return np.zeros_like(old.contact_force)
-        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
-        return 1.0 / np.outer(length, self.penalties)
-
-    def _friction(self, x: Floats) -> Floats:
-        return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
-
     def _largest_share(self, u: Floats, delta: Floats) -> float:
         share = 1.0
         while not self.body.tissue.smallest_J(u + share * delta) > SMALLEST_J:
@@ -335,7 +294,6 @@ class Equilibrium:
         return share
 
     # -- candidates and factorisation
-    # ---------------------------------------------------------------------------------
 
     def choose_candidates(self, state: State, reach: float) -> None:
         """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the
@@ -347,7 +305,7 @@ class Equilibrium:
         if not needed.any():
             needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
         if needed[self.candidates].sum() != needed.sum():
-            wider = self.pad.free & ((gap <= max(2.0 * reach, 4.0 * self.length)) | needed)
+            wider = self.pad.free & ((gap <= max(2.0 * reach, 4.0 * self.interface.length)) | needed)
             self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
             self._factor = None
 
@@ -411,40 +369,16 @@ class Equilibrium:
         return inner
 
     # -- acceptance
-    # -----------------------------------------------------------------------------------------------------
 
     def obeys_contact(self, old: State, state: State) -> bool:
-        """Whether gaps, stick, slip and the friction cone hold at the present positions; admits new
-        candidates where a node sinks in.
+        """Whether contact and friction hold at the present positions; a node that sinks in becomes a
+        candidate.
         """
-        position = self.positions(state.u)
-        frame = outline.frame(self.surface, position)
-        short = self.tolerance * self.length
-        sunk = self.pad.free & (state.status == OPEN) & (frame.gap < -short)
-        if sunk.any():
-            self.choose_candidates(state, max(0.0, float(frame.gap[sunk].max())))
+        sunk = self.interface.deepest(state)
+        if sunk is not None:
+            self.choose_candidates(state, max(0.0, sunk))
             return False
-        active = state.status != OPEN
-        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
-        if self._pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
-            return False
-        normal, shear = state.contact_force[active].T
-        slip = (frame.stretch * (position[:, 0] - self._origin(old)))[active]
-        softness = self._softness(old)[active]
-        slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
-        x = np.where(self._pins.held, self._pins.x, position[:, 0])[active]
-        limit = self._friction(x) * normal
-        status = state.status[active]
-        sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
-        sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
-        slips = (
-            (status == STICK)
-            | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
-            | (limit == 0.0)
-        )
-        gap = frame.normal_gap[active] + softness[:, 0] * normal
-        closed = (np.abs(gap) <= short) & (normal >= -weak)
-        return bool((closed & sticks & slips).all())
+        return self.interface.obeyed(old, state)
 
 
 class RigidOutline(Equilibrium):

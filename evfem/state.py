@@ -8,6 +8,8 @@ from evfem.mesh import Floats, Ints
 
 #: voltages are squared and counted in kV^2 where they are an unknown
 KILOVOLT = 1000.0
+#: forces are compared with the largest reaction, or with this (N/mm) where it is smaller
+SMALLEST_FORCE = 1e-6
 
 
 class StepFailed(ArithmeticError):

@@ -25,7 +25,7 @@ FLOORS = {
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
         "mesh quality meshcheck meshfile outline lattice section fingerpad kernels assembly forms "
-        "pad contactedge attraction contact condensed linear dynamics body state pins newton",
+        "pad contactedge attraction contact condensed linear dynamics body state pins interface newton",
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm"},

@@ -1,0 +1,103 @@
+"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys their
+laws.
+
+Contact forces of a state are along the profile's normal and tangent at the node's x. Slip is counted along
+the profile from the last accepted x, or from the jump of friction that holds the node (`evfem.pins`). With
+penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t
+A) = 0 instead of g = 0 and s = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem import pad as outline
+from evfem.condensed import Candidates
+from evfem.contact import BACKWARD, FORWARD, OPEN, STICK
+from evfem.mesh import Floats, Ints
+from evfem.pins import Pins
+from evfem.state import SMALLEST_FORCE, State
+
+
+class Interface:
+    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
+
+    def __init__(self, pad: outline.Pad, points: Floats, surface: Any, tolerance: float) -> None:
+        self.pad, self.surface, self.tolerance = pad, surface, tolerance
+        self.points = points[pad.nodes]
+        self.penalties: tuple[float, float] | None = None
+        self.pins = Pins(surface.friction_jumps, pad.nodes.size)
+        ends = self.points[pad.edges[:, :2]]
+        self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
+
+    def positions(self, u: Floats) -> Floats:
+        """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
+        return self.points + u[self.pad.nodes]
+
+    def contact_forces(self, state: State) -> Floats:
+        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
+        frame = outline.frame(self.surface, self.positions(state.u))
+        normal, shear = state.contact_force.T
+        slope, stretch = frame.slope, frame.stretch
+        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+
+    def describe(self, old: State, state: State, c: Ints, fall: Floats) -> Candidates:
+        """What the contact problem has to know of the candidates c; `fall` (P,) of the attraction."""
+        position = self.positions(state.u)[c]
+        frame = outline.frame(self.surface, position)
+        softness = self._softness(old)[c]
+        origin = self._origin(old)[c]
+        slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
+        friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
+        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness, fall[c])
+
+    def _origin(self, old: State) -> Floats:
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
+        return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
+
+    def _softness(self, old: State) -> Floats:
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
+        exact.
+        """
+        if self.penalties is None:
+            return np.zeros_like(old.contact_force)
+        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
+        return 1.0 / np.outer(length, self.penalties)
+
+    def _friction(self, x: Floats) -> Floats:
+        return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
+
+    def deepest(self, state: State) -> float | None:
+        """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
+        gap = outline.frame(self.surface, self.positions(state.u)).gap
+        sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
+        return float(gap[sunk].max()) if sunk.any() else None
+
+    def obeyed(self, old: State, state: State) -> bool:
+        """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
+        position = self.positions(state.u)
+        frame = outline.frame(self.surface, position)
+        short = self.tolerance * self.length
+        active = state.status != OPEN
+        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
+        if self.pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
+            return False
+        normal, shear = state.contact_force[active].T
+        slip = (frame.stretch * (position[:, 0] - self._origin(old)))[active]
+        softness = self._softness(old)[active]
+        slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
+        x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
+        limit = self._friction(x) * normal
+        status = state.status[active]
+        sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
+        sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
+        slips = (
+            (status == STICK)
+            | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
+            | (limit == 0.0)
+        )
+        gap = frame.normal_gap[active] + softness[:, 0] * normal
+        closed = (np.abs(gap) <= short) & (normal >= -weak)
+        return bool((closed & sticks & slips).all())
