@@ -9,7 +9,19 @@ from typing import Any
 from evfem.errors import InputError
 
 #: every study, in the order in which "all" runs them
-NAMES = ("section321", "laws", "fig05", "fig06", "fig07", "fig08", "fig09", "fig10", "fig12", "fig13")
+NAMES = (
+    "section321",
+    "laws",
+    "fig05",
+    "fig06",
+    "fig07",
+    "fig08",
+    "fig09",
+    "fig10",
+    "fig11",
+    "fig12",
+    "fig13",
+)
 
 
 def run(name: str, quick: bool = False, out: Path | None = None) -> dict[str, Any]:

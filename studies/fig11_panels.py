@@ -81,7 +81,13 @@ def _contribution(ax: Axes, shown: Shown) -> None:
             color=colour,
             label=f"{name}: $\\alpha$ = {alpha:.3f}, $\\beta$ = {beta:.2f}",
         )
-        ax.plot(fine, alpha * fine**-beta, color=COLOURS["fe"], linewidth=1.3)
+        ax.plot(
+            fine,
+            alpha * fine**-beta,
+            color=COLOURS["fe"],
+            linewidth=1.3,
+            label="fits of (11)" if marker == "s" else None,
+        )
         alpha, beta = PAPER_FIT[pad]
         ax.plot(
             fine,
@@ -92,6 +98,7 @@ def _contribution(ax: Axes, shown: Shown) -> None:
             label=f"the paper's fit: {alpha:g}, {beta:g}",
         )
     ax.set(xlabel=LOAD_LABEL, ylabel="air layer over contact, (9b)/(10) − 1", xlim=(0, 0.105), ylim=(0, None))
+    ax.plot([], [], color=COLOURS["fe"], linewidth=1.3, label="fits of (11)")
     ax.legend(fontsize="x-small")
     panel_letter(ax, "a")
 
@@ -157,4 +164,4 @@ def _sensitivities(axes: Any, shown: Shown) -> None:
     axes[0].set_xticks([0.03, 0.1, 0.3], ["0.03", "0.1", "0.3"])
     axes[0].minorticks_off()
     panel_letter(axes[0], "e")
-    axes[1].set_title("dotted: the paper", loc="right", fontsize="x-small")
+    axes[1].set_title("dotted: the paper, thin: base", loc="right", fontsize="x-small")

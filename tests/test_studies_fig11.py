@@ -82,6 +82,7 @@ def test_runs_with_the_load_held_give_what_the_cheaper_runs_give():
 def test_with_friction_every_load_gets_its_voltage_from_its_own_state():
     case = pressing.Case(PAD, (0.03, 0.05), voltage=1000.0, friction=0.3)
     branched = pressing.run(case)
-    scene = case.scene(Press(force=0.03, steps=1), VoltageRamp(1000.0, steps=1, hold="force"), voltage=0.0)
-    assert branched.force[0] == pytest.approx(simulate(scene).electrostatic_force[-1], rel=1e-6)
-    assert branched.force[1] > branched.force[0]
+    motion = [Press(force=0.03, steps=1), Press(force=0.05, steps=1)]
+    scene = case.scene(*motion, VoltageRamp(1000.0, steps=1, hold="force"), voltage=0.0)
+    assert branched.force[1] == pytest.approx(simulate(scene).electrostatic_force[-1], rel=1e-6)
+    assert branched.force[0] < branched.force[1]
