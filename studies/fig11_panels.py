@@ -81,13 +81,7 @@ def _contribution(ax: Axes, shown: Shown) -> None:
             color=colour,
             label=f"{name}: $\\alpha$ = {alpha:.3f}, $\\beta$ = {beta:.2f}",
         )
-        ax.plot(
-            fine,
-            alpha * fine**-beta,
-            color=COLOURS["fe"],
-            linewidth=1.3,
-            label="fits of (11)" if marker == "s" else None,
-        )
+        ax.plot(fine, alpha * fine**-beta, color=COLOURS["fe"], linewidth=1.3, zorder=1)
         alpha, beta = PAPER_FIT[pad]
         ax.plot(
             fine,
