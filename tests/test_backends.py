@@ -47,7 +47,7 @@ def numbers(element):
 
 @pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
 def test_the_same_numbers_without_the_fast_extra(element):
-    path = json.dumps([str(HERE), str(HERE.parent)])
+    path = json.dumps([str(HERE), *sys.path])
     command = [sys.executable, "-c", WITHOUT, path, element]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     slow, here = json.loads(done.stdout), numbers(element)
