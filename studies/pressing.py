@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -225,7 +227,22 @@ def _bundle(case: Case, result: Result, frames: list[Frame], force: Floats, iter
 def run_all(cases: Iterable[Case], processes: int = 1) -> dict[Case, Pressed]:
     """Every case once, the dearest first, in this process or in several."""
     wanted = sorted(set(cases), key=_cost, reverse=True)
-    return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
+    with one_thread_each():
+        return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """New processes use one thread in dense algebra: with more, they only wait for each other's cores."""
+    before = os.environ.get("OMP_NUM_THREADS")
+    os.environ["OMP_NUM_THREADS"] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["OMP_NUM_THREADS"]
+        else:
+            os.environ["OMP_NUM_THREADS"] = before
 
 
 def _cost(case: Case) -> float:
