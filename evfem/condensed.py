@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.contact import OPEN, Border, ContactProblem, ContactSolution, Pull, solve_pulled
+from evfem.contact import BACKWARD, FORWARD, OPEN, Border, ContactProblem, ContactSolution, Pull, solve_pulled
 from evfem.mesh import Floats, Ints
 from evfem.pad import Frame
 
@@ -33,7 +33,7 @@ class Candidates:
     contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
     interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
     for the penalty variant, which thereby needs no other solver. `fall` (c,) N/mm per mm: how fast the
-    attraction falls with the gap.
+    attraction falls with the gap; `rise` (c,): slope of the friction coefficient in 1/mm.
     """
 
     frame: Frame
@@ -43,6 +43,7 @@ class Candidates:
     friction: Floats
     softness: Floats
     fall: Floats
+    rise: Floats
 
     @property
     def axes(self) -> Floats:
@@ -52,10 +53,14 @@ class Candidates:
 
     @property
     def turning(self) -> Floats:
-        """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2)."""
+        """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2): it
+        turns with the profile, and friction grows where its coefficient does.
+        """
         axes = self.axes
         rate = self.frame.curvature / self.frame.stretch**2
-        return rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+        turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+        sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
+        return turned + (sign * self.rise * self.force[:, 0])[:, None] * axes[:, 1]
 
 
 @dataclass(frozen=True, eq=False)

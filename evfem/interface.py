@@ -51,7 +51,10 @@ class Interface:
         origin = self._origin(old)[c]
         slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
         friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
-        return Candidates(frame, slip, state.contact_force[c], state.status[c], friction, softness, fall[c])
+        rise = np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape)
+        return Candidates(
+            frame, slip, state.contact_force[c], state.status[c], friction, softness, fall[c], rise
+        )
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""

@@ -86,7 +86,7 @@ def deformed(result: Result, field: str = "von_mises", frame: int = -1, ax: Axes
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
     ax.set_title(f"step {shown.step}, position {shown.position:.4g} mm", fontsize="medium")
-    name = field.replace("_", " ")
+    name = field.replace("_", " ").replace("mises", "Mises")
     ax.figure.colorbar(colors, ax=ax, label=f"{name} ({UNITS.get(field, 'MPa')})", shrink=0.8)
     return ax
 

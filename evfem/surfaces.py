@@ -22,7 +22,7 @@ import numpy as np
 from evfem.checks import put, real
 from evfem.electrostatics import Layer
 from evfem.errors import InputError
-from evfem.tables import numbers, piecewise_linear, read_columns
+from evfem.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -63,6 +63,17 @@ class _Surface:
             return np.full(np.shape(x), self.friction)
         place, mu = np.array(self.friction).T
         return piecewise_linear(place, mu, x)
+
+    def friction_slope(self, x: Array) -> Array:
+        """Derivative (1/mm) of the friction coefficient at x (mm), jumps left out.
+
+        >>> Flat(friction=[[0.0, 0.2], [2.0, 0.6]]).friction_slope(np.array([1.0, 3.0])).tolist()
+        [0.2, 0.0]
+        """
+        if isinstance(self.friction, float):
+            return np.zeros(np.shape(x))
+        place, mu = np.array(self.friction).T
+        return piecewise_slope(place, mu, x)
 
     @property
     def friction_jumps(self) -> Array:
