@@ -67,8 +67,8 @@ class _Surface:
     def friction_slope(self, x: Array) -> Array:
         """Derivative (1/mm) of the friction coefficient at x (mm), jumps left out.
 
-        >>> Flat(friction=[[0.0, 0.2], [2.0, 0.6]]).friction_slope(np.array([1.0, 3.0])).tolist()
-        [0.2, 0.0]
+        >>> Flat(friction=[[0.0, 0.25], [2.0, 0.75]]).friction_slope(np.array([1.0, 3.0])).tolist()
+        [0.25, 0.0]
         """
         if isinstance(self.friction, float):
             return np.zeros(np.shape(x))

@@ -138,7 +138,7 @@ def _holding(hold):
 def energy_error(result):
     """Energy that is put in but neither stored nor dissipated, relative to what is put in.
 
-    A voltage that is there from the start pulls the touching pad in one jump, whose energy no step size resolves:
+    A voltage that is there from the start pulls the touching pad in one jump, whose energy no step resolves:
     it is counted from the first row on.
     """
     put_in = result.external_work + result.electrostatic_work
