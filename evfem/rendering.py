@@ -212,16 +212,24 @@ def replay(
 
 
 def exact(
-    reference: Recording, display: Surface, law: ForceLaw, largest_voltage: float = 10_000.0
+    reference: Recording,
+    display: Surface,
+    law: ForceLaw,
+    largest_voltage: float = 10_000.0,
+    start: float | None = None,
 ) -> Recording:
     """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
 
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as
     its equation; where that lies outside, the voltage stays at its limit. The voltage found is in
-    `result.voltage`.
+    `result.voltage`. Before the position `start` (mm) it stays 0: while the contact sticks, attraction
+    hardly changes the friction force, and a wish above what sticking gives cannot be met.
     """
     felt = apparent_friction(reference.result)
-    return replay(reference, display, law, FollowForce(felt.position, felt.tangential_force, largest_voltage))
+    wish = felt.tangential_force
+    if start is not None:
+        wish = np.where(felt.position < start, -np.max(np.abs(wish)), wish)
+    return replay(reference, display, law, FollowForce(felt.position, wish, largest_voltage))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,8 +34,8 @@ INSIGHTS = {
     "1911.12 V": "that is (20a) for an apparent friction of 0.0887 on 0.072, below the texture's 0.1: one "
     "instant, not the largest voltage; while all nodes slip forward the mean over a period is 0.0997 or more "
     "(work of friction on the profile), which makes the largest voltage on 0.072 more than 2460 V",
-    "out of reach": "steps at 0 V where the display still has more friction force than wished: at the start, "
-    "where the finger sticks, and at the smallest friction, where its load is not that of the reference",
+    "out of reach": "steps at 0 V where the display's force is not as wished: before full slip, where the "
+    "voltage hardly acts on it, and at the smallest friction, where its load is not that of the reference",
 }
 #: prefix of the keys -> what is simulated; the first pad is the paper's
 PADS = {"": True, "without_ridges.": False}
@@ -83,6 +83,8 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
     possible, share = _where_possible(outcome)
     numbers[f"{prefix}inverse.{name}.relative_l2_where_possible"] = possible
     numbers[f"{prefix}inverse.{name}.share_out_of_reach"] = share
+    steered = np.flatnonzero(outcome.rendered["exact"].voltage > 0.0)
+    numbers[f"{prefix}inverse.{name}.first_voltage_at_mm"] = float(outcome.position[steered[0]])
     apart = outcome.rendered["exact"].voltage - outcome.rendered["open"].voltage
     numbers[f"{key}.voltage_difference_V"] = float(np.abs(apart).max())
     numbers[f"{key}.voltage_rms_V"] = signal.rms
@@ -107,11 +109,12 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
 def _where_possible(outcome: Outcome) -> tuple[float, float]:
     """Relative L2 error of the exact encoding over the steps it can serve, and the share of the others.
 
-    Out of reach are steps at 0 V in which the display still has more friction force than wished.
+    Out of reach are steps at 0 V in which the friction force on the display is not the wished one: before
+    full slip, and where the display has more than that of its own.
     """
     found = outcome.rendered["exact"]
     error = found.force - outcome.force
-    beyond = (found.voltage == 0.0) & (error > 1e-6 * np.abs(outcome.force).max())
+    beyond = (found.voltage == 0.0) & (np.abs(error) > 1e-6 * np.abs(outcome.force).max())
     served = np.linalg.norm(error[~beyond]) / np.linalg.norm(outcome.force[~beyond])
     return float(served), float(np.mean(beyond))
 

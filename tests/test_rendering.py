@@ -161,6 +161,17 @@ def test_where_the_wish_is_below_the_displays_own_friction(jump):
     assert (signal.profile(found.result.position[slide][own]) == 0.0).all()
 
 
+def test_the_voltage_waits_for_its_start(jump):
+    found = exact(jump, Display(friction=0.25), Kaczmarek(), start=0.55)
+    slide = np.array(found.result.motion) == "slide"
+    early = found.result.position[slide] < 0.55
+    assert found.result.voltage[slide][early].max() == 0.0
+    assert found.result.voltage[slide][~early].min() > 500.0
+    error = compare(jump.result, found.result).error
+    assert np.abs(error[~early]).max() < 1e-10
+    assert error[early][-1] == pytest.approx(-0.05 * 0.02, rel=0.05)
+
+
 def test_a_limited_voltage_reproduces_as_much_as_it_can(jump):
     free = exact(jump, Display(friction=0.3), Kaczmarek())
     most = 0.5 * free.result.voltage.max()
