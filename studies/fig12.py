@@ -273,6 +273,7 @@ def _draw_voltage(ax: Axes, outcome: Outcome, key: str) -> None:
         textcoords="offset points",
         fontsize="x-small",
         color=COLOURS["neutral"],
+        bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 0.5},
     )
     ax.grid(alpha=0.3)
 
