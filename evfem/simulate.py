@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from evfem.errors import InputError, NotConverged
 from evfem.ledger import SUMS, Ledger, frame_of
@@ -48,6 +49,12 @@ def simulate(
     resume from) and `finished(result)`. `resume` continues from such arrays and rows. Raises `NotConverged`,
     with the result so far, and leaves everything up to the last good step with the observers.
     """
+    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
+    with threadpool_limits(limits=scene.solver.threads):
+        return _simulate(scene, progress, observers, resume)
+
+
+def _simulate(scene: Scene, progress: bool, observers: Sequence[Any], resume: Saved | None) -> Result:
     run = Run(scene, resume)
     total = scene.total_steps
     _tell(observers, "started", run.model.mesh, scene, total)

@@ -28,7 +28,7 @@ FLOORS = {
         "pad contactedge attraction contact condensed linear dynamics body state pins interface newton",
     ),
     "scenes": (
-        {"numpy", "pydantic", "tomli_w", "tqdm"},
+        {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
         "motion scene scenekeys scenefile result plan stepping model ledger simulate rendering",
     ),
     "edges": ({"numpy", "meshio", "matplotlib"}, "export plotting report runfolder cli"),

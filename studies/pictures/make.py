@@ -5,8 +5,10 @@ from pathlib import Path
 import evfem as ev
 from evfem import plotting
 
+PICTURE = Path(__file__).with_name("slide.png")
 
-def main(path: Path = Path(__file__).with_name("slide.png")) -> None:
+
+def main(path: Path = PICTURE) -> None:
     """Run the README's example and draw forces, pad and contact pressure."""
     from matplotlib.figure import Figure
 
