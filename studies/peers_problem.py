@@ -66,15 +66,10 @@ def quantities(scene: str, history: Any) -> dict[str, float]:
     if scene == "B":
         slide = np.abs(tangential[15:])
         found |= {f"Ft_after_{s}": slide[round(10 * s) - 1] for s in (0.1, 0.5, 3.0)}
-        found |= {"Fn_after_3.0": normal[-1], "Ft_mean_2_to_3": _mean(slide[19:], 0.1)}
+        found |= {"Fn_after_3.0": normal[-1], "Ft_mean_2_to_3": np.mean(slide[19:])}
     if scene == "C":
         found |= {f"Fe_at_{d}": electrostatic[round(10 * d) - 1] for d in (0.5, 1.0, 1.5)}
     return {key: float(value) for key, value in found.items()}
-
-
-def _mean(values: Floats, step: float) -> float:
-    """Mean over an interval by the trapezoidal rule."""
-    return float(np.trapezoid(values, dx=step) / (step * (len(values) - 1)))
 
 
 def errors(scene: str, found: Mapping[str, float]) -> dict[str, float]:

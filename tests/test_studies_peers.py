@@ -139,11 +139,19 @@ def test_errors_and_ratios_by_hand():
     assert not [key for key in numbers if "to_0.1_percent" in key]  # nobody is that good
     names = [one.name for one in peers.series(runs)]
     assert names == ["A evfem q1", "A felupe q1", "A evfem q2p1", "A felupe q2"]
-    # scene B is judged by its tangential force, and its mean over the last millimetre is a trapezoidal rule:
-    # ten intervals, of which the last ends at 0.1564 instead of 0.1473
+    # eleven values, of which the last is 0.1564 instead of 0.1473
     slide = run("evfem", "q1", "B").forces
-    assert slide["Ft_mean_2_to_3"] == pytest.approx(0.1473 + (0.1564 - 0.1473) / 20.0, rel=1e-12)
+    assert slide["Ft_mean_2_to_3"] == pytest.approx((10 * 0.1473 + 0.1564) / 11.0, rel=1e-12)
     assert slide["Fn_after_3.0"] == 0.5214
+
+
+def test_cost_of_an_error_between_levels():
+    # error falls with the square of the cost: 4 % at 1 s, 0.04 % at 10 s, so 0.4 % at sqrt(10) s
+    curve = [(1.0, 4.0), (10.0, 0.04)]
+    assert peers.cost_of(0.4, curve) == pytest.approx(10.0**0.5)
+    assert peers.cost_of(5.0, curve) == 1.0  # the coarsest level is better than asked for
+    assert peers.cost_of(0.01, curve) is None  # nothing is extrapolated
+    assert peers.cost_of(0.4, []) is None
 
 
 def test_path_of_the_bone():
