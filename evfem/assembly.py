@@ -120,7 +120,7 @@ def make_space(mesh: Mesh, element: str) -> Space:
     kind, intorder, sampling = ELEMENTS[element]
     if mesh.kind != kind:
         raise InputError("solver.element", element, f"cells of kind {kind}, the mesh has {mesh.kind}")
-    shape = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+    shape = shape_functions(kind)
     grid = scikit_mesh(mesh)
     basis = skfem.Basis(grid, shape, intorder=intorder)
     _, node_of_dof = cKDTree(mesh.points).query(basis.doflocs.T)
@@ -144,6 +144,19 @@ def make_space(mesh: Mesh, element: str) -> Space:
         sample,
         projection,
     )
+
+
+def shape_functions(kind: str) -> Any:
+    """scikit-fem's shape functions on cells of a kind."""
+    import skfem
+
+    return {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+
+
+def scatter(nodes: Ints, fe: Floats, size: int) -> Floats:
+    """Sum of cell forces (E, n, 2) on the nodes (E, n) they belong to, (size, 2)."""
+    flat = nodes.ravel()
+    return np.stack([np.bincount(flat, fe[..., i].ravel(), size) for i in (0, 1)], axis=1)
 
 
 def _gradients(basis: Any) -> Floats:
@@ -250,7 +263,7 @@ class Tissue:
             space.sample,
             optimize=True,
         )
-        return self._scatter(fe)
+        return scatter(self.space.nodes, fe, self.space.size)
 
     def tangent(self, u: Floats) -> Floats:
         """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
@@ -347,10 +360,6 @@ class Tissue:
         blocks = -np.einsum("es,esak,esbi->eaibk", q, push, push, optimize=True)
         size = 2 * space.nodes.shape[1]
         return blocks.reshape(len(space.nodes), size, size)
-
-    def _scatter(self, fe: Floats) -> Floats:
-        flat = self.space.nodes.ravel()
-        return np.stack([np.bincount(flat, fe[..., i].ravel(), self.space.size) for i in (0, 1)], axis=1)
 
 
 def gradient_rows(gradient: Floats) -> Floats:

@@ -18,7 +18,15 @@ from typing import Any
 
 import numpy as np
 
-from evfem.assembly import ELEMENTS, Space, compiled_kernels, gradient_rows, scikit_mesh
+from evfem.assembly import (
+    ELEMENTS,
+    Space,
+    compiled_kernels,
+    gradient_rows,
+    scatter,
+    scikit_mesh,
+    shape_functions,
+)
 from evfem.materials import split
 from evfem.mesh import Floats
 
@@ -56,10 +64,14 @@ class Dynamics:
         elif self.viscosity is not None:
             F = self._gradient(u)
             P = F @ self._stress(F) * self.space.weight[..., None, None]
-            total += self._scatter(np.einsum("eqij,eqnj->eni", P, self.space.gradient, optimize=True))
+            total += scatter(
+                self.space.nodes,
+                np.einsum("eqij,eqnj->eni", P, self.space.gradient, optimize=True),
+                self.space.size,
+            )
         if self.mass is not None:
             change = (u - self._u0) / self.step**2 - self._v0 / self.step
-            total += self._scatter(self.mass @ change[self.space.nodes])
+            total += scatter(self.space.nodes, self.mass @ change[self.space.nodes], self.space.size)
         return total
 
     def add_tangent(self, u: Floats, cells: Floats) -> None:
@@ -123,10 +135,6 @@ class Dynamics:
         assert self.viscosity is not None
         return 2.0 * (self.viscosity / self.step)[:, None, None, None] * (strain(F) - self._strain0)
 
-    def _scatter(self, fe: Floats) -> Floats:
-        flat = self.space.nodes.ravel()
-        return np.stack([np.bincount(flat, fe[..., i].ravel(), self.space.size) for i in (0, 1)], axis=1)
-
 
 def strain(F: Floats) -> Floats:
     """Green strain (..., 2, 2) of F (..., 2, 2)."""
@@ -138,7 +146,7 @@ def mass_matrices(space: Space) -> Floats:
     import skfem
 
     kind, intorder, _ = ELEMENTS[space.element]
-    shape = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+    shape = shape_functions(kind)
     basis = skfem.Basis(scikit_mesh(space.mesh), shape, intorder=intorder)
     N = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])
     return np.einsum("aeq,beq,eq->eab", N, N, basis.dx, optimize=True)

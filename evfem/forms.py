@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.assembly import ELEMENTS, Space, scikit_mesh
+from evfem.assembly import ELEMENTS, Space, scatter, scikit_mesh, shape_functions
 from evfem.errors import InputError
 from evfem.mesh import Floats, Ints
 
@@ -42,7 +42,7 @@ class FormTerm:
         fe = np.einsum("cq,cqk,cqkd->cd", self.weight, flux, self.rows, optimize=True).reshape(
             *self.nodes.shape, 2
         )
-        return np.stack([np.bincount(self.nodes.ravel(), fe[..., i].ravel(), len(u)) for i in (0, 1)], axis=1)
+        return scatter(self.nodes, fe, len(u))
 
     def add_tangent(self, u: Floats, cells: Floats) -> None:
         """Add the form's tangents to the cell matrices (E, 2 n, 2 n) of the whole mesh."""
@@ -80,7 +80,7 @@ def make_term(space: Space, function: Callable[[Any, Any, Any], Any], on: str, b
     import skfem
 
     kind, intorder, _ = ELEMENTS[space.element]
-    shape = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+    shape = shape_functions(kind)
     mesh, grid = space.mesh, scikit_mesh(space.mesh)
     if boundary:
         if on not in mesh.node_sets:
