@@ -107,7 +107,7 @@ def missing() -> list[str]:
 def run_once(package: str, element: str, scene: str, level: int) -> dict[str, Any]:
     """One measured run in a new process of this interpreter; {"failed": its last words} if it fails."""
     path = os.pathsep.join(p for p in sys.path if p)
-    words = [sys.executable, "-m", f"{__package__}.peers_run", package, element, scene, str(level)]
+    words = [sys.executable, "-P", "-m", f"{__package__}.peers_run", package, element, scene, str(level)]
     environment = os.environ | ONE_THREAD | {"PYTHONPATH": path}
     done = subprocess.run(words, env=environment, capture_output=True, text=True)
     if done.returncode:
