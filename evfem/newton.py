@@ -69,7 +69,6 @@ class Equilibrium:
         self._frozen = False
         self._outdated = False
         self._steering = NONE
-        self._clamped = False
         self._stiffest = 0.0
 
     # -- what a state is
@@ -112,7 +111,7 @@ class Equilibrium:
         self.choose_candidates(state, 1.2 * travel)
         self._begin(old, target.duration)
         self.interface.pins.begin(self.positions(old.u)[:, 0])
-        self._steering, self._clamped = self._first_steering(old, target), False
+        self._steering = self._first_steering(old, target)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
             state, balance = self._balance(old, state, target, frozen)
@@ -268,17 +267,15 @@ class Equilibrium:
         change = float(found.extra[-1])
         if not 0.0 <= now + change <= most:
             self._steering = LOW if now + change < 0.0 else HIGH
-            self._clamped = True
             change = (0.0 if self._steering == LOW else most) - now
             found = self._solve(replace(step, residual=step.residual + change * push))
         return found, saved + change * unit, change
 
     def _wish_met(self, old: State, state: State, target: Target) -> bool:
         """Whether the friction force is as wished, or as near as the voltage's limits allow; if the limit is
-        no longer needed, the voltage becomes an unknown again. A limit that this step has come back to stays:
-        where the pad sticks, no voltage may bring the wish.
+        no longer needed, the voltage becomes an unknown again.
         """
-        if target.tangential_force is None or self._steering == FREE or self._clamped:
+        if target.tangential_force is None or self._steering == FREE:
             return True
         forward = np.sign(target.bone[0] - old.bone[0]) or 1.0
         lacking = forward * (target.tangential_force - state.reaction[0])

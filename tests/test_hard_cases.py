@@ -9,7 +9,6 @@ from evfem import friction
 from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
 from evfem.fingerpad import FingerPad
 from evfem.scene import Hover, Output, Press, Scene, Slide, Solver, VoltageRamp
-from evfem.signals import FollowForce
 from evfem.simulate import Run, simulate
 from evfem.surfaces import Display, Flat
 
@@ -122,17 +121,3 @@ def test_penalised_friction_obeys_the_return_map():
         history = before[touching] + past / 20.0
         point = friction.return_map(after[touching], history, pressure, 0.3, penalty=20.0)
         np.testing.assert_allclose(point.shear, shear, atol=1e-7)
-
-
-def test_a_wish_that_a_sticking_pad_cannot_follow_ends_at_a_limit():
-    """While the pad sticks the voltage hardly moves its friction force: it stays within its limits, and
-    the run goes on.
-    """
-    motion = [Press(force=0.05, steps=5), Slide(0.2, steps=10)]
-    reference = run(Flat(friction=0.3), *motion)
-    position, force = reference.position[5:], 1.001 * reference.applied_tangential_force[5:]
-    wish = FollowForce(np.append(0.0, position), np.append(0.0, force), largest_voltage=5000.0)
-    result = run(Display(friction=0.3), *motion, law=Kaczmarek(), voltage=wish)
-    assert (result.voltage >= 0.0).all()
-    assert (result.voltage <= 5000.0).all()
-    np.testing.assert_allclose(result.applied_tangential_force[5:], force, rtol=5e-3)
