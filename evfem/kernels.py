@@ -17,17 +17,24 @@ from evfem.mesh import Floats, Ints
 
 
 @njit(cache=True, error_model="numpy")
+def _deformation(u: Any, cell: Any, gradient: Any) -> Any:
+    """F11, F12, F21, F22 of one point from shape gradients (n, 2) of its cell's nodes (n,)."""
+    a, b, c, d = 1.0, 0.0, 0.0, 1.0
+    for k in range(cell.size):
+        gx, gy = gradient[k, 0], gradient[k, 1]
+        ux, uy = u[cell[k], 0], u[cell[k], 1]
+        a += ux * gx
+        b += ux * gy
+        c += uy * gx
+        d += uy * gy
+    return a, b, c, d
+
+
+@njit(cache=True, error_model="numpy")
 def _jacobians(u: Any, nodes: Any, sample: Any, inverse: Any, log_J: Any) -> None:
     """F^-T (S, 2, 2) and ln J (S,) of one cell; ln J is nan where the cell is inverted."""
     for s in range(sample.shape[0]):
-        a, b, c, d = 1.0, 0.0, 0.0, 1.0
-        for k in range(nodes.size):
-            gx, gy = sample[s, k, 0], sample[s, k, 1]
-            ux, uy = u[nodes[k], 0], u[nodes[k], 1]
-            a += ux * gx
-            b += ux * gy
-            c += uy * gx
-            d += uy * gy
+        a, b, c, d = _deformation(u, nodes, sample[s])
         J = a * d - b * c
         log_J[s] = np.log(J)
         inverse[s, 0, 0] = d / J
@@ -78,14 +85,7 @@ def forces(
         P = projection.reshape(0, 0) if none else projection[e]
         _volume_force(log_J, mu[e], lmbda[e], weight[e], P, volume)
         for q in range(Q):
-            a, b, c, d = 1.0, 0.0, 0.0, 1.0
-            for k in range(n):
-                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
-                ux, uy = u[cell[k], 0], u[cell[k], 1]
-                a += ux * gx
-                b += ux * gy
-                c += uy * gx
-                d += uy * gy
+            a, b, c, d = _deformation(u, cell, gradient[e, q])
             w = weight[e, q] * mu[e]
             for k in range(n):
                 gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
@@ -167,14 +167,7 @@ def smallest_J(u: Floats, nodes: Ints, sample: Floats) -> float:
     smallest = np.inf
     for e in range(nodes.shape[0]):
         for s in range(sample.shape[1]):
-            a, b, c, d = 1.0, 0.0, 0.0, 1.0
-            for k in range(nodes.shape[1]):
-                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
-                ux, uy = u[nodes[e, k], 0], u[nodes[e, k], 1]
-                a += ux * gx
-                b += ux * gy
-                c += uy * gx
-                d += uy * gy
+            a, b, c, d = _deformation(u, nodes[e], sample[e, s])
             smallest = min(smallest, a * d - b * c)
     return smallest
 
@@ -205,14 +198,7 @@ def viscous_forces(
 @njit(cache=True, error_model="numpy")
 def _viscous_point(u: Any, cell: Any, gradient: Any, rate: float, strain0: Any, F: Any, S: Any) -> None:
     """F (2, 2) and S = 2 rate (E - E0) of one point."""
-    a, b, c, d = 1.0, 0.0, 0.0, 1.0
-    for k in range(cell.size):
-        gx, gy = gradient[k, 0], gradient[k, 1]
-        ux, uy = u[cell[k], 0], u[cell[k], 1]
-        a += ux * gx
-        b += ux * gy
-        c += uy * gx
-        d += uy * gy
+    a, b, c, d = _deformation(u, cell, gradient)
     F[0, 0], F[0, 1], F[1, 0], F[1, 1] = a, b, c, d
     S[0, 0] = 2.0 * rate * (0.5 * (a * a + c * c - 1.0) - strain0[0, 0])
     S[1, 1] = 2.0 * rate * (0.5 * (b * b + d * d - 1.0) - strain0[1, 1])
