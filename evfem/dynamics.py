@@ -54,6 +54,11 @@ class Dynamics:
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = strain(self._gradient(u))
 
+    @property
+    def beginning(self) -> tuple[Floats, float]:
+        """Displacements (N, 2) that the step began with, and its seconds."""
+        return self._u0, self.step
+
     def forces(self, u: Floats) -> Floats:
         """Nodal forces (N, 2) in N per mm of depth."""
         total = np.zeros_like(u)

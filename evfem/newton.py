@@ -30,7 +30,7 @@ from evfem.contact import OPEN, ContactNotSolved
 from evfem.interface import Interface
 from evfem.linear import Singular, make_condensation
 from evfem.mesh import Floats, Ints
-from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Record, State, StepFailed, Target
+from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Linearised, Record, State, StepFailed, Target
 
 #: renew the factorisation when more iterations than this would be needed with the old one
 PATIENCE = 5
@@ -64,6 +64,7 @@ class Equilibrium:
         self.stride = 0.05 * depth
         self.soft = 0.02 * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
         self._factor: Any = None
+        self._linearised: Linearised | None = None
         self._condensed: Any = None
         self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
         self._frozen = False
@@ -329,7 +330,22 @@ class Equilibrium:
             raise StepFailed(f"the tangent is singular ({error})", history) from error
         self._condensed = Condensed.make(self._factor.schur, self._coupling(state))
         self._stiffest = float(upper[self.body.pattern.diagonal].max())
+        dynamics = self.body.dynamics
+        begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
+        self._linearised = Linearised(state.u, state.voltage, self._touching, self._frozen, begin, seconds)
         self.record.factorisations += 1
+
+    @property
+    def carried(self) -> Linearised | None:
+        """Where the factorisation was made that the next step may use, if there is one."""
+        return None if self._factor is None else self._linearised
+
+    def linearise(self, state: State, at: Linearised) -> None:
+        """Make the factorisation again that a run which goes on from `state` had made at `at`."""
+        self._touching, self._frozen = at.touching, at.frozen
+        if self.body.dynamics is not None:
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
+        self._renew(replace(state, u=at.u, voltage=at.voltage), [])
 
     def _stale(self, history: list[float]) -> bool:
         if len(history) < 2:

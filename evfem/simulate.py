@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from evfem.errors import InputError, NotConverged
+from evfem.errors import NotConverged
 from evfem.ledger import SUMS, Ledger, frame_of
 from evfem.model import Model, make_model
 from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.result import Frame, Result, Saved, provenance
+from evfem.resuming import carried_arrays, carry_on, state_arrays, state_of, usable
 from evfem.scene import Scene
 from evfem.signals import FollowForce, VoltageProfile
 from evfem.state import State, StepFailed, Target
@@ -217,32 +218,18 @@ class Run:
 
     def checkpoint(self) -> dict[str, Any]:
         """Arrays from which the run can go on after its last converged step."""
-        state = self.state
         return {
-            "u": state.u,
-            "contact_force": state.contact_force,
-            "status": state.status,
-            "bone": state.bone,
-            "voltage": np.array(state.voltage),
-            "attraction": state.attraction,
-            "reaction": state.reaction,
-            "velocity": state.velocity,
-            "candidates": self.model.equilibrium.candidates,
+            **state_arrays(self.state),
+            **carried_arrays(self.model.equilibrium),
             "part": np.array(self.stepper.part),
             "time": np.array(self.time),
             "sums": np.array([self.ledger.sums[name] for name in SUMS]),
         }
 
     def _restore(self, saved: Saved) -> None:
-        arrays: dict[str, Any] = saved.arrays
-        for name, array in self.checkpoint().items():
-            if name not in arrays or (name != "candidates" and arrays[name].shape != np.shape(array)):
-                raise InputError(
-                    "checkpoint", f"no usable {name}", "a checkpoint of the same scene and version"
-                )
-        names = ("u", "contact_force", "status", "bone", "attraction", "reaction", "velocity")
-        self.state = State(**{name: arrays[name] for name in names}, voltage=float(arrays["voltage"]))
-        self.model.equilibrium.candidates = arrays["candidates"]
+        arrays = usable(saved, self.checkpoint())
+        self.state = state_of(arrays)
+        carry_on(self.model.equilibrium, self.state, arrays)
         self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])
         self.ledger.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
         self.rows = list(saved.rows)

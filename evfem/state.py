@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from evfem.mesh import Floats, Ints
 
@@ -34,6 +35,20 @@ class State:
     attraction: Floats
     reaction: Floats
     velocity: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,), whether the
+    attraction was frozen, and the step's displacements at its beginning (N, 2) and its seconds.
+    """
+
+    u: Floats
+    voltage: float
+    touching: Any
+    frozen: bool
+    begin: Floats
+    duration: float
 
 
 @dataclass(frozen=True)

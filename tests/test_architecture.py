@@ -20,7 +20,8 @@ FLOORS = {
     "words and algebra": ({"numpy"}, "errors tensor checks values digest storage tables"),
     "laws": (
         {"numpy", "scipy"},
-        "moduli splitlaw ogden materials electrostatics forces encoding surfaces friction signals reference",
+        "moduli splitlaw ogden materials electrostatics forces encoding surfaces friction signals "
+        "hjif signalfile reference",
     ),
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
@@ -29,7 +30,7 @@ FLOORS = {
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
-        "motion scene scenekeys scenefile result plan stepping model ledger simulate rendering",
+        "motion scene scenekeys scenefile result plan stepping model ledger resuming simulate rendering",
     ),
     "edges": ({"numpy", "meshio", "matplotlib"}, "export plotting report runfolder cli"),
 }
