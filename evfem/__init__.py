@@ -25,6 +25,7 @@ _NAMES = {
     "plan": ("plan",),
     "result": ("Checkpoint", "Frame", "Result"),
     "scene": ("Boundary", "Output", "Region", "Scene", "Solver", "default_scene", "form", "grad"),
+    "signalfile": ("Playback", "read_signal", "write_signal"),
     "signals": ("Amplifier", "VoltageProfile"),
     "simulate": ("simulate",),
     "surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
