@@ -7,11 +7,12 @@ C: A under 1000 V with Kaczmarek's law, acting vertically on the current project
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Layer, Layers
+from evfem.electrostatics import Layer, Layers, eps_0
 from evfem.materials import NeoHookean
 from evfem.mesh import Mesh
 
@@ -50,6 +51,29 @@ UNCERTAINTY = {"A": 0.04, "B": 0.2}
 def scene_mesh(element: str, level: int) -> Mesh:
     """The nodes of a level, as linear quads for q1, as a quarter as many quadratic ones for the others."""
     return benchmark_mesh(level, 1 if element == "q1" else 2, same_nodes=element != "q1")
+
+
+def write(target: Path, scene: str, element: str, level: int) -> None:
+    """The scene as a file of arrays for programs without evfem; `peers_apart.Problem` says what is in it."""
+    mesh = scene_mesh(element, level)
+    lame = np.empty((2, len(mesh.cells)))
+    for name, law in MATERIALS.items():
+        lame[:, mesh.cells_of(name)] = np.array([[law.mu], [law.lmbda]])
+    np.savez(
+        target,
+        points=mesh.points,
+        cells=mesh.cells,
+        mu=lame[0],
+        lmbda=lame[1],
+        pad=mesh.node_sets["pad"],
+        bone=mesh.node_sets["bone"],
+        path=path(scene),
+        plane=PLANE,
+        friction=FRICTION[scene],
+        pull=0.5 * eps_0 * VOLTAGE[scene] ** 2,
+        layers=np.array([LAYERS.reduced, LAYERS.thickness]),
+        tolerance=TOLERANCE,
+    )
 
 
 def path(scene: str) -> Floats:
