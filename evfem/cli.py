@@ -11,12 +11,13 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, NoReturn
 
 import evfem
-from evfem.errors import InputError, NotConverged
+from evfem.errors import InputError, NotConverged, StorageError
 
 if TYPE_CHECKING:
     from evfem.runfolder import RunFolder
@@ -67,7 +68,30 @@ def parser() -> argparse.ArgumentParser:
     mesh = commands.add_parser("mesh", parents=[scene], help="write the finger's mesh as .vtu or .msh")
     mesh.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh")
     mesh.set_defaults(function=_mesh)
+
+    voltage = commands.add_parser("signal", help="write a voltage signal as .wav, .png, .hjif or .csv")
+    _signal_options(voltage)
+    voltage.set_defaults(function=_signal)
     return top
+
+
+def _signal_options(voltage: argparse.ArgumentParser) -> None:
+    voltage.add_argument("file", type=Path, metavar="VOLTAGE", help="signal to read, .csv or .wav")
+    voltage.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="file to write; its ending says as what"
+    )
+    voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
+    voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
+    voltage.add_argument(
+        "--friction",
+        type=float,
+        nargs=2,
+        metavar=("MU0", "MU1"),
+        help="coefficients at 0 V and at full scale, for .hjif",
+    )
+    voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help="of the .wav; default: 48000")
+    voltage.add_argument("--carrier", type=float, metavar="HZ", help="sine that the .wav modulates")
+    voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help="of the .png; default: 0.1")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -95,12 +119,22 @@ def _status(given: argparse.Namespace) -> int:
     except NotConverged as error:
         return _say(error, NOT_CONVERGED)
     except BrokenPipeError:  # the reader of our output has gone
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return DONE
     except OSError as error:
+        if not isinstance(error, StorageError):  # our output cannot be written
+            _silence()
         return _say(error, DISK_FAILED)
+    except MemoryError:
+        return _say("not enough memory for this input; try a coarser one", BAD_INPUT)
     except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
+
+
+def _silence() -> None:
+    """Throw away what is left to print, so that the interpreter does not try once more when it ends."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _say(message: object, status: int) -> int:
@@ -210,6 +244,22 @@ def _mesh(given: argparse.Namespace) -> int:
         f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",
         flush=True,
     )
+    return DONE
+
+
+def _signal(given: argparse.Namespace) -> int:
+    from evfem.signalfile import Playback, read_signal, write_signal
+
+    playback = None
+    if given.full_scale is not None:
+        playback = Playback(
+            given.full_scale, given.speed, given.friction, given.rate, given.carrier, given.pixel
+        )
+    profile = read_signal(given.file)
+    write_signal(given.out, profile, playback)
+    start, stop = profile.position[0], profile.position[-1]
+    largest = max(abs(profile.voltage))
+    print(f"{start:g} to {stop:g} mm, at most {largest:g} V; in {given.out}", flush=True)
     return DONE
 
 
