@@ -25,11 +25,11 @@ from evfem.digest import digest
 from evfem.errors import InputError
 from evfem.mesh import KINDS, Floats, Ints, Mesh
 from evfem.scene import Scene
-from evfem.storage import load_arrays, save_arrays, write_text
+from evfem.storage import load_arrays, save_arrays
 
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-1"
+CHECKPOINT_FORMAT = "evfem-checkpoint-2"
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
 
 
@@ -159,19 +159,30 @@ COLUMNS = tuple(spec.name for spec in fields(Result))[:-3]
 
 
 def load(path: str | Path) -> Result:
-    """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file."""
+    """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
+
+    No object is unpickled, and no more memory is taken than the file is long (at most 4 GB).
+    """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     try:
-        columns: dict[str, Any] = {name: arrays[f"history/{name}"] for name in COLUMNS}
+        columns: dict[str, Any] = {name: _checked_column(name, arrays[f"history/{name}"]) for name in COLUMNS}
         mesh = _mesh_from(arrays)
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
         if len({len(column) for column in columns.values()}) > 1:
             raise ValueError("columns of different length")
-        columns["motion"] = [str(kind) for kind in columns["motion"]]
+        if not isinstance(provenance, dict):
+            raise ValueError("no provenance")
         return Result(**columns, frames=frames, mesh=mesh, provenance=provenance)
-    except (KeyError, ValueError, TypeError, IndexError) as error:
+    except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error
+
+
+def _checked_column(name: str, column: np.ndarray) -> Any:
+    kinds = "U" if name == "motion" else "iu" if name in INTEGERS else "f"
+    if column.ndim != 1 or (column.size and column.dtype.kind not in kinds):
+        raise ValueError(f"column {name}")
+    return [str(kind) for kind in column] if name == "motion" else column
 
 
 def csv_line(row: Row) -> str:
@@ -186,11 +197,6 @@ def csv_line(row: Row) -> str:
 def csv_header() -> str:
     """The first line of history.csv."""
     return _csv_text(COLUMNS)
-
-
-def write_history(rows: Sequence[Row], path: str | Path) -> None:
-    """Write history.csv: one line per step, exact numbers, in one step."""
-    write_text(path, csv_header() + "".join(csv_line(row) for row in rows))
 
 
 def _csv_text(values: Sequence[str]) -> str:
@@ -275,25 +281,45 @@ class Checkpoint:
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
         """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
+        header["version"] = np.array(evfem.__version__)
         plain = [{name: _python(value) for name, value in row.items()} for row in rows]
         header["rows"] = np.array(json.dumps(plain))
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
 
     def read(self, scene_digest: str) -> Saved:
-        """The state of the same scene. Raises InputError for another scene's or a damaged file."""
-        allowed = "a checkpoint of the same scene"
+        """The state of the same scene. Raises InputError for another scene's, another version's or a
+        damaged file.
+        """
+        allowed = "a checkpoint of the same scene and version"
         arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
         try:
+            owner, version = str(arrays["scene"]), str(arrays["version"])
             rows = json.loads(str(arrays["rows"]))
-            owner = str(arrays["scene"])
-            if any(set(row) != set(COLUMNS) for row in rows):
-                raise ValueError("columns of another version")
-        except (KeyError, ValueError, TypeError) as error:
+            if owner == scene_digest:
+                _check_rows(rows)
+        except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
+        if version != evfem.__version__:
+            given = f"{self.path}, written by evfem {version[:40]!r}"
+            raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, written by another scene", allowed)
         state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)
+
+
+def _check_rows(rows: Any) -> None:
+    """Whether these are the rows of a history, from the first step on."""
+    if not isinstance(rows, list) or not rows:
+        raise ValueError("no rows")
+    for step, row in enumerate(rows, 1):
+        if set(row) != set(COLUMNS):
+            raise ValueError("columns of another version")
+        numbers = [value for name, value in row.items() if name != "motion"]
+        if row["step"] != step or not isinstance(row["motion"], str):
+            raise ValueError(f"row {step}")
+        if not all(type(value) in (int, float) for value in numbers):
+            raise ValueError(f"row {step}")
 
 
 def _python(value: Any) -> Any:
@@ -312,16 +338,23 @@ def _mesh_arrays(mesh: Mesh) -> dict[str, np.ndarray]:
 def _mesh_from(arrays: Mapping[str, np.ndarray]) -> Mesh:
     kind = str(arrays["mesh/kind"])
     if kind not in KINDS:
-        raise ValueError(f"cells of the kind {kind}")
+        raise ValueError("cells of an unknown kind")
+    corners, order = KINDS[kind]
+    nodes_of_cell = corners if order == 1 else {3: 6, 4: 9}[corners]
+    points, cells, region = (arrays[f"mesh/{name}"] for name in ("points", "cells", "region"))
     prefix = "mesh/set/"
-    return Mesh(
-        points=arrays["mesh/points"],
-        cells=arrays["mesh/cells"],
-        kind=kind,
-        region=arrays["mesh/region"],
-        region_names=json.loads(str(arrays["mesh/region_names"])),
-        node_sets={key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)},
-    )
+    sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
+    names = json.loads(str(arrays["mesh/region_names"]))
+    if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
+        raise ValueError("points of the mesh")
+    if region.ndim != 1 or cells.shape != (len(region), nodes_of_cell) or region.dtype.kind not in "iu":
+        raise ValueError("cells of the mesh")
+    if not isinstance(names, dict) or not all(type(number) is int for number in names.values()):
+        raise ValueError("names of regions")
+    for nodes in (cells, *sets.values()):
+        if nodes.dtype.kind not in "iu" or (nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points)):
+            raise ValueError("nodes that do not exist")
+    return Mesh(points, cells, kind, region, names, sets)
 
 
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:

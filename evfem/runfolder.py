@@ -1,6 +1,8 @@
 """The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
 
-Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names.
+Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint
+to go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only
+files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names.
 """
 
 from __future__ import annotations
@@ -22,9 +24,9 @@ from evfem.result import (
     Result,
     Row,
     Saved,
+    csv_header,
     csv_line,
     provenance,
-    write_history,
 )
 from evfem.scene import Scene
 from evfem.storage import replacing, write_text
@@ -38,6 +40,8 @@ HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
     "checkpoint.npz",
 )
 OURS = re.compile(r"history\.csv|summary\.json|fields\.pvd|fields_\d+\.vtu|forces\.png|checkpoint\.npz")
+#: what a killed run was writing
+LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
 
 
 @dataclass
@@ -57,6 +61,7 @@ class RunFolder:
     opened: bool = field(default=False, init=False)
     _series: ParaViewSeries | None = field(default=None, init=False)
     _digest: str = field(default="", init=False)
+    _lines: list[str] = field(default_factory=list, init=False)
     _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
 
     def started(self, mesh: Mesh, scene: Scene, total_steps: int) -> None:
@@ -94,11 +99,14 @@ class RunFolder:
         if not self.rows or self.rows[-1]["step"] != row["step"]:
             Checkpoint(self.path / STATE).write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
-        with _storing(self.path), open(self.path / HISTORY, "a", encoding="utf-8", newline="") as history:
-            history.write(csv_line(row))
+        self._write_history()
         if self._series is not None:
             self._series.write_index()
         self._pending = None
+
+    def _write_history(self) -> None:
+        self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
+        write_text(self.path / HISTORY, csv_header() + "".join(self._lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
@@ -108,7 +116,7 @@ class RunFolder:
         self._commit()
         if not self.opened:
             self._open()
-        write_history(self.rows, self.path / HISTORY)
+        self._write_history()
         if result is None:
             assert self.mesh is not None
             result = Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
@@ -122,27 +130,30 @@ class RunFolder:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
         with _storing(self.path):
             self.path.mkdir(parents=True, exist_ok=True)
-            if self.resume is None:
-                for name in _present(self.path):
-                    (self.path / name).unlink()
+            old = [p.name for p in self.path.iterdir() if LEFT.fullmatch(p.name)]
+            for name in old if self.resume else [*old, *_present(self.path)]:
+                (self.path / name).unlink()
         steps = range(1, self.scene.total_steps + 1)
         self._series = ParaViewSeries(self.path / FIELDS, self.rows) if self.fields else None
         series = [self._series.frame_path(n).name for n in steps] if self._series else []
         names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
         names = sorted({*names, *(_listed(self.path) if self.resume else ())})
         write_text(self.path / MANIFEST, "".join(f"{name}\n" for name in names))
-        write_history(self.rows, self.path / HISTORY)
+        self._write_history()
         self.opened = True
 
 
-def saved(path: Path, scene: Scene) -> Saved:
-    """The checkpoint of an interrupted run of `scene` in the folder `path`.
+def saved(path: Path, scene: Scene) -> Saved | None:
+    """The checkpoint of an interrupted run of `scene` in the folder `path`; None if a run began there, but
+    was killed before its first step was stored.
 
-    Raises InputError when there is none, or one of another scene.
+    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or version.
     """
-    if not (path / STATE).is_file():
-        raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
-    return Checkpoint(path / STATE).read(scene.digest())
+    if (path / STATE).is_file():
+        return Checkpoint(path / STATE).read(scene.digest())
+    if (path / MANIFEST).is_file() and not _present(path):
+        return None
+    raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
 
 
 def _present(path: Path) -> list[str]:

@@ -1,20 +1,47 @@
-"""Files that are either complete or untouched: written beside their place, then moved there in one step."""
+"""Files that are either complete or untouched: written beside their place, then moved there in one step.
+
+This holds when the process is killed at any moment and when the disk is full; nothing is forced through the
+disk's own cache, so a power failure may cost the last steps.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
+import re
+import struct
 import zipfile
-import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from evfem.errors import InputError, StorageError
 
 #: what reading a cut off, damaged or foreign archive can raise
-DAMAGE = (zipfile.BadZipFile, zlib.error, ValueError, TypeError, EOFError, NotImplementedError, MemoryError)
+DAMAGE = (
+    zipfile.BadZipFile,
+    struct.error,
+    ValueError,
+    TypeError,
+    KeyError,
+    IndexError,
+    OverflowError,
+    EOFError,
+    NotImplementedError,
+    RuntimeError,
+    MemoryError,
+)
+#: largest archive that is read, in bytes, and the most arrays in it
+LARGEST_ARCHIVE, MOST_ARRAYS = 4 * 2**30, 10_000
+#: the only header of an array that is read: plain numbers, truth values or text
+HEADER = re.compile(
+    rb"\x93NUMPY\x01\x00..\{'descr': '([<>|][biufU]\d{1,9})', 'fortran_order': (True|False), "
+    rb"'shape': \(((?:\d{1,15}, ?)*\d{0,15})\), \} *\n",
+    re.DOTALL,
+)
 
 
 @contextmanager
@@ -63,28 +90,47 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
 def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
     """All arrays of such a file whose array `format` says `form`.
 
-    Raises InputError(key, ...) for a missing, cut off or foreign file, StorageError when the disk refuses.
+    Takes no more memory than the file is long, and at most 4 GB: compressed members, objects and arrays that
+    are not as long as their headers say are refused. Raises InputError(key, ...) for a missing, cut off,
+    damaged or foreign file, StorageError when the disk refuses.
     """
     allowed = f"a file of the format {form}"
     try:
         with open(path, "rb") as file, zipfile.ZipFile(file) as archive:
-            arrays = {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}
+            members = archive.infolist()
+            if os.fstat(file.fileno()).st_size > LARGEST_ARCHIVE or len(members) > MOST_ARRAYS:
+                raise ValueError("too large")
+            arrays = {info.filename.removesuffix(".npy"): _array(archive, info) for info in members}
     except FileNotFoundError as error:
         raise InputError(key, f"{path}, which does not exist", allowed) from error
     except DAMAGE as error:
         raise InputError(key, f"{path}, cut off or of another kind", allowed) from error
     except OSError as error:
+        if error.errno == errno.EINVAL:  # a directory of the archive that points outside the file
+            raise InputError(key, f"{path}, cut off or of another kind", allowed) from error
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
-    if "format" not in arrays or str(arrays["format"]) != form:
+    if "format" not in arrays or arrays["format"].ndim or str(arrays["format"]) != form:
         raise InputError(key, f"{path}, of another format", allowed)
     return arrays
 
 
-def _array(archive: zipfile.ZipFile, name: str) -> np.ndarray:
-    with archive.open(name) as member:
-        array = np.lib.format.read_array(member, allow_pickle=False)
-        member.read()  # to the end of the member, where its checksum is compared
-        return array
+def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
+    """One array, its checksum compared."""
+    if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
+        raise ValueError("compressed")
+    data = archive.read(info)
+    header = HEADER.match(data)
+    if header is None:
+        raise ValueError("no plain array")
+    dtype, shape = np.dtype(header[1].decode()), tuple(map(int, re.findall(rb"\d+", header[3])))
+    length = dtype.itemsize
+    for size in shape:
+        length *= size
+    if length != len(data) - header.end():
+        raise ValueError("not as long as its header says")
+    order: Literal["F", "C"] = "F" if header[2] == b"True" else "C"
+    array = np.ndarray(shape, dtype, data, header.end(), order=order)
+    return array.astype(dtype.newbyteorder("="))
 
 
 def _remove(path: Path) -> None:
