@@ -163,7 +163,8 @@ def _hjif(profile: VoltageProfile, playback: Playback) -> str:
 
 def _positions(number: int, start: float, spacing: float) -> Floats:
     """Where the samples are, the same to the last bit when written and when read."""
-    return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
+    with np.errstate(over="ignore"):  # infinite positions in a damaged file are refused by the profile
+        return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
 
 
 def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> int:
