@@ -15,6 +15,8 @@ from evfem.quality import scaled_jacobian
 SMALLEST, LARGEST = 1.0, 200.0
 #: Two nodes closer than this part of the outline's extent are the same place.
 SAME_PLACE = 1e-7
+#: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
+MOST_PAIRS = 8_000_000
 
 
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
@@ -78,7 +80,13 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
     if len(unused):
         refuse(f"{len(unused)} nodes that no cell uses (node {_some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
-    pairs = cKDTree(mesh.points).query_pairs(radius, output_type="ndarray")
+    # first by boxes, for of many nodes in one place there would be too many pairs
+    box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
+    order = np.lexsort(box.T)
+    same = np.flatnonzero((np.diff(box[order], axis=0) == 0).all(axis=1))
+    pairs = np.stack([order[same], order[same + 1]], axis=1)
+    if not len(pairs):
+        pairs = cKDTree(mesh.points).query_pairs(radius, output_type="ndarray")
     if len(pairs):
         first, second = pairs[0]
         fault = f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})"
@@ -148,7 +156,7 @@ def _outline(mesh: Mesh, refuse: Refuse) -> None:
         refuse("no outline", "a body with an outline")
     if mesh.order == 2:
         edges = np.vstack([edges[:, [0, 2]], edges[:, [2, 1]]])
-    pairs = _near_pairs(mesh.points[edges])
+    pairs = _near_pairs(mesh.points[edges], refuse)
     apart = (edges[pairs[:, 0]][:, :, None] != edges[pairs[:, 1]][:, None, :]).all(axis=(1, 2))
     a, b = mesh.points[edges[pairs[:, 0]]], mesh.points[edges[pairs[:, 1]]]
     (across, along), (back, _) = _frame(a, b), _frame(b, a)
@@ -162,12 +170,19 @@ def _outline(mesh: Mesh, refuse: Refuse) -> None:
         refuse(fault, "cells that do not overlap, and no node on another cell's edge")
 
 
-def _near_pairs(segments: Floats) -> Ints:
-    """Pairs of segments (K, 2, 2) whose middles are no further apart than the longest is long."""
+def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
+    """Pairs of segments (K, 2, 2) whose middles are near enough for them to meet."""
     from scipy.spatial import cKDTree
 
-    reach = float(np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1).max())
-    return np.asarray(cKDTree(segments.mean(axis=1)).query_pairs(1.001 * reach, output_type="ndarray"))
+    half, middle = 0.5005 * np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1), segments.mean(axis=1)
+    tree, reach = cKDTree(middle), 2.0 * float(half.max())
+    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
+        refuse(
+            "edges of the outline too close for their lengths", "edges of similar lengths along the outline"
+        )
+    pairs = np.asarray(tree.query_pairs(reach, output_type="ndarray"))
+    distance = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
+    return pairs[distance <= half[pairs].sum(axis=1)]
 
 
 def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:

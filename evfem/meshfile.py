@@ -11,20 +11,18 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import tempfile
-import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evfem import mshread, vturead
 from evfem.errors import InputError, StorageError
 from evfem.mesh import KINDS, Ints, Mesh
 from evfem.meshcheck import check
-
-if TYPE_CHECKING:
-    import meshio
+from evfem.meshparts import LARGEST, Parts, Unreadable
+from evfem.mshread import PHYSICAL
+from evfem.storage import replacing
 
 #: Cells that are no part of the body: kept only for the nodes of a physical group.
 LOWER = {"vertex", "line", "line3"}
@@ -35,7 +33,7 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh of a file (`.vtu`, `.msh`, or another that meshio reads with the same data), in mm.
+    """The checked mesh of a `.vtu` or `.msh` file of at most 256 MB, in mm.
 
     `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of
     gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are turned
@@ -43,15 +41,15 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
     cannot be a finger.
     """
     path = Path(path)
-    raw = _quietly(path)
-    blocks = [(block.type, np.asarray(block.data)) for block in raw.cells]
-    names = _physical_names(path) if path.suffix == ".msh" else {}
+    raw = _parts(path)
+    blocks = raw.blocks
+    names = raw.names
     solid = [k for k, (kind, cells) in enumerate(blocks) if kind not in LOWER and len(cells)]
     kind = _one_kind(path, [blocks[k][0] for k in solid])
     cells = np.vstack([blocks[k][1] for k in solid]).astype(np.int64)
     if names:
         region, region_names = _groups(path, raw, solid, names)
-        sets = _group_sets(raw, blocks, names)
+        sets = _group_sets(raw, names)
     else:
         region, region_names = _numbers(path, raw, solid, regions)
         sets = {}
@@ -60,22 +58,22 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
     return check(mesh, str(path))
 
 
-def _quietly(path: Path) -> meshio.Mesh:
-    """What meshio reads, with nothing on the terminal."""
-    import meshio
-
+def _parts(path: Path) -> Parts:
     if not path.is_file():
         raise InputError("finger.mesh", str(path), "a mesh file that exists")
-    sink = io.StringIO()
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise InputError("finger.mesh", str(path), f"a mesh file that ends with {' or '.join(READERS)}")
     try:
-        with contextlib.redirect_stdout(sink), contextlib.redirect_stderr(sink), warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return meshio.read(path)
-    except (Exception, SystemExit) as error:
-        reason = " ".join(str(error).split())[:200] if isinstance(error, Exception) else ""
-        reason = reason or "its content is not what its ending says"
-        allowed = "a readable mesh file, best .vtu or .msh with physical groups"
+        if path.stat().st_size > LARGEST:
+            raise Unreadable(f"more than {LARGEST // 2**20} MB")
+        return reader(path.read_bytes())
+    except (Unreadable, MemoryError) as error:
+        reason = " ".join(str(error).split())[:200] or "not enough memory"
+        allowed = "a readable mesh file, .vtu or .msh with physical groups"
         raise InputError("finger.mesh", f"{path} ({reason})", allowed) from error
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def _one_kind(path: Path, kinds: list[str]) -> str:
@@ -97,26 +95,8 @@ def _plane(path: Path, points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(points[:, :2])
 
 
-def _physical_names(path: Path) -> _Names:
-    """(dimension, number) -> name of the physical groups: meshio merges equal names of lines and surfaces."""
-    with open(path, "rb") as file:
-        text = file.read()
-    _, found, rest = text.partition(b"$PhysicalNames")
-    names: _Names = {}
-    for line in rest.partition(b"$EndPhysicalNames")[0].splitlines() if found else []:
-        words = line.decode(errors="replace").strip().split(None, 2)
-        if len(words) == 3:
-            names[int(words[0]), int(words[1])] = words[2].strip('"')
-    return names
-
-
-def _physical(raw: meshio.Mesh, k: int) -> Ints:
-    tags = raw.cell_data.get("gmsh:physical")
-    return np.asarray(np.zeros(len(raw.cells[k])) if tags is None else tags[k], dtype=np.int64)
-
-
-def _groups(path: Path, raw: meshio.Mesh, solid: list[int], names: _Names) -> tuple[Ints, dict[str, int]]:
-    tag = np.concatenate([_physical(raw, k) for k in solid])
+def _groups(path: Path, raw: Parts, solid: list[int], names: _Names) -> tuple[Ints, dict[str, int]]:
+    tag = np.concatenate([raw.cell_data[PHYSICAL][k] for k in solid])
     region_names = {name: number for (dimension, number), name in names.items() if dimension == 2}
     lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
     if lost:
@@ -126,11 +106,10 @@ def _groups(path: Path, raw: meshio.Mesh, solid: list[int], names: _Names) -> tu
     return tag, {name: number for name, number in region_names.items() if number in present}
 
 
-def _group_sets(raw: meshio.Mesh, blocks: list[tuple[str, np.ndarray]], names: _Names) -> dict[str, Ints]:
+def _group_sets(raw: Parts, names: _Names) -> dict[str, Ints]:
     sets: dict[str, Ints] = {}
-    for k, (kind, cells) in enumerate(blocks):
+    for (kind, cells), tag in zip(raw.blocks, raw.cell_data[PHYSICAL], strict=True):
         dimension = {"vertex": 0, "line": 1, "line3": 1}.get(kind, 2)
-        tag = _physical(raw, k)
         for (d, number), name in names.items():
             if dimension < 2 and d == dimension and len(nodes := np.unique(cells[tag == number])):
                 sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
@@ -138,7 +117,7 @@ def _group_sets(raw: meshio.Mesh, blocks: list[tuple[str, np.ndarray]], names: _
 
 
 def _numbers(
-    path: Path, raw: meshio.Mesh, solid: list[int], regions: Mapping[str, int] | None
+    path: Path, raw: Parts, solid: list[int], regions: Mapping[str, int] | None
 ) -> tuple[Ints, dict[str, int]]:
     if "region" not in raw.cell_data:
         raise InputError(
@@ -153,9 +132,9 @@ def _numbers(
     region = region.astype(np.int64)
     if regions is None:
         regions = {
-            name.removeprefix(PREFIX): int(np.ravel(number)[0])
+            name.removeprefix(PREFIX): int(number.flat[0])
             for name, number in raw.field_data.items()
-            if name.startswith(PREFIX)
+            if name.startswith(PREFIX) and number.size and np.isfinite(number).all()
         }
     return region, _checked_names(path, region, regions)
 
@@ -183,7 +162,7 @@ def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict
     return dict(regions)
 
 
-def _point_sets(path: Path, raw: meshio.Mesh) -> dict[str, Ints]:
+def _point_sets(path: Path, raw: Parts) -> dict[str, Ints]:
     """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and 1."""
     sets = {}
     for name, values in raw.point_data.items():
@@ -216,14 +195,8 @@ def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
             + " or ".join(WRITERS)
             + " (other formats cannot carry the names of regions and boundaries)",
         )
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as folder:
-            part = Path(folder) / path.name
-            with contextlib.redirect_stderr(io.StringIO()):
-                writer(mesh, part)
-            os.replace(part, path)
-    except OSError as error:
-        raise StorageError(f"{path} cannot be written: {error.strerror or error}") from error
+    with replacing(path) as part, contextlib.redirect_stderr(io.StringIO()):
+        writer(mesh, part)
 
 
 def _three(points: np.ndarray) -> np.ndarray:
@@ -281,4 +254,5 @@ def _all_edges(mesh: Mesh, name: str) -> Ints:
     return edges
 
 
+READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vturead.read, ".msh": mshread.read}
 WRITERS: Mapping[str, Callable[[Mesh, Path], None]] = {".vtu": _write_vtu, ".msh": _write_msh}

@@ -25,8 +25,9 @@ FLOORS = {
     ),
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
-        "mesh quality meshcheck meshfile outline lattice section fingerpad kernels assembly forms "
-        "pad contactedge attraction contact condensed linear dynamics body state pins interface newton",
+        "mesh quality meshcheck meshparts vturead mshread meshfile outline lattice section fingerpad "
+        "kernels assembly forms pad contactedge attraction contact condensed linear dynamics body state "
+        "pins interface newton",
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
