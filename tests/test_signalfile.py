@@ -148,6 +148,14 @@ def test_the_friction_map_is_linear_in_friction(tmp_path):
     }
 
 
+def test_a_column_has_the_voltage_in_its_middle(tmp_path):
+    ramp = VoltageProfile([5.0, 15.0], [0.0, 100.0])
+    write_signal(tmp_path / "map.png", ramp, Playback(full_scale=100.0, pixel=1.0))
+    with Image.open(tmp_path / "map.png") as picture:
+        grey = np.asarray(picture)[0]
+    assert grey.tolist() == [round(255 * ((i + 0.5) / 10.0) ** 2) for i in range(10)]
+
+
 # The structure of .hjif: fields, types and limits as MPEG's reference software reads and checks them. It is
 # public under a BSD licence: MPEGGroup/HapticReferenceSoftware at 2de9ff1, source/IOHaptics/src/IOJson.cpp
 # (loadFile and what it calls), the names of the kinds in source/Types/include, bits of the binary twin in
@@ -312,10 +320,12 @@ def test_any_signal_has_the_published_structure(rows, speed, start):
     np.testing.assert_allclose(time * speed, place, rtol=0.01)
     # at its own keyframes the curve is the friction of some place at most a tick away
     tick = 10.0 ** (file["perceptions"][0]["unit_exponent"] + 3)
-    near = x[0] + place[:, None] + tick * np.linspace(-1.0, 1.0, 41)
-    wish = 0.2 + 0.7 * (profile(near) / 300.0) ** 2
-    assert np.all(mu >= wish.min(axis=1) - 1e-6)
-    assert np.all(mu <= wish.max(axis=1) + 1e-6)
+    for at, value in zip(x[0] + place, mu, strict=True):
+        rows_there = profile.voltage[np.abs(x - at) <= tick]
+        volts = np.concatenate([rows_there, profile(np.array([at - tick, at + tick]))])
+        lowest = 0.0 if volts.min() <= 0.0 <= volts.max() else np.abs(volts).min()
+        share = (np.array([lowest, np.abs(volts).max()]) / 300.0) ** 2
+        assert 0.2 + 0.7 * share[0] - 1e-6 <= value <= 0.2 + 0.7 * share[1] + 1e-6
 
 
 def test_ticks_are_the_finest_that_fit():
