@@ -312,16 +312,16 @@ def test_any_signal_has_the_published_structure(rows, speed, start):
     try:
         file = hjif.document(profile, 300.0, speed, (0.2, 0.9))
     except InputError:
-        assert np.ptp(x) / speed > 50.0 / 48_000 * 1000  # too slow over too long a way for whole ticks
+        assert np.ptp(x) / speed > 100.0  # seconds: whole ticks a second were more than 1 % off
         return
     check_structure(json.loads(json.dumps(file, allow_nan=False)))
     time, place, mu = curve_of(file)
     assert place[-1] == pytest.approx(np.ptp(x), abs=place[-1] / time[-1] / file["timescale"] * 1.02)
-    np.testing.assert_allclose(time * speed, place, rtol=0.01)
+    np.testing.assert_allclose(time * speed, place, rtol=0.0102)  # ticks per second are whole
     # at its own keyframes the curve is the friction of some place at most a tick away
     tick = 10.0 ** (file["perceptions"][0]["unit_exponent"] + 3)
     for at, value in zip(x[0] + place, mu, strict=True):
-        rows_there = profile.voltage[np.abs(x - at) <= tick]
+        rows_there = profile.voltage[np.abs(x - at) <= 1.000001 * tick]
         volts = np.concatenate([rows_there, profile(np.array([at - tick, at + tick]))])
         lowest = 0.0 if volts.min() <= 0.0 <= volts.max() else np.abs(volts).min()
         share = (np.array([lowest, np.abs(volts).max()]) / 300.0) ** 2
