@@ -34,8 +34,8 @@ def ticks(length: float, speed: float) -> tuple[int, int]:
     >>> ticks(length=10.0, speed=20.0)  # micrometres
     (-6, 20000)
 
-    The ticks per second are whole, so that time can be 1 % off, in signals of minutes. Raises InputError where
-    it would be more.
+    The ticks per second are whole, so that time can be 1 % off, in signals of minutes; InputError where it
+    would be more.
     """
     for exponent in range(-12, 1):
         unit = 10.0 ** (exponent + 3)
