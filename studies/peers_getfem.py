@@ -95,12 +95,8 @@ class Peer:
             self.model.add_initialized_data(name, value)
         self.model.add_nonlinear_term(self.outline, f"{PULL}*Test_u(2)", PAD, 0, 0)
 
-    def assemble_residual(self) -> float:
-        """Contact and residual at the current state, the largest free one over the largest force on the bone.
-
-        GetFEM has the residual of its last state; where there is friction, its state follows. The bone's
-        force is what the plane and the field leave over.
-        """
+    def update_friction(self) -> None:
+        """Contact at the current displacement, and its state where there is friction."""
         u = np.ravel(self.model.variable("u")).reshape(-1, 2)[self.pad]
         self.contact.update(*(self.problem.points[self.problem.free_pad] + u).T)
         if self.problem.friction:
@@ -108,6 +104,14 @@ class Peer:
                 values = np.zeros(len(self.dof))
                 values[self.pad] = getattr(self.contact, name)
                 self.model.set_variable(name, values)
+
+    def residual(self) -> float:
+        """The largest free residual over the largest force on the bone, which the plane and the field balance.
+
+        GetFEM has assembled it at the current displacement; where there is friction, its state has changed.
+        """
+        self.update_friction()
+        if self.problem.friction:
             self.model.assembly("build_rhs")
         residual = np.ravel(self.model.rhs())[self.unknowns].reshape(-1, 2)[self.free]
         normal, tangential, pull = self.forces
@@ -117,9 +121,10 @@ class Peer:
     def move(self, position: float, indentation: float) -> int:
         """Move the bone and find the equilibrium by full Newton steps; the number of iterations."""
         self.model.set_variable("moved", [position, -indentation])
+        self.update_friction()
         for iteration in range(1, MOST_ITERATIONS + 1):
             self.model.solve("max_iter", 1, "max_res", 1e-300, "lsearch", "simplest", "alpha max ratio", 1e300)
-            error = self.assemble_residual()
+            error = self.residual()
             if error <= self.problem.tolerance and not self.contact.turning.any():
                 self.contact.keep()
                 return iteration
