@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy.io import wavfile
 
-from evfem import cli, hjif
-from evfem.electrostatics import Kaczmarek, Layer, Layers
-from evfem.encoding import AreaLaw, Encoding
+from evfem import cli
+from evfem.electrostatics import Kaczmarek
 from evfem.errors import InputError, StorageError
 from evfem.fingerpad import FingerPad
 from evfem.motion import Press
@@ -154,187 +153,6 @@ def test_a_column_has_the_voltage_in_its_middle(tmp_path):
     with Image.open(tmp_path / "map.png") as picture:
         grey = np.asarray(picture)[0]
     assert grey.tolist() == [round(255 * ((i + 0.5) / 10.0) ** 2) for i in range(10)]
-
-
-# The structure of .hjif: fields, types and limits as MPEG's reference software reads and checks them. It is
-# public under a BSD licence: MPEGGroup/HapticReferenceSoftware at 2de9ff1, source/IOHaptics/src/IOJson.cpp
-# (loadFile and what it calls), the names of the kinds in source/Types/include, bits of the binary twin in
-# source/IOHaptics/include/IOBinaryFields.h. MPEG's own JSON schema is not public; the ISO text was not used.
-NUMBER = (int, float)
-PERCEPTION = {
-    "id": int,
-    "avatar_id": int,
-    "description": str,
-    "perception_modality": str,
-    "unit_exponent": int,
-    "perception_unit_exponent": int,
-    "reference_devices": list,
-    "effect_library": list,
-    "channels": list,
-}
-EXPERIENCE = {
-    "version": str,
-    "profile": str,
-    "level": int,
-    "date": str,
-    "description": str,
-    "timescale": int,
-    "avatars": list,
-    "perceptions": list,
-    "syncs": list,
-}
-CHANNEL = {
-    "id": int,
-    "description": str,
-    "gain": NUMBER,
-    "mixing_coefficient": NUMBER,
-    "body_part_mask": int,
-    "reference_device_id": int,
-    "bands": list,
-}
-BAND = {
-    "band_type": str,
-    "curve_type": str,
-    "lower_frequency_limit": int,
-    "upper_frequency_limit": int,
-    "effects": list,
-}
-DEVICE_FIELDS = {"id": int, "name": str, "maximum_voltage": NUMBER, "type": str}
-EFFECT = {"effect_type": str, "position": int, "keyframes": list}
-KEYFRAME = {"relative_position": int, "amplitude_modulation": NUMBER}
-CURVES = ("Unknown", "Cubic", "Linear", "Akima", "Bezier", "Bspline")
-ACTUATORS = ("Unknown", "LRA", "VCA", "ERM", "Piezo")
-
-
-def fits(thing, fields):
-    """An object with just these fields, of these types (true is no number in JSON)."""
-    assert set(thing) == set(fields)
-    for name, kind in fields.items():
-        assert isinstance(thing[name], kind), name
-        assert not isinstance(thing[name], bool), name
-    return thing
-
-
-def check_structure(file):
-    fits(file, EXPERIENCE)
-    assert re.fullmatch(r"[0-9]{4}(-[1-9])?", file["version"])
-    assert int(file["version"][:4]) >= 2023
-    assert file["profile"] == "Main"  # the other profile has no friction
-    assert file["level"] in (1, 2)
-    assert re.fullmatch(r"[0-9]{4}-[01][0-9]-[0-3][0-9]", file["date"])
-    assert 0 < file["timescale"] <= 48_000
-    assert len(file["description"].encode()) < 256
-    avatars = {avatar["id"] for avatar in file["avatars"]} | {0}
-    for perception in file["perceptions"]:
-        fits(perception, PERCEPTION)
-        assert perception["perception_modality"] == "Friction"
-        assert perception["avatar_id"] in avatars
-        assert -128 <= perception["unit_exponent"] < 128
-        assert len(perception["description"].encode()) < 256
-        devices = {fits(device, DEVICE_FIELDS)["id"] for device in perception["reference_devices"]}
-        assert {device["type"] for device in perception["reference_devices"]} <= set(ACTUATORS)
-        assert 1 <= len(perception["channels"]) <= 127
-        for channel in perception["channels"]:
-            check_channel(fits(channel, CHANNEL), devices)
-
-
-def check_channel(channel, devices):
-    assert channel["reference_device_id"] in devices
-    assert 1 <= len(channel["bands"]) <= 7
-    for band in channel["bands"]:
-        fits(band, BAND)
-        assert band["band_type"] == "Curve"
-        assert band["curve_type"] in CURVES
-        assert 0 <= band["lower_frequency_limit"] <= band["upper_frequency_limit"] < 2**16
-        for effect in band["effects"]:
-            fits(effect, EFFECT)
-            assert effect["effect_type"] == "Basis"
-            assert 0 <= effect["position"] < 2**25
-            frames = [fits(frame, KEYFRAME) for frame in effect["keyframes"]]
-            places = np.array([frame["relative_position"] for frame in frames])
-            assert 3 <= len(frames) < 2**16  # the software's synthesizer leaves out a curve of two
-            assert np.all(np.diff(places) > 0)
-            assert 0 <= places[0] <= places[-1] < 2**16
-            assert all(-1.0 <= frame["amplitude_modulation"] <= 1.0 for frame in frames)
-
-
-def curve_of(file):
-    """Times in s, places in mm and coefficients of friction of the only curve in a file."""
-    (perception,) = file["perceptions"]
-    (channel,) = perception["channels"]
-    (band,) = channel["bands"]
-    (effect,) = band["effects"]
-    ticks = np.array([frame["relative_position"] for frame in effect["keyframes"]])
-    amplitude = np.array([frame["amplitude_modulation"] for frame in effect["keyframes"]])
-    mu = amplitude * channel["gain"] * 10.0 ** perception["perception_unit_exponent"]
-    return ticks / file["timescale"], ticks * 10.0 ** (perception["unit_exponent"] + 3), mu
-
-
-def test_mpeg_haptics_has_the_published_structure_and_the_friction(tmp_path):
-    path = tmp_path / "tone.hjif"
-    write_signal(path, JUMP, DEVICE)
-    file = json.loads(path.read_text(encoding="utf-8"))
-    check_structure(file)
-    time, place, mu = curve_of(file)
-    assert file["perceptions"][0]["channels"][0]["bands"][0]["curve_type"] == "Linear"
-    assert time[-1] == 0.5  # 10 mm at 20 mm/s
-    assert place[-1] == pytest.approx(10.0, rel=1e-12)
-    np.testing.assert_allclose(place, 20.0 * time, rtol=1e-12)
-    x = np.linspace(0.0, 10.0, 4001)
-    wish = 0.5 + 0.1 * (JUMP(1.0 + x) / 2000.0) ** 2
-    off = np.abs(np.interp(x, place, mu) - wish)
-    assert np.max(off[np.abs(x - 5.0) > 0.001]) < 1.1e-5  # a 1e-4th of the 0.1 that is added, and rounding
-    # the jump takes one micrometre: 0.50625 just before 5 mm, 0.55625 from there on
-    np.testing.assert_allclose(np.interp([4.999, 5.0], place, mu), [0.50625, 0.55625], atol=1e-4)
-
-
-def test_the_coefficient_at_full_scale_comes_from_an_encoding():
-    layers = Layers.of(Layer(0.20, 1650.0), Layer(0.09, 3.35))
-    display = Encoding(Kaczmarek(), layers, AreaLaw(112.0), friction=0.5)
-    top = display.tangential_force(0.5, 2000.0) / 0.5
-    profile = VoltageProfile([0.0, 10.0], [0.0, 1776.73])
-    _, _, mu = curve_of(hjif.document(profile, 2000.0, 20.0, (0.5, top)))
-    assert mu[-1] == pytest.approx(0.6, abs=1e-6)  # 1776.73 V feels like 0.6: the example of Encoding
-    assert mu[0] == pytest.approx(0.5, rel=1e-9)
-
-
-@settings(max_examples=80, deadline=None)
-@given(
-    rows=st.lists(st.tuples(st.floats(0.0, 20.0), st.floats(-1.0, 1.0)), min_size=2, max_size=15),
-    speed=st.floats(0.05, 5000.0),
-    start=st.floats(-100.0, 100.0),
-)
-def test_any_signal_has_the_published_structure(rows, speed, start):
-    x = start + np.cumsum([gap for gap, _ in rows])
-    if not np.ptp(x) > 1.0:
-        return
-    profile = VoltageProfile(x, 300.0 * np.array([u for _, u in rows]))
-    try:
-        file = hjif.document(profile, 300.0, speed, (0.2, 0.9))
-    except InputError:
-        assert np.ptp(x) / speed > 100.0  # seconds: whole ticks a second were more than 1 % off
-        return
-    check_structure(json.loads(json.dumps(file, allow_nan=False)))
-    time, place, mu = curve_of(file)
-    assert place[-1] == pytest.approx(np.ptp(x), abs=place[-1] / time[-1] / file["timescale"] * 1.02)
-    np.testing.assert_allclose(time * speed, place, rtol=0.0102)  # ticks per second are whole
-    # at its own keyframes the curve is the friction of some place at most a tick away
-    tick = 10.0 ** (file["perceptions"][0]["unit_exponent"] + 3)
-    for at, value in zip(x[0] + place, mu, strict=True):
-        rows_there = profile.voltage[np.abs(x - at) <= 1.000001 * tick]
-        volts = np.concatenate([rows_there, profile(np.array([at - tick, at + tick]))])
-        lowest = 0.0 if volts.min() <= 0.0 <= volts.max() else np.abs(volts).min()
-        share = (np.array([lowest, np.abs(volts).max()]) / 300.0) ** 2
-        assert 0.2 + 0.7 * share[0] - 1e-6 <= value <= 0.2 + 0.7 * share[1] + 1e-6
-
-
-def test_ticks_are_the_finest_that_fit():
-    assert hjif.ticks(10.0, 20.0) == (-6, 20_000)
-    assert hjif.ticks(10.0, 48.1) == (-5, 4810)  # 48100 micrometres a second are more than 48000
-    assert hjif.ticks(70.0, 20.0) == (-5, 2000)  # 70000 micrometres are more than 16 bits hold
-    assert hjif.ticks(10.0, 12.34567) == (-6, 12_346)
-    with pytest.raises(InputError, match=r"speed: given 0.014 mm/s over 500 mm"):
-        hjif.ticks(500.0, 0.014)
 
 
 @pytest.mark.parametrize(
@@ -526,9 +344,6 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
     assert cli.main(["signal", str(out), "--out", str(tmp_path / "back.csv")]) == 0
     back = read_signal(tmp_path / "back.csv")
     assert back.voltage.tolist() == read_signal(out).voltage.tolist()
-    hjif_file = tmp_path / "tone.hjif"
-    assert cli.main(["signal", str(source), "--out", str(hjif_file), *scale, "--friction", "0.5", "0.6"]) == 0
-    check_structure(json.loads(hjif_file.read_text()))
     assert cli.main(["signal", str(source), "--out", str(tmp_path / "a.wav"), "--full-scale", "nan"]) == 2
     assert capsys.readouterr().err == "evfem: full_scale: given nan; allowed: a voltage in V above zero\n"
     assert not (tmp_path / "a.wav").exists()
