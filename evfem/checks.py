@@ -19,7 +19,10 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     """
     if isinstance(value, bool) or not isinstance(value, Real):
         raise InputError(key, value, allowed)
-    number = float(value)
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond all floats
+        number = math.inf
     if not (math.isfinite(number) and test(number)):
         raise InputError(key, value, allowed)
     return number

@@ -7,9 +7,34 @@ from __future__ import annotations
 
 from typing import Any
 
+#: most letters of a value, and of a text, in a message
+LONGEST_VALUE, LONGEST_TEXT = 200, 500
+
 
 class EvfemError(Exception):
     """Base of every exception that evfem raises on purpose."""
+
+
+def readable(value: object) -> str:
+    """A value as it is shown to the user: on one line, cut to a readable length.
+
+    >>> readable("two\\nlines"), len(readable([1.0] * 1000))
+    ("'two\\\\nlines'", 200)
+    """
+    try:
+        return _cut(repr(value), LONGEST_VALUE)
+    except (ValueError, RecursionError):  # an integer of too many digits, lists in lists
+        return f"{type(value).__name__} too large to show"
+
+
+def _line(text: str) -> str:
+    """A text on one line, cut to a readable length."""
+    start = text[: LONGEST_TEXT + 1]
+    return _cut("".join(c if c.isprintable() else ascii(c)[1:-1] for c in start), LONGEST_TEXT)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 3] + "..."
 
 
 class InputError(EvfemError, ValueError):
@@ -22,8 +47,8 @@ class InputError(EvfemError, ValueError):
 
     def __init__(self, key: str, given: object, allowed: str) -> None:
         self.key, self.given, self.allowed = key, given, allowed
-        text = given if isinstance(given, str) else repr(given)
-        super().__init__(f"{key}: given {text}; allowed: {allowed}")
+        text = _line(given) if isinstance(given, str) else readable(given)
+        super().__init__(f"{_line(key)}: given {text}; allowed: {allowed}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, so that the error reaches another process."""

@@ -1,7 +1,8 @@
 """Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the file.
 
-Relative paths in a file are relative to the file. Beyond what files written by hand need, `dump` uses three
-keys so that a file stands alone: `points` of a profile, `voltage_profile` and `gap_eps_r`.
+Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps, csv files of
+64 MB and one million rows, meshes of 128 MB (`evfem.meshparts`). Beyond what files written by hand need,
+`dump` uses three keys so that a file stands alone: `points` of a profile, `voltage_profile`, `gap_eps_r`.
 """
 
 from __future__ import annotations
@@ -14,10 +15,12 @@ from typing import Any
 
 import tomli_w
 
+from evfem.checks import MOST_STEPS
 from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import InputError, StorageError
 from evfem.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.materials import LAWS, from_table
+from evfem.meshparts import LARGEST
 from evfem.scene import COUPLINGS, DIRECTIONS, Motion, Output, Scene, Solver, VoltageRamp
 from evfem.scenekeys import (
     MOTIONS,
@@ -39,6 +42,7 @@ from evfem.signals import FollowForce, VoltageProfile
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
 
 VERSION = 1
+#: largest files in bytes, and most steps of all motions together
 LARGEST_SCENE = 4 * 2**20
 LARGEST_TABLE = 64 * 2**20
 FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
@@ -79,6 +83,8 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     table = top.electrostatics
     electrostatics = None if table is None else parse(ElectrostaticsTable, table, "electrostatics")
     motion = [_motion(table, f"motion[{i}]") for i, table in enumerate(top.motion)]
+    if (total := sum(one.steps for one in motion)) > MOST_STEPS:
+        raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
     law, voltage = _law_and_voltage(electrostatics, motion, folder)
     return Scene(
         finger=_finger(top.finger, folder),
@@ -104,8 +110,10 @@ def _build(cls: type, table: Table, prefix: str) -> Any:
 def _check_size(key: str, path: Path, most: int) -> None:
     try:
         size = path.stat().st_size
-    except OSError as error:
-        raise InputError(key, f"{path} ({error.strerror})", "a file that exists and can be read") from error
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
+        reason = getattr(error, "strerror", None) or "no path"
+        given = f"{shown(str(path))} ({reason})"
+        raise InputError(key, given, "a file that exists and can be read") from error
     if not path.is_file():
         raise InputError(key, f"{path}, which is no file", "a file")
     if size > most:
@@ -208,7 +216,7 @@ def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) 
         raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")
     parsed = parse(MeshTable, table, "finger")
     path = folder / parsed.mesh
-    _check_size("finger.mesh", path, 64 * LARGEST_TABLE)
+    _check_size("finger.mesh", path, LARGEST)
     with at("finger"):
         materials = _materials(parsed.materials)
         return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)

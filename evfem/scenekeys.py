@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic import Field as Key
 
-from evfem.errors import InputError
+from evfem.errors import InputError, readable
 from evfem.scene import (
     CONTACTS,
     COUPLINGS,
@@ -214,7 +214,7 @@ def _join(prefix: str, name: str) -> str:
 
 def shown(value: object) -> str:
     """A value as it stands in the file, cut to a readable length."""
-    text = str(value).lower() if isinstance(value, bool) else repr(value)
+    text = str(value).lower() if isinstance(value, bool) else readable(value)
     return text if len(text) <= 80 else text[:77] + "..."
 
 

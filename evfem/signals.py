@@ -13,12 +13,14 @@ import numpy as np
 
 from evfem.errors import InputError
 from evfem.storage import write_text
-from evfem.tables import numbers, piecewise_linear, read_columns
+from evfem.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
 from evfem.values import Values, above, plain
 
 #: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
 APPLIED_TO_EFFECTIVE = 2.0
 HEADER = ["position", "voltage"]
+#: largest magnitude of a position (mm) and of a voltage (V)
+LARGEST = 1e6
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,12 @@ class VoltageProfile:
         if position.size == 0 or position.size != voltage.size:
             sizes = f"{position.size} positions and {voltage.size} voltages"
             raise InputError("voltage profile", sizes, "equally many positions and voltages, at least one")
+        if position.size > MOST_ROWS:
+            raise InputError("position", f"{position.size} rows", f"at most {MOST_ROWS} rows")
+        for key, values, unit in (("position", position, "mm"), ("voltage", voltage, "V")):
+            if np.abs(values).max() > LARGEST:
+                given = f"{values[np.argmax(np.abs(values))]:g}"
+                raise InputError(key, given, f"numbers within {LARGEST:g} {unit}")
         falls = np.flatnonzero(np.diff(position) < 0)
         if falls.size:
             row = int(falls[0])

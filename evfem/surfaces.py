@@ -27,7 +27,18 @@ from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
 
-FRICTION = "a number of at least 0, or a table [[x, mu], ...] with mu >= 0 and x not decreasing"
+FRICTION = (
+    "a number from 0 to 100, or a table [[x, mu], ...] with mu from 0 to 100 and x not decreasing, "
+    "within 1e6 mm, in at most 10000 rows"
+)
+TERMS = (
+    "a list of at most 1000 rows [amplitude, wavenumber, phase], amplitudes within 1e3 mm, wavenumbers and "
+    "phases within 1e6"
+)
+#: what a surface may be at most: rows of a table, sines of a sum, samples of a profile; positions (mm),
+#: heights and amplitudes (mm), wavenumbers (rad/mm), coefficients of friction; how near samples may be (mm)
+MOST_ROWS, MOST_TERMS, MOST_SAMPLES = 10_000, 1_000, 1_000_000
+FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 #: Equation (25) of the paper, 0.025 (sin 6x + cos 12x - 1) in mm, as rows amplitude, wavenumber, phase.
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
 
@@ -43,7 +54,8 @@ class _Surface:
     def _check_common(self) -> None:
         put(self, friction=_friction(self.friction))
         if self.y is not None:
-            put(self, y=real("surface.y", self.y, "a height in mm, or None for first touch at the start"))
+            allowed = "a height within 1e3 mm, or None for first touch at the start"
+            put(self, y=real("surface.y", self.y, allowed, lambda y: abs(y) <= HIGHEST))
         if not (self.insulator is None or isinstance(self.insulator, Layer)):
             raise InputError("surface.insulator", self.insulator, "Layer(thickness, eps_r), or None")
 
@@ -172,7 +184,10 @@ class Sinusoid(_Surface):
     def __post_init__(self) -> None:
         self._check_common()
         terms = EQUATION_25 if self.terms is None else self.terms
-        put(self, terms=_rows("surface.terms", terms, 3, "a list of rows [amplitude, wavenumber, phase]"))
+        rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
+        if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
+            raise InputError("surface.terms", terms, TERMS)
+        put(self, terms=rows)
 
     def _sum(self, x: Array, order: int) -> Array:
         """Derivative of the given order: each one is a factor k and a quarter of a turn."""
@@ -271,18 +286,18 @@ class Profile(_Surface):
 def _friction(given: Any) -> float | Rows:
     """A number as float, a table as a tuple of rows."""
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
-        return real("surface.friction", given, FRICTION, lambda mu: mu >= 0.0)
-    rows = _rows("surface.friction", given, 2, FRICTION)
+        return real("surface.friction", given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
+    rows = _rows("surface.friction", given, 2, FRICTION, MOST_ROWS)
     x, mu = np.array(rows).T
-    if np.any(mu < 0.0) or np.any(np.diff(x) < 0.0):
+    if not ((mu >= 0.0) & (mu <= ROUGHEST) & (np.abs(x) <= FARTHEST)).all() or (np.diff(x) < 0.0).any():
         raise InputError("surface.friction", given, FRICTION)
     return rows
 
 
-def _rows(key: str, given: Any, columns: int, allowed: str) -> tuple[tuple[float, ...], ...]:
+def _rows(key: str, given: Any, columns: int, allowed: str, most: int) -> tuple[tuple[float, ...], ...]:
     """A table of numbers as a tuple of rows."""
     table = numbers(key, given, allowed, axes=2)
-    if table.shape[1] != columns or not len(table):
+    if table.shape[1] != columns or not 0 < len(table) <= most:
         raise InputError(key, given, allowed)
     return tuple(map(tuple, table.tolist()))
 
@@ -291,9 +306,14 @@ def _check_samples(x: Array, height: Array) -> None:
     if len(x) < 2 or len(x) != len(height):
         given = f"{len(x)} values of x, {len(height)} heights"
         raise InputError("surface.x", given, "at least two points, and as many heights as x")
-    wrong = np.flatnonzero(np.diff(x) <= 0.0)
+    if len(x) > MOST_SAMPLES:
+        raise InputError("surface.x", f"{len(x)} points", f"at most {MOST_SAMPLES} points")
+    for key, values, most in (("surface.x", x, FARTHEST), ("surface.height", height, HIGHEST)):
+        if np.abs(values).max() > most:
+            given = f"{values[np.argmax(np.abs(values))]:g}"
+            raise InputError(key, given, f"lengths in mm within {most:g} mm")
+    wrong = np.flatnonzero(np.diff(x) < NEAREST)
     if len(wrong):
         n = int(wrong[0])
-        raise InputError(
-            "surface.x", f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})", "increasing values"
-        )
+        given = f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})"
+        raise InputError("surface.x", given, f"increasing values, at least {NEAREST:g} mm apart")

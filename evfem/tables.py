@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import math
+from array import array
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,8 @@ from numpy.typing import NDArray
 from evfem.errors import InputError
 
 Floats = NDArray[np.float64]
+#: most rows of a csv file
+MOST_ROWS = 1_000_000
 
 
 def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
@@ -64,27 +68,35 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
     """Columns of a csv file whose first line is `header` and whose other lines hold one number per column.
 
-    Raises `InputError` with `key` for a file that cannot be read or has anything else in it.
+    Raises `InputError` with `key` for a file that cannot be read or has anything else in it, or more than
+    `MOST_ROWS` rows.
     """
     allowed = f"a readable csv file with the header {','.join(header)}"
+    columns = [array("d") for _ in header]
     try:
         with path.open(newline="", encoding="utf-8-sig") as lines:
-            rows = [(n, [cell.strip() for cell in row]) for n, row in enumerate(csv.reader(lines), 1) if row]
+            rows = ((n, [cell.strip() for cell in row]) for n, row in enumerate(csv.reader(lines), 1) if row)
+            _, first = next(rows, (0, []))
+            if first != header:
+                raise InputError(key, f"{path}, which starts with {','.join(first)[:60]!r}", allowed)
+            for number, cells in rows:
+                row = _row(cells, f"{path}, line {number}", len(header), key)
+                if len(columns[0]) == MOST_ROWS:
+                    raise InputError(key, f"{path} with more rows", f"at most {MOST_ROWS} rows")
+                for column, value in zip(columns, row, strict=True):
+                    column.append(value)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(key, f"{path} ({reason})", allowed) from None
-    if not rows or rows[0][1] != header:
-        start = ",".join(rows[0][1])[:60] if rows else ""
-        raise InputError(key, f"{path}, which starts with {start!r}", allowed)
-    table = [_row(row, f"{path}, line {number}", len(header), key) for number, row in rows[1:]]
-    return [np.array([row[i] for row in table], dtype=float) for i in range(len(header))]
+    return [np.array(column) for column in columns]
 
 
 def _row(cells: list[str], place: str, columns: int, key: str) -> list[float]:
     try:
-        row = [float(cell) for cell in cells]
+        row = [float(cell) for cell in cells] if len(cells) == columns else []
     except ValueError:
         row = []
-    if len(row) != columns or not np.isfinite(row).all():
-        raise InputError(key, f"{place}: {','.join(cells)}", f"{columns} finite numbers on each line")
+    if not row or not all(map(math.isfinite, row)):
+        given = ",".join(cells)[:60]
+        raise InputError(key, f"{place}: {given!r}", f"{columns} finite numbers on each line")
     return row
