@@ -21,6 +21,7 @@ NAMES = (
     "fig11",
     "fig12",
     "fig13",
+    "stability",
     "peers",
 )
 
