@@ -22,23 +22,19 @@ from evfem.mesh import Floats, Ints, Mesh
 from evfem.pad import make_pad
 from evfem.surfaces import Flat
 
+from .peers_apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
 from .peers_problem import (
     FRICTION,
     LAYERS,
     MATERIALS,
     PLANE,
-    SMALLEST_FORCE,
     TOLERANCE,
     VOLTAGE,
     path,
     scene_mesh,
 )
 
-#: N/mm per mm of penetration or elastic slip, and node
-PENALTY = 1000.0
 POSITIVE, GENERAL = 2, 11  # kinds of matrix in PARDISO: symmetric positive definite, unsymmetric
-MOST_ITERATIONS = 40
-ROUNDING = 1e-9  # a node this close to sliding goes on sliding
 
 
 @dataclass
@@ -60,49 +56,27 @@ class LinearSolver:
 
 
 class Plane:
-    """The rigid plane under a set of nodes, as an item of FElupe's Newton method.
-
-    An open node remembers where it was at the end of the last converged step, a touching one where its
-    tangential spring is relaxed.
-    """
+    """The rigid plane under a set of nodes, as an item of FElupe's Newton method."""
 
     def __init__(self, field: Any, nodes: Ints, friction: float) -> None:
-        self.field, self.nodes, self.friction = field, nodes, friction
+        self.field, self.nodes = field, nodes
         self.start = field[0].region.mesh.points[nodes]
         self.shape = field[0].values.shape
-        self.sliding = np.zeros(len(nodes))
+        self.state = PenaltyContact(self.start[:, 0], PLANE, friction)
         self.results = fem.mechanics.Results()
-        self.relaxed = self.reference = self.start[:, 0]
         self.assemble = fem.mechanics.Assemble(vector=self.vector, matrix=self.matrix)
 
     def vector(self, field: Any, **_: Any) -> Any:
-        """What the plane adds to the residual.
-
-        A node that slid one way in the last iteration does not slide the other way in this one: it sticks
-        first, beyond the limit if need be. Plain return mapping would jump between both for ever.
-        """
-        x, y = (self.start + field[0].values[self.nodes]).T
-        self.pressed = PENALTY * np.maximum(PLANE - y, 0.0)
-        trial, limit = PENALTY * (x - self.reference), self.friction * self.pressed
-        direction = np.sign(trial) * (np.abs(trial) > limit * (1.0 - ROUNDING))
-        self.turning = direction * self.sliding < 0.0
-        self.sliding = np.where(self.turning, 0.0, direction) * (limit > 0.0)
-        sticks = (self.sliding == 0.0) & (limit > 0.0)
-        self.dragged = np.where(sticks, trial, self.sliding * limit)
-        self.relaxed = x - self.dragged / PENALTY
+        """What the plane adds to the residual."""
+        self.state.update(*(self.start + field[0].values[self.nodes]).T)
         residual = np.zeros(self.shape)
-        residual[self.nodes] = np.column_stack([self.dragged, -self.pressed])
+        residual[self.nodes] = np.column_stack([self.state.dragged, -self.state.pressed])
         return sparse.csr_matrix(residual.reshape(-1, 1))
-
-    def keep(self) -> None:
-        """Remember the converged state of friction."""
-        self.reference = self.relaxed
 
     def matrix(self, **_: Any) -> Any:
         """The derivative of what `vector` computed last."""
-        touching = PENALTY * (self.pressed > 0.0)
-        along = np.where(self.sliding != 0.0, 0.0, touching) * (self.friction > 0.0)
-        across = -self.friction * self.sliding * touching
+        touching, along = PENALTY * self.state.touching, PENALTY * self.state.sticking
+        across = -self.state.friction * self.state.sliding * touching
         x, y = 2 * self.nodes, 2 * self.nodes + 1
         rows, columns = np.concatenate([x, x, y]), np.concatenate([x, y, y])
         size = int(np.prod(self.shape))
@@ -163,7 +137,7 @@ class Peer:
     def forces(self) -> list[float]:
         """Normal, tangential and electrostatic force in N/mm."""
         pull = -self.pull.forces[:, 1].sum() if self.pull else 0.0
-        return [float(self.contact.pressed.sum()), float(self.contact.dragged.sum()), float(pull)]
+        return [*self.contact.state.forces, float(pull)]
 
     def step(self, position: float, indentation: float) -> int:
         """Move the bone and find the equilibrium; the number of iterations."""
@@ -181,7 +155,7 @@ class Peer:
             maxiter=MOST_ITERATIONS,
             verbose=0,
         )
-        self.contact.keep()
+        self.contact.state.keep()
         return int(result.iterations)
 
     def check(self, dx: Floats, f: Floats, ftol: float, **_: Any) -> tuple[float, float, bool]:
@@ -193,7 +167,7 @@ class Peer:
         return (
             float(np.linalg.norm(dx)),
             float(residual),
-            bool(residual <= ftol and not self.contact.turning.any()),
+            bool(residual <= ftol and not self.contact.state.turning.any()),
         )
 
 

@@ -50,7 +50,9 @@ class Peer:
         test, trial = ufl.TestFunction(vectors), ufl.TrialFunction(vectors)
         points = 2 * self.problem.order - 1
         rule = {"quadrature_rule": "GLL", "quadrature_degree": points}
-        ds = ufl.Measure("ds", self.mesh, subdomain_data=pad_facets(self.mesh, self.problem), metadata=rule)(1)
+        ds = ufl.Measure("ds", self.mesh, subdomain_data=pad_facets(self.mesh, self.problem), metadata=rule)(
+            1
+        )
         start = cpu_seconds()
         share = fem.form(ufl.TestFunction(scalars) * ds, jit_params=COMPILER)
         residual = self._solid(test) + self._touch(test, ds)
@@ -70,7 +72,9 @@ class Peer:
         F = ufl.Identity(2) + ufl.grad(self.u)
         cofactor = ufl.inv(F).T
         P = mu * (F - cofactor) + lmbda * ufl.ln(ufl.det(F)) * cofactor
-        return ufl.inner(P, ufl.grad(test)) * ufl.dx(metadata={"quadrature_degree": 2 * self.problem.order + 1})
+        return ufl.inner(P, ufl.grad(test)) * ufl.dx(
+            metadata={"quadrature_degree": 2 * self.problem.order + 1}
+        )
 
     def _touch(self, test: Any, ds: Any) -> Any:
         place = ufl.SpatialCoordinate(self.mesh) + self.u

@@ -79,7 +79,9 @@ class Peer:
         nodal = f"IM_GAUSSLOBATTO1D({2 * self.problem.order - 1})"
         self.outline = gf.MeshIm(self.mesh, gf.Integ(f"IM_PRODUCT({nodal},{nodal})"))
         self.pad = self.dof[self.problem.free_pad]
-        share = gf.asm_generic(self.outline, 1, "Test_s", PAD, "s", True, self.scalars, np.zeros(len(self.dof)))
+        share = gf.asm_generic(
+            self.outline, 1, "Test_s", PAD, "s", True, self.scalars, np.zeros(len(self.dof))
+        )
         self.stiffness = np.zeros(len(self.dof))
         self.stiffness[self.pad] = PENALTY / np.ravel(share)[self.pad]
         for name in ("stiffness", "sticking", "sliding", "reference"):
@@ -91,7 +93,9 @@ class Peer:
             self.model.add_nonlinear_term(self.outline, FRICTION, PAD, 0, 0)
 
     def _add_pull(self) -> None:
-        for name, value in zip(("pull", "near", "far"), (self.problem.pull, *self.problem.layers), strict=True):
+        for name, value in zip(
+            ("pull", "near", "far"), (self.problem.pull, *self.problem.layers), strict=True
+        ):
             self.model.add_initialized_data(name, value)
         self.model.add_nonlinear_term(self.outline, f"{PULL}*Test_u(2)", PAD, 0, 0)
 
@@ -106,7 +110,7 @@ class Peer:
                 self.model.set_variable(name, values)
 
     def residual(self) -> float:
-        """The largest free residual over the largest force on the bone, which the plane and the field balance.
+        """The largest free residual over the largest force on the bone, which plane and field balance.
 
         GetFEM has assembled it at the current displacement; where there is friction, its state has changed.
         """
@@ -123,7 +127,9 @@ class Peer:
         self.model.set_variable("moved", [position, -indentation])
         self.update_friction()
         for iteration in range(1, MOST_ITERATIONS + 1):
-            self.model.solve("max_iter", 1, "max_res", 1e-300, "lsearch", "simplest", "alpha max ratio", 1e300)
+            self.model.solve(
+                "max_iter", 1, "max_res", 1e-300, "lsearch", "simplest", "alpha max ratio", 1e300
+            )
             error = self.residual()
             if error <= self.problem.tolerance and not self.contact.turning.any():
                 self.contact.keep()

@@ -27,7 +27,6 @@ VOLTAGE = {"A": 0.0, "B": 0.0, "C": 1000.0}
 STRATUM_CORNEUM, INSULATOR = Layer(0.38, 1650.0), Layer(0.09, 3.35)
 LAYERS = Layers.of(STRATUM_CORNEUM, INSULATOR)
 TOLERANCE = 1e-8  # largest free residual over the largest force on the bone
-SMALLEST_FORCE = 1e-6  # N/mm, below which forces are no measure
 
 #: what was converged with exact contact and quadratic elements of two packages that agree, N/mm
 REFERENCE: Mapping[str, Mapping[str, float]] = {

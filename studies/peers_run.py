@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 from evfem.fingerpad import Electrical, MeshedFinger
 from evfem.scene import Output, Press, Scene, Slide, Solver
 from evfem.surfaces import Display
 
+from .peers_apart import measured
 from .peers_problem import (
     FRICTION,
     INSULATOR,
@@ -74,31 +73,11 @@ def _felupe() -> Callable[[str, str, int], dict[str, Any]]:
 PACKAGES = {"evfem": _evfem, "felupe": _felupe}
 
 
-def resident_MB() -> float:
-    """The largest resident memory of this process so far.
-
-    Linux's own mark of the process where there is one: `ru_maxrss` starts at the mark of the parent.
-    """
-    status = Path("/proc/self/status")
-    if status.exists():
-        for line in status.read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return float(line.split()[1]) / 1024.0
-    import resource
-
-    unit = 1024.0**2 if sys.platform == "darwin" else 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def measured(package: str, element: str, scene: str, level: int) -> dict[str, Any]:
-    """Run and measure."""
+def run(package: str, element: str, scene: str, level: int) -> dict[str, Any]:
+    """Import what is needed, then run and measure."""
     solve = PACKAGES[package]()
-    imported = resident_MB()
-    wall, cpu = time.perf_counter(), time.process_time()
-    found = solve(scene, element, level)
-    found |= {"cpu_s": time.process_time() - cpu, "wall_s": time.perf_counter() - wall}
-    return found | {"imported_MB": imported, "peak_MB": resident_MB()}
+    return measured(lambda: solve(scene, element, level))
 
 
 if __name__ == "__main__":
-    print(json.dumps(measured(*sys.argv[1:4], int(sys.argv[4]))))
+    print(json.dumps(run(*sys.argv[1:4], int(sys.argv[4]))))

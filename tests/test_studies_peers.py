@@ -1,26 +1,24 @@
-"""evfem beside FElupe: the quick comparison with and without the peer, and how runs become numbers."""
+"""evfem beside its peers: the quick comparison with and without them, and how runs become numbers."""
 
+import ast
 import importlib
 import importlib.util
 import json
+import os
+import sys
 import types
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-peers, problem, run_module = (
-    importlib.import_module(f"{studies.__name__}.{name}") for name in ("peers", "peers_problem", "peers_run")
+peers, numbers, hosts, shown, problem, apart = (
+    importlib.import_module(f"{studies.__name__}.{name}")
+    for name in ("peers", "peers_numbers", "peers_hosts", "peers_shown", "peers_problem", "peers_apart")
 )
-INSTALLED = not peers.missing()
+PRESENT = [name for name in numbers.PEERS if hosts.host(name)]
 FORCES = ("Fn_at_0.5", "Fn_at_1.0", "Fn_at_1.5")
-
-
-def without_felupe(monkeypatch):
-    def found(name):
-        return None if name == "felupe" else importlib.util.find_spec(name)
-
-    monkeypatch.setattr(peers, "find_spec", found)
 
 
 def run(package, element, scene="A", level=0, cpu=1.0, factor=1.0):
@@ -36,23 +34,25 @@ def run(package, element, scene="A", level=0, cpu=1.0, factor=1.0):
             tangential[place] = factor * reference[f"Ft_after_{distance}"]
         normal[44] = factor * reference["Fn_after_3.0"]
     history = np.column_stack([normal, tangential, 0 * normal]).tolist()
-    cost = dict.fromkeys(peers.MEASURED, cpu) | {"iterations": 10, "factorisations": 5}
-    return peers.Run(package, element, scene, level, cost | {"history": history})
+    cost = dict.fromkeys(numbers.MEASURED, cpu) | {"iterations": 10, "factorisations": 5}
+    return numbers.Run(package, element, scene, level, cost | {"history": history})
 
 
-def test_quick_comparison_without_the_peer(monkeypatch, tmp_path, capsys):
-    without_felupe(monkeypatch)
+def test_quick_comparison_without_peers(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(hosts, "host", lambda name: sys.executable if name == "evfem" else None)
     result = studies.run("peers", quick=True, out=tmp_path)
-    assert "felupe is not installed" in capsys.readouterr().err
-    assert result["assumptions"]["missing"] == ["felupe"]
+    said = capsys.readouterr().err
+    assert "felupe is not installed (pip install evfem[peers])" in said
+    assert "getfem is not installed (apt install python3-getfem)" in said
+    assert result["assumptions"]["missing"] == list(numbers.PEERS)
     assert result["assumptions"]["failed"] == {}
-    numbers = result["numbers"]
-    assert not [key for key in numbers if "felupe" in key]
+    found = result["numbers"]
+    assert not [key for key in found if any(name in key for name in numbers.PEERS)]
     # the benchmark's own words: Q1 on L0 is 3.4 % too stiff, quadratic cells are within 0.3 %
-    assert numbers["A.L0.evfem_q1.error_percent.Fn_at_1.5"] == pytest.approx(3.4, abs=0.3)
-    assert abs(numbers["A.L0.evfem_q2p1.error_percent.Fn_at_1.5"]) < 0.3
+    assert found["A.L0.evfem_q1.error_percent.Fn_at_1.5"] == pytest.approx(3.4, abs=0.3)
+    assert abs(found["A.L0.evfem_q2p1.error_percent.Fn_at_1.5"]) < 0.3
     # 15 steps of an exact contact
-    assert 15 <= numbers["A.L0.evfem_q1.iterations"] <= 120
+    assert 15 <= found["A.L0.evfem_q1.iterations"] <= 120
     files = sorted(path.name for path in tmp_path.iterdir())
     assert files == ["peers.csv", "peers.json", "peers.md", "peers.png"]
     assert json.loads((tmp_path / "peers.json").read_text()) == json.loads(json.dumps(result))
@@ -62,48 +62,144 @@ def test_quick_comparison_without_the_peer(monkeypatch, tmp_path, capsys):
 
 def test_quick_comparison_with_what_is_installed(tmp_path):
     result = studies.run("peers", quick=True, out=tmp_path)
-    numbers, said = result["numbers"], result["assumptions"]
-    assert said["missing"] == ([] if INSTALLED else ["felupe"])
+    found, said = result["numbers"], result["assumptions"]
+    assert said["missing"] == [name for name in numbers.PEERS if name not in PRESENT]
     assert said["failed"] == {}
-    assert all(type(value) is float and np.isfinite(value) for value in numbers.values())
-    assert ("A.L0.felupe_q1.cpu_s" in numbers) == INSTALLED
-    assert len(said["table"]) == (6 if INSTALLED else 4)
-    # one mesh, one energy, exact contact and a stiff penalty: 0.54 N/mm on about 20 nodes, 1000 N/mm per mm,
-    # so that 3e-5 mm of 1.5 mm are lost, and the force grows with the power 1.9 of the indentation
-    peer = {key: numbers.get(f"A.L0.felupe_q1.{key}", numbers[f"A.L0.evfem_q1.{key}"]) for key in FORCES}
-    for key, force in peer.items():
-        assert force == pytest.approx(numbers[f"A.L0.evfem_q1.{key}"], rel=2e-4)
+    assert all(type(value) is float and np.isfinite(value) for value in found.values())
+    assert len(said["table"]) == 4 + 2 * len(PRESENT)
+    for name in PRESENT:
+        # one mesh, one energy, exact contact and a stiff penalty: 0.54 N/mm on about 20 nodes, 1000 N/mm per
+        # mm, so that 3e-5 mm of 1.5 mm are lost, and the force grows with the power 1.9 of the indentation
+        for key in FORCES:
+            own = found[f"A.L0.evfem_q1.{key}"]
+            assert found[f"A.L0.{name}_q1.{key}"] == pytest.approx(own, rel=2e-4)
+        # plain Newton on the same 15 steps; a wrong tangent needs far more
+        assert 15 <= found[f"A.L0.{name}_q1.iterations"] <= 75
+        assert abs(found[f"A.L0.{name}_q2.error_percent.Fn_at_1.5"]) < 1.0
+    # the peers solve the same discrete problem with either element
+    assert found.get("A.L0.apart_percent.q2", 0.0) < 1e-5
 
 
 @pytest.mark.parametrize("scene", ["B", "C"])
-def test_friction_and_attraction_are_the_same_problem_for_both(scene):
-    # two codes, one problem: a stiff penalty (as above) and an elastic slip of 2e-5 mm in the first 0.1 mm
-    peer = peers.run_once("felupe", "q1", scene, 0)
-    if not INSTALLED:
-        assert "felupe" in peer["failed"]
-        return
-    theirs, own = (
-        problem.quantities(scene, found["history"])
-        for found in (peer, peers.run_once("evfem", "q1", scene, 0))
-    )
-    assert theirs == pytest.approx(own, rel=5e-4)
-    assert peer["iterations"] <= 5 * len(problem.path(scene))  # C with a wrong sign in its tangent: 81
+def test_friction_and_attraction_are_the_same_problem_for_all(scene, tmp_path):
+    # several codes, one problem: a stiff penalty (as above), an elastic slip of 2e-5 mm in the first 0.1 mm
+    own = problem.quantities(scene, hosts.run_once("evfem", "q1", scene, 0)["history"])
+    for name in numbers.PEERS:
+        peer = hosts.run_once(name, "q1", scene, 0, tmp_path)
+        if name not in PRESENT:
+            assert f"{name} is not installed" in peer["failed"]
+            continue
+        assert problem.quantities(scene, peer["history"]) == pytest.approx(own, rel=5e-4)
+        assert peer["iterations"] <= 5 * len(problem.path(scene))  # C with a wrong sign in its tangent: 81
+
+
+def imports(path):
+    """Top-level names of what a file imports."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "a script has no package"
+            yield node.module.split(".")[0]
+        elif isinstance(node, ast.Import):
+            yield from (alias.name.split(".")[0] for alias in node.names)
+
+
+@pytest.mark.parametrize("name", ["apart", "fenicsx", "getfem"])
+def test_a_script_needs_its_package_and_numpy_only(name):
+    allowed = {"fenicsx": {"dolfinx", "ufl", "petsc4py", "mpi4py"}, "getfem": {"getfem"}}.get(name, set())
+    found = set(imports(Path(hosts.__file__).with_name(f"peers_{name}.py")))
+    assert found - set(sys.stdlib_module_names) <= allowed | {"numpy", "peers_apart"}
+
+
+def test_the_first_interpreter_that_has_a_package_is_its_host(monkeypatch, tmp_path):
+    # a stand-in that says it has everything; only packages with a script of their own may live elsewhere
+    other = tmp_path / "python3"
+    other.write_text("#!/bin/sh\nexit 0\n")
+    other.chmod(0o755)
+    monkeypatch.setattr(hosts, "SYSTEM", str(tmp_path / "none"))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert list(hosts.interpreters()) == [sys.executable, str(other)]
+    packages = {
+        "here": hosts.Package(("json",), "", "x.py"),
+        "there": hosts.Package(("no_such_module",), "", "x.py"),
+        "nowhere": hosts.Package(("no_such_module",), ""),
+    }
+    monkeypatch.setattr(hosts, "PACKAGES", packages)
+    found = [hosts.host.__wrapped__(name) for name in packages]
+    assert found == [sys.executable, str(other), None]
+    assert hosts.environment(str(other))["PYTHONPATH"] == ""
+    assert hosts.environment(sys.executable)["PYTHONPATH"].split(os.pathsep)[-1] in sys.path
+
+
+def test_the_problem_as_a_file(tmp_path):
+    problem.write(tmp_path / "c.npz", "C", "q2", 0)
+    read = apart.read(str(tmp_path / "c.npz"))
+    assert read.order == 2
+    assert read.points.shape == (793, 2)
+    assert read.cells.shape == (180, 9)
+    # E / (2 (1 + nu)) and E nu / ((1 + nu) (1 - 2 nu)) of tissue and skin; ten of twelve layers are tissue
+    assert np.unique(read.mu) == pytest.approx([0.05 / 2.96, 1.0 / 2.6])
+    assert np.unique(read.lmbda) == pytest.approx([0.05 * 0.48 / (1.48 * 0.04), 0.3 / (1.3 * 0.4)])
+    assert np.sum(read.mu < 0.1) == 150
+    assert len(read.free_pad) == 59
+    # both lengths of Kaczmarek's law by hand, and eps_0 U^2 / 2
+    assert read.layers == pytest.approx([0.38 / 1650 + 0.09 / 3.35, 0.47])
+    assert read.pull == pytest.approx(8.854e-12 * 1e6 / 2, rel=1e-4)
+
+
+def test_penalty_contact_by_hand():
+    # two nodes at the plane y = 0, 1000 N/mm per mm, friction 0.3: pressed 1e-3 mm deep and moved sideways
+    contact = apart.PenaltyContact(np.zeros(2), 0.0, 0.3)
+    contact.update(np.array([1e-4, 1e-4]), np.array([-1e-3, 1e-3]))
+    assert contact.forces == pytest.approx((1.0, 0.1))  # the first sticks, the second is open
+    assert contact.sticking.tolist() == [True, False]
+    contact.update(np.array([5e-4, 0.0]), np.array([-1e-3, 1e-3]))
+    assert contact.forces == pytest.approx((1.0, 0.3))
+    assert contact.sliding.tolist() == [1.0, 0.0]
+    contact.keep()
+    assert contact.reference == pytest.approx([2e-4, 0.0])  # an open node's spring starts where it is
+    # back beyond the limit: it sticks first, and the state says that it is not final
+    contact.update(np.array([-5e-4, 0.0]), np.array([-1e-3, 1e-3]))
+    assert contact.forces == pytest.approx((1.0, -0.7))
+    assert contact.turning.tolist() == [True, False]
+    contact.update(np.array([-5e-4, 0.0]), np.array([-1e-3, 1e-3]))
+    assert contact.forces == pytest.approx((1.0, -0.3))
+    assert not contact.turning.any()
 
 
 def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
-    def run_once(package, element, scene, level):
+    def run_once(package, element, scene, level, compiled):
         if element == "q2":
             return {"failed": "NewtonConvergenceError: no"}
         return dict(run(package, element, scene, level).measured)
 
     monkeypatch.setattr(peers, "run_once", run_once)
-    runs, failed = peers.compete({0: ("A", 2)}, peers.CONTENDERS)
+    who = [one for one in numbers.CONTENDERS if one[0] in ("evfem", "felupe")]
+    runs, failed = peers.compete({0: ("A", 2)}, who)
     assert failed == {"A.L0.felupe_q2": "NewtonConvergenceError: no"}
     assert [one.key for one in runs] == ["A.L0.evfem_q1", "A.L0.felupe_q1", "A.L0.evfem_q2p1"]
+    line = "| A | L0 | felupe | q2 | not done: NewtonConvergenceError: no | - | - | - | - | - |"
+    assert shown.table(runs, failed)[-1] == line
+
+
+def test_warm_up_goes_on_until_nothing_is_compiled(monkeypatch):
+    order, seconds = [], iter([2.0, 0.5, 0.01, 1.0, 0.01])
+
+    def run_once(package, element, scene, level, compiled):
+        order.append((package, scene))
+        forms = {"form_cpu_s": next(seconds)} if package == "fenicsx" else {}
+        return dict(run(package, element).measured) | forms
+
+    monkeypatch.setattr(peers, "run_once", run_once)
+    cold = peers.warm_up("BA", 0, [("evfem", "q1"), ("fenicsx", "q1")], Path("unused"))
+    assert order == [("evfem", "B"), *[("fenicsx", "B")] * 3, *[("fenicsx", "A")] * 2]
+    assert cold == {
+        "B.L0.fenicsx_q1": {"cold_cpu_s": 1.0, "form_cpu_s": 2.0},
+        "A.L0.fenicsx_q1": {"cold_cpu_s": 1.0, "form_cpu_s": 1.0},
+    }
 
 
 def test_the_last_words_of_a_process_that_fails():
-    assert "element" in peers.run_once("evfem", "q7", "A", 0)["failed"]
+    assert "element" in hosts.run_once("evfem", "q7", "A", 0)["failed"]
 
 
 def test_packages_take_turns_and_the_fastest_round_counts(monkeypatch):
@@ -111,10 +207,10 @@ def test_packages_take_turns_and_the_fastest_round_counts(monkeypatch):
 
     def run_once(*who):
         order.append(who[0])
-        return dict(run(*who).measured) | {"cpu_s": next(seconds)}
+        return dict(run(*who[:4]).measured) | {"cpu_s": next(seconds)}
 
     monkeypatch.setattr(peers, "run_once", run_once)
-    runs, _ = peers.compete({0: ("A", 3)}, peers.CONTENDERS[:2])
+    runs, _ = peers.compete({0: ("A", 3)}, numbers.CONTENDERS[:2])
     assert order == ["evfem", "felupe"] * 3
     assert [(one.measured["cpu_s"], one.measured["slowest_cpu_s"]) for one in runs] == [
         (2.0, 4.0),
@@ -126,19 +222,25 @@ def test_errors_and_ratios_by_hand():
     runs = [
         run("evfem", "q1", cpu=2.0, factor=1.02),
         run("felupe", "q1", cpu=10.0, factor=1.02),
+        run("getfem", "q1", cpu=8.0, factor=1.03),
         run("evfem", "q2p1", cpu=4.0, factor=1.002),
         run("felupe", "q2", cpu=30.0, factor=0.998),
     ]
-    numbers = peers.numbers(runs)
-    assert numbers["A.L0.evfem_q1.error_percent.Fn_at_1.0"] == pytest.approx(2.0)
-    assert numbers["A.L0.felupe_q2.error_percent.Fn_at_0.5"] == pytest.approx(-0.2)
-    assert runs[3].error() == pytest.approx(0.2)
-    assert numbers["A.L0.felupe_over_evfem.q1.cpu_s"] == 5.0
-    assert numbers["A.L0.felupe_over_evfem.q2p1.cpu_s"] == 7.5
-    assert numbers["A.Fn_to_0.3_percent.felupe_over_evfem.cpu_s"] == 7.5
-    assert not [key for key in numbers if "to_0.1_percent" in key]  # nobody is that good
-    names = [one.name for one in peers.series(runs)]
-    assert names == ["A evfem q1", "A felupe q1", "A evfem q2p1", "A felupe q2"]
+    found = numbers.numbers(runs, {"A.L0.fenicsx_q1": {"cold_cpu_s": 3.0}})
+    assert found["A.L0.evfem_q1.error_percent.Fn_at_1.0"] == pytest.approx(2.0)
+    assert found["A.L0.felupe_q2.error_percent.Fn_at_0.5"] == pytest.approx(-0.2)
+    assert runs[4].error() == pytest.approx(0.2)
+    assert found["A.L0.felupe_over_evfem.q1.cpu_s"] == 5.0
+    assert found["A.L0.fastest_over_evfem.q1.cpu_s"] == 4.0
+    assert found["A.L0.felupe_over_evfem.q2p1.cpu_s"] == 7.5
+    assert found["A.L0.apart_percent.q1"] == pytest.approx(100 * 0.01 / (3.07 / 3))
+    assert "A.L0.apart_percent.q2" not in found  # one package alone
+    assert found["A.L0.fenicsx_q1.cold_cpu_s"] == 3.0
+    assert found["A.Fn_to_0.3_percent.felupe_over_evfem.cpu_s"] == 7.5
+    assert found["A.Fn_to_0.3_percent.fastest_over_evfem.cpu_s"] == 7.5  # GetFEM's runs are not that good
+    assert not [key for key in found if "to_0.1_percent" in key]  # nobody is that good
+    names = [one.name for one in numbers.series(runs)]
+    assert names == ["A evfem q1", "A felupe q1", "A getfem q1", "A evfem q2p1", "A felupe q2"]
     # eleven values, of which the last is 0.1564 instead of 0.1473
     slide = run("evfem", "q1", "B").forces
     assert slide["Ft_mean_2_to_3"] == pytest.approx((10 * 0.1473 + 0.1564) / 11.0, rel=1e-12)
@@ -148,10 +250,10 @@ def test_errors_and_ratios_by_hand():
 def test_cost_of_an_error_between_levels():
     # error falls with the square of the cost: 4 % at 1 s, 0.04 % at 10 s, so 0.4 % at sqrt(10) s
     curve = [(1.0, 4.0), (10.0, 0.04)]
-    assert peers.cost_of(0.4, curve) == pytest.approx(10.0**0.5)
-    assert peers.cost_of(5.0, curve) == 1.0  # the coarsest level is better than asked for
-    assert peers.cost_of(0.01, curve) is None  # nothing is extrapolated
-    assert peers.cost_of(0.4, []) is None
+    assert numbers.cost_of(0.4, curve) == pytest.approx(10.0**0.5)
+    assert numbers.cost_of(5.0, curve) == 1.0  # the coarsest level is better than asked for
+    assert numbers.cost_of(0.01, curve) is None  # nothing is extrapolated
+    assert numbers.cost_of(0.4, []) is None
 
 
 def test_path_of_the_bone():
@@ -162,10 +264,10 @@ def test_path_of_the_bone():
 
 
 def test_memory_is_that_of_this_process():
-    before = run_module.resident_MB()
+    before = apart.resident_MB()
     block = np.ones(40_000_000)  # 320 MB
     assert block.nbytes / 2**20 > 300
-    assert run_module.resident_MB() >= max(before, 300.0)
+    assert apart.resident_MB() >= max(before, 300.0)
 
 
 def test_all_leaves_peers_out(monkeypatch, capsys):
