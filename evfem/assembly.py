@@ -27,6 +27,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -111,6 +113,17 @@ class Space:
     def size(self) -> int:
         """Number of nodes."""
         return len(self.mesh.points)
+
+    @cached_property
+    def cells(self) -> Any:
+        """The same arrays in blocks, for the compiled loops."""
+        from evfem.lanes import Cells, blocked
+
+        pointwise = np.zeros((len(self.nodes), 0, 0))
+        sample = self.gradient[:, :0] if self.sample is self.gradient else self.sample
+        projection = pointwise if self.projection is None else self.projection
+        arrays = (self.nodes, self.gradient, self.weight, sample, projection)
+        return Cells(*(blocked(array) for array in arrays))
 
 
 def make_space(mesh: Mesh, element: str) -> Space:
@@ -210,7 +223,7 @@ class Tissue:
             [c for m, c in measures if m == "trace"] or [np.zeros(0, np.int64)]
         )
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.kernels = compiled_kernels() if self.mu is not None else None
+        self.kernels = compiled_kernels("kernels") if self.mu is not None else None
         self._rows: Floats | None = None
 
     # -- kinematics
@@ -222,18 +235,21 @@ class Tissue:
         ue = np.swapaxes(u[space.nodes], 1, 2)[:, None]
         F = ue @ space.gradient
         Fs = F if space.sample is space.gradient else ue @ space.sample
+        trace = Fs[..., 0, 0] + Fs[..., 1, 1]
+        # J - 1 keeps the digits that J loses where tissue is nearly incompressible
+        change = trace + (Fs[..., 0, 0] * Fs[..., 1, 1] - Fs[..., 0, 1] * Fs[..., 1, 0])
+        J = 1.0 + change
         F[..., 0, 0] += 1.0
         F[..., 1, 1] += 1.0
         if Fs is not F:
             Fs[..., 0, 0] += 1.0
             Fs[..., 1, 1] += 1.0
-        J = Fs[..., 0, 0] * Fs[..., 1, 1] - Fs[..., 0, 1] * Fs[..., 1, 0]
         with np.errstate(invalid="ignore", divide="ignore"):
-            log_J = np.log(J)
+            log_J = np.log1p(change)
             cofactor = np.stack([Fs[..., 1, 1], -Fs[..., 1, 0], -Fs[..., 0, 1], Fs[..., 0, 0]], axis=-1)
             inverse = cofactor / J[..., None]
         small = self._small_strain
-        log_J[small] = Fs[small, :, 0, 0] + Fs[small, :, 1, 1] - 2.0
+        log_J[small] = trace[small]
         inverse[small] = np.array([1.0, 0.0, 0.0, 1.0])
         theta = log_J if space.projection is None else (space.projection @ log_J[..., None])[..., 0]
         return np.moveaxis(F, (2, 3), (0, 1)), theta, J, inverse
@@ -241,7 +257,7 @@ class Tissue:
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
         if self.kernels is not None:
-            return self.kernels.smallest_J(u, self.space.nodes, self.space.sample)
+            return self.kernels.smallest_J(u, self.space.cells)
         return float(self.kinematics(u)[2].min())
 
     # -- residual, tangent, energy
@@ -250,7 +266,7 @@ class Tissue:
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
         if self.kernels is not None:
-            return self.kernels.forces(u, self.mu, self.lmbda, *self._arrays())
+            return self.kernels.forces(u, *self._blocks)
         F, theta, _, inverse = self.kinematics(u)
         S, q = self._stress(F, theta)
         space, w = self.space, self.space.weight
@@ -268,7 +284,7 @@ class Tissue:
     def tangent(self, u: Floats) -> Floats:
         """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
         if self.kernels is not None:
-            return self.kernels.tangent(u, self.mu, self.lmbda, *self._arrays())
+            return self.kernels.tangent(u, *self._blocks, len(self.space.nodes))
         F, theta, _, inverse = self.kinematics(u)
         _, q = self._stress(F, theta)
         A, c, k = self._moduli(F, theta)
@@ -287,6 +303,8 @@ class Tissue:
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
+        if self.kernels is not None:
+            return self.kernels.energy(u, *self._blocks)
         F, theta, _, _ = self.kinematics(u)
         psi = np.empty_like(theta)
         for law, cells in self.groups:
@@ -311,10 +329,12 @@ class Tissue:
     # -- pieces
     # -------------------------------------------------------------------------------------------------------
 
-    def _arrays(self) -> tuple[Any, ...]:
-        space = self.space
-        projection = np.zeros((0, 0, 0)) if space.projection is None else space.projection
-        return space.nodes, space.gradient, space.weight, space.sample, projection
+    @cached_property
+    def _blocks(self) -> tuple[Any, ...]:
+        """What the compiled loops read: Lame moduli (B, L) and the space's cells."""
+        from evfem.lanes import blocked
+
+        return blocked(self.mu), blocked(self.lmbda), self.space.cells
 
     def _stress(self, F: Floats, theta: Floats) -> tuple[Floats, Floats]:
         S, q = np.empty_like(F), np.empty_like(theta)
@@ -383,13 +403,12 @@ def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any
     return mu, lmbda
 
 
-def compiled_kernels() -> Any:
-    """The compiled kernels of evfem[fast], or None where numba is not installed."""
+def compiled_kernels(name: str) -> Any:
+    """A module of compiled loops of evfem[fast], or None where numba is not installed."""
     try:
-        from evfem import kernels
+        return import_module(f"evfem.{name}")
     except ImportError:
         return None
-    return kernels
 
 
 def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:

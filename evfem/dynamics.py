@@ -43,7 +43,8 @@ class Dynamics:
         self.space = space
         self.viscosity = viscosity
         self.mass = None if density is None else mass_matrices(space) * density[:, None, None]
-        self.kernels = compiled_kernels()
+        self._inertia = None if self.mass is None else assembled(space, self.mass)
+        self.kernels = compiled_kernels("viscous") if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, 2))
         self._strain0: Floats = np.zeros((*space.weight.shape, 2, 2))
@@ -52,7 +53,7 @@ class Dynamics:
         """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N, 2)."""
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
-            self._strain0 = strain(self._gradient(u))
+            self._strain0 = self._strain(u)
 
     @property
     def beginning(self) -> tuple[Floats, float]:
@@ -65,7 +66,7 @@ class Dynamics:
         if self.step == 0.0:
             return total
         if self.viscosity is not None and self.kernels is not None:
-            total += self.kernels.viscous_forces(u, *self._arrays())
+            total += self.kernels.forces(u, *self._blocks())
         elif self.viscosity is not None:
             F = self._gradient(u)
             P = F @ self._stress(F) * self.space.weight[..., None, None]
@@ -74,9 +75,8 @@ class Dynamics:
                 np.einsum("eqij,eqnj->eni", P, self.space.gradient, optimize=True),
                 self.space.size,
             )
-        if self.mass is not None:
-            change = (u - self._u0) / self.step**2 - self._v0 / self.step
-            total += scatter(self.space.nodes, self.mass @ change[self.space.nodes], self.space.size)
+        if self._inertia is not None:
+            total += self._inertia @ ((u - self._u0) / self.step**2 - self._v0 / self.step)
         return total
 
     def add_tangent(self, u: Floats, cells: Floats) -> None:
@@ -85,7 +85,7 @@ class Dynamics:
             return
         E, Q, n, _ = self.space.gradient.shape
         if self.viscosity is not None and self.kernels is not None:
-            self.kernels.add_viscous_tangent(u, *self._arrays(), cells)
+            self.kernels.add_tangent(u, *self._blocks(), cells)
         elif self.viscosity is not None:
             F = self._gradient(u)
             S, rate = self._stress(F), (self.viscosity / self.step)[:, None, None, None, None, None]
@@ -111,18 +111,19 @@ class Dynamics:
         """What the viscous stress dissipates in the step, N mm per mm of depth."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
-        F = self._gradient(u)
-        S = self._stress(F)
-        return float(
-            np.einsum("eqij,eqij,eq->", S, strain(F) - self._strain0, self.space.weight, optimize=True)
-        )
+        change = self._strain(u) - self._strain0
+        if self.kernels is not None:
+            rate, cells, _ = self._blocks()
+            squares = np.einsum("bqjl,bqjl,j->bql", change, change, np.array([1.0, 1.0, 2.0]))
+            return float(np.einsum("bl,bql,bql->", 2.0 * rate, squares, cells.weight))
+        squares = np.einsum("eqij,eqij->eq", change, change)
+        return float(np.einsum("e,eq,eq->", 2.0 * self.viscosity / self.step, squares, self.space.weight))
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """Kinetic energy of nodal velocities (N, 2), N mm per mm of depth."""
-        if self.mass is None:
+        if self._inertia is None:
             return 0.0
-        v = velocity[self.space.nodes]
-        return float(0.5 * np.sum(v * (self.mass @ v)))
+        return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
 
     def _gradient(self, u: Floats) -> Floats:
         """F (E, Q, 2, 2)."""
@@ -131,10 +132,18 @@ class Dynamics:
         F[..., 1, 1] += 1.0
         return F
 
-    def _arrays(self) -> tuple[Any, ...]:
+    def _strain(self, u: Floats) -> Floats:
+        """Green strain of every point: (E, Q, 2, 2), or in blocks where the compiled loops read it."""
+        return (
+            strain(self._gradient(u)) if self.kernels is None else self.kernels.strains(u, self.space.cells)
+        )
+
+    def _blocks(self) -> tuple[Any, ...]:
+        """What the compiled loops read: viscosity over the step (B, L), cells, strains before the step."""
+        from evfem.lanes import blocked
+
         assert self.viscosity is not None
-        space = self.space
-        return self.viscosity / self.step, space.nodes, space.gradient, space.weight, self._strain0
+        return blocked(self.viscosity / self.step), self.space.cells, self._strain0
 
     def _stress(self, F: Floats) -> Floats:
         assert self.viscosity is not None
@@ -144,6 +153,15 @@ class Dynamics:
 def strain(F: Floats) -> Floats:
     """Green strain (..., 2, 2) of F (..., 2, 2)."""
     return 0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(2))
+
+
+def assembled(space: Space, matrices: Floats) -> Any:
+    """Sparse matrix (N, N) of cell matrices (E, n, n)."""
+    import scipy.sparse as sparse
+
+    n = space.nodes.shape[1]
+    rows, columns = np.repeat(space.nodes, n, axis=1).ravel(), np.tile(space.nodes, (1, n)).ravel()
+    return sparse.coo_matrix((matrices.ravel(), (rows, columns)), (space.size, space.size)).tocsr()
 
 
 def mass_matrices(space: Space) -> Floats:

@@ -1,9 +1,7 @@
-"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`, one cell
-after the other.
+"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`.
 
 psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are
-mu (per gradient component) and lmbda (for theta). Array shapes as in `evfem.assembly`; `projection` of size 0
-means theta = ln J pointwise.
+mu (per gradient component) and lmbda (for theta). Cells come in blocks (`evfem.lanes`), moduli as (B, L).
 """
 
 from __future__ import annotations
@@ -11,229 +9,257 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from evfem.mesh import Floats, Ints
-
-
-@njit(cache=True, error_model="numpy")
-def _deformation(u: Any, cell: Any, gradient: Any) -> Any:
-    """F11, F12, F21, F22 of one point from shape gradients (n, 2) of its cell's nodes (n,)."""
-    a, b, c, d = 1.0, 0.0, 0.0, 1.0
-    for k in range(cell.size):
-        gx, gy = gradient[k, 0], gradient[k, 1]
-        ux, uy = u[cell[k], 0], u[cell[k], 1]
-        a += ux * gx
-        b += ux * gy
-        c += uy * gx
-        d += uy * gy
-    return a, b, c, d
+from evfem.lanes import LANES, Cells, compiled, displacement_gradient, gather, inlined, spread, volume
+from evfem.mesh import Floats
 
 
-@njit(cache=True, error_model="numpy")
-def _jacobians(u: Any, nodes: Any, sample: Any, inverse: Any, log_J: Any) -> None:
-    """F^-T (S, 2, 2) and ln J (S,) of one cell; ln J is nan where the cell is inverted."""
-    for s in range(sample.shape[0]):
-        a, b, c, d = _deformation(u, nodes, sample[s])
-        J = a * d - b * c
-        log_J[s] = np.log(J)
-        inverse[s, 0, 0] = d / J
-        inverse[s, 0, 1] = -c / J
-        inverse[s, 1, 0] = -b / J
-        inverse[s, 1, 1] = a / J
-
-
-@njit(cache=True, error_model="numpy")
-def _volume_force(log_J: Any, mu: float, lmbda: float, weight: Any, projection: Any, force: Any) -> None:
-    """Weighted q = lmbda theta - mu, gathered at the samples of ln J: force (S,)."""
-    if projection.size == 0:
-        for s in range(log_J.size):
-            force[s] = weight[s] * (lmbda * log_J[s] - mu)
+@inlined
+def _states(ue: Any, gradient: Any, sample: Any, H: Any, inverse: Any, log_J: Any) -> None:
+    """H (Q, 4, L) at the points of a block, F^-T (S, 4, L) and ln J (S, L) at its samples."""
+    for q in range(gradient.shape[0]):
+        displacement_gradient(ue, gradient[q], H[q])
+    if sample.shape[0] == 0:
+        for s in range(gradient.shape[0]):
+            volume(H[s], inverse[s], log_J[s])
         return
-    force[:] = 0.0
-    for q in range(weight.size):
-        theta = 0.0
-        for s in range(log_J.size):
-            theta += projection[q, s] * log_J[s]
-        value = weight[q] * (lmbda * theta - mu)
-        for s in range(log_J.size):
-            force[s] += projection[q, s] * value
+    Hs = np.empty((4, LANES))
+    for s in range(sample.shape[0]):
+        displacement_gradient(ue, sample[s], Hs)
+        volume(Hs, inverse[s], log_J[s])
 
 
-@njit(cache=True, error_model="numpy")
-def forces(
-    u: Floats,
-    mu: Floats,
-    lmbda: Floats,
-    nodes: Ints,
-    gradient: Floats,
-    weight: Floats,
-    sample: Floats,
-    projection: Floats,
-) -> Floats:
+@inlined
+def _theta(log_J: Any, projection: Any, theta: Any) -> None:
+    """Volume measure at the points (Q, L) from ln J at the samples (S, L)."""
+    if projection.shape[0] == 0:
+        theta[:] = log_J
+        return
+    theta[:] = 0.0
+    for q in range(theta.shape[0]):
+        for s in range(log_J.shape[0]):
+            for i in range(LANES):
+                theta[q, i] += projection[q, s, i] * log_J[s, i]
+
+
+@inlined
+def _to_samples(values: Any, projection: Any, out: Any) -> None:
+    """Transpose of `_theta`: what acts on theta (Q, L), gathered at the samples (S, L)."""
+    if projection.shape[0] == 0:
+        out[:] = values
+        return
+    out[:] = 0.0
+    for q in range(values.shape[0]):
+        for s in range(out.shape[0]):
+            for i in range(LANES):
+                out[s, i] += projection[q, s, i] * values[q, i]
+
+
+@inlined
+def _volume_force(theta: Any, mu: Any, lmbda: Any, weight: Any) -> None:
+    """Turn theta (Q, L) into the weighted q = lmbda theta - mu."""
+    for q in range(theta.shape[0]):
+        for i in range(LANES):
+            theta[q, i] = weight[q, i] * (lmbda[i] * theta[q, i] - mu[i])
+
+
+@inlined
+def _add_forces(P: Any, gradient: Any, fe: Any) -> None:
+    """fe (n, 2, L) += P (4, L) times the shape gradients (n, 2, L) of one point."""
+    for k in range(gradient.shape[0]):
+        for i in range(LANES):
+            gx, gy = gradient[k, 0, i], gradient[k, 1, i]
+            fe[k, 0, i] += P[0, i] * gx + P[1, i] * gy
+            fe[k, 1, i] += P[2, i] * gx + P[3, i] * gy
+
+
+@inlined
+def _stresses(H: Any, mu: Any, weight: Any) -> None:
+    """Turn H (Q, 4, L) into the weighted mu F."""
+    for q in range(H.shape[0]):
+        for i in range(LANES):
+            w = weight[q, i] * mu[i]
+            H[q, 0, i] = w * (1.0 + H[q, 0, i])
+            H[q, 1, i] *= w
+            H[q, 2, i] *= w
+            H[q, 3, i] = w * (1.0 + H[q, 3, i])
+
+
+@inlined
+def _volume_states(
+    ue: Any, mu: Any, lmbda: Any, block: Any, H: Any, inverse: Any, log_J: Any, theta: Any, pull: Any
+) -> None:
+    """Everything of a block that depends on the displacements: H (Q, 4, L), F^-T (S, 4, L), and the weighted
+    volume force gathered at the samples, pull (S, L).
+    """
+    gradient, weight, sample, projection = block
+    _states(ue, gradient, sample, H, inverse, log_J)
+    _theta(log_J, projection, theta)
+    _volume_force(theta, mu, lmbda, weight)
+    _to_samples(theta, projection, pull)
+
+
+@compiled
+def forces(u: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> Floats:
     """Internal nodal forces (N, 2); nan where a cell is inverted."""
-    E, Q, n = gradient.shape[:3]
-    S = sample.shape[1]
+    nodes, gradient, weight, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    S = sample.shape[1] or Q
     out = np.zeros_like(u)
-    inverse, log_J, volume = np.empty((S, 2, 2)), np.empty(S), np.empty(S)
-    fe = np.empty((n, 2))
-    none = projection.size == 0
-    for e in range(E):
-        fe[:] = 0.0
-        cell = nodes[e]
-        _jacobians(u, cell, sample[e], inverse, log_J)
-        P = projection.reshape(0, 0) if none else projection[e]
-        _volume_force(log_J, mu[e], lmbda[e], weight[e], P, volume)
-        for q in range(Q):
-            a, b, c, d = _deformation(u, cell, gradient[e, q])
-            w = weight[e, q] * mu[e]
-            for k in range(n):
-                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
-                fe[k, 0] += w * (a * gx + b * gy)
-                fe[k, 1] += w * (c * gx + d * gy)
+    ue, fe, H = np.empty((n, 2, LANES)), np.empty((n, 2, LANES)), np.empty((Q, 4, LANES))
+    inverse, log_J = np.empty((S, 4, LANES)), np.empty((S, LANES))
+    theta, pull = np.empty((Q, LANES)), np.empty((S, LANES))
+    for b in range(B):
+        gather(u, nodes[b], ue)
+        block = (gradient[b], weight[b], sample[b], projection[b])
+        _volume_states(ue, mu[b], lmbda[b], block, H, inverse, log_J, theta, pull)
+        _stresses(H, mu[b], weight[b])
         for s in range(S):
-            for k in range(n):
-                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
-                fe[k, 0] += volume[s] * (inverse[s, 0, 0] * gx + inverse[s, 0, 1] * gy)
-                fe[k, 1] += volume[s] * (inverse[s, 1, 0] * gx + inverse[s, 1, 1] * gy)
-        for k in range(n):
-            out[cell[k], 0] += fe[k, 0]
-            out[cell[k], 1] += fe[k, 1]
+            for j in range(4):
+                for i in range(LANES):
+                    inverse[s, j, i] *= pull[s, i]
+        fe[:] = 0.0
+        if sample.shape[1] == 0:
+            H += inverse
+        for s in range(sample.shape[1]):
+            _add_forces(inverse[s], sample[b, s], fe)
+        for q in range(Q):
+            _add_forces(H[q], gradient[b, q], fe)
+        spread(fe, nodes[b], out)
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def tangent(
-    u: Floats,
-    mu: Floats,
-    lmbda: Floats,
-    nodes: Ints,
-    gradient: Floats,
-    weight: Floats,
-    sample: Floats,
-    projection: Floats,
-) -> Floats:
-    """Cell tangents (E, 2 n, 2 n)."""
-    E, Q, n = gradient.shape[:3]
-    S = sample.shape[1]
-    out = np.zeros((E, 2 * n, 2 * n))
-    inverse, log_J, volume = np.empty((S, 2, 2)), np.empty(S), np.empty(S)
-    push = np.empty((S, n, 2))
-    rows = np.empty((Q, 2 * n))
-    none = projection.size == 0
-    for e in range(E):
-        K = out[e]
-        _jacobians(u, nodes[e], sample[e], inverse, log_J)
-        P = projection.reshape(0, 0) if none else projection[e]
-        _volume_force(log_J, mu[e], lmbda[e], weight[e], P, volume)
-        for s in range(S):
-            for k in range(n):
-                gx, gy = sample[e, s, k, 0], sample[e, s, k, 1]
-                push[s, k, 0] = inverse[s, 0, 0] * gx + inverse[s, 0, 1] * gy
-                push[s, k, 1] = inverse[s, 1, 0] * gx + inverse[s, 1, 1] * gy
+@inlined
+def _pushed(inverse: Any, sample: Any, push: Any) -> None:
+    """F^-T times the shape gradients (S, n, 2, L): the change of ln J by nodal displacements (S, n, 2, L)."""
+    for s in range(sample.shape[0]):
+        for k in range(sample.shape[1]):
+            for i in range(LANES):
+                gx, gy = sample[s, k, 0, i], sample[s, k, 1, i]
+                push[s, k, 0, i] = inverse[s, 0, i] * gx + inverse[s, 1, i] * gy
+                push[s, k, 1, i] = inverse[s, 2, i] * gx + inverse[s, 3, i] * gy
+
+
+@inlined
+def _theta_rows(push: Any, projection: Any, rows: Any) -> None:
+    """Change of theta by nodal displacements (Q, n, 2, L)."""
+    if projection.shape[0] == 0:
+        rows[:] = push
+        return
+    rows[:] = 0.0
+    for q in range(rows.shape[0]):
+        for s in range(push.shape[0]):
+            for k in range(rows.shape[1]):
+                for i in range(LANES):
+                    rows[q, k, 0, i] += projection[q, s, i] * push[s, k, 0, i]
+                    rows[q, k, 1, i] += projection[q, s, i] * push[s, k, 1, i]
+
+
+@inlined
+def _pair(k: int, m: int, stiff: Any, rows: Any, pull: Any, push: Any, K: Any) -> None:
+    """Stiffness (4, L) between nodes k and m of what acts through theta: its modulus `stiff` (Q, L), and the
+    curvature of ln J.
+    """
+    K[:] = 0.0
+    for q in range(rows.shape[0]):
+        for i in range(LANES):
+            x, y = stiff[q, i] * rows[q, k, 0, i], stiff[q, i] * rows[q, k, 1, i]
+            K[0, i] += x * rows[q, m, 0, i]
+            K[1, i] += x * rows[q, m, 1, i]
+            K[2, i] += y * rows[q, m, 0, i]
+            K[3, i] += y * rows[q, m, 1, i]
+    for s in range(push.shape[0]):
+        for i in range(LANES):
+            x, y = pull[s, i] * push[s, m, 0, i], pull[s, i] * push[s, m, 1, i]
+            K[0, i] -= x * push[s, k, 0, i]
+            K[1, i] -= x * push[s, k, 1, i]
+            K[2, i] -= y * push[s, k, 0, i]
+            K[3, i] -= y * push[s, k, 1, i]
+
+
+@inlined
+def _shear(k: int, m: int, gradient: Any, weight: Any, mu: Any, K: Any) -> None:
+    """Add mu grad(k) . grad(m) to the diagonal of K (4, L)."""
+    for q in range(gradient.shape[0]):
+        for i in range(LANES):
+            value = gradient[q, k, 0, i] * gradient[q, m, 0, i] + gradient[q, k, 1, i] * gradient[q, m, 1, i]
+            value *= weight[q, i] * mu[i]
+            K[0, i] += value
+            K[3, i] += value
+
+
+@inlined
+def _store(K: Any, k: int, m: int, first: int, out: Any) -> None:
+    """Write the stiffness (4, L) of nodes k and m and its transpose into the matrices of a block's cells."""
+    for i in range(min(LANES, out.shape[0] - first)):
+        cell = out[first + i]
+        cell[2 * k, 2 * m] = cell[2 * m, 2 * k] = K[0, i]
+        cell[2 * k, 2 * m + 1] = cell[2 * m + 1, 2 * k] = K[1, i]
+        cell[2 * k + 1, 2 * m] = cell[2 * m, 2 * k + 1] = K[2, i]
+        cell[2 * k + 1, 2 * m + 1] = cell[2 * m + 1, 2 * k + 1] = K[3, i]
+
+
+@compiled
+def tangent(u: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> Floats:
+    """Cell tangents (E, 2 n, 2 n) of E = `count` cells."""
+    nodes, gradient, weight, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    S = sample.shape[1] or Q
+    out = np.empty((count, 2 * n, 2 * n))
+    ue, H = np.empty((n, 2, LANES)), np.empty((Q, 4, LANES))
+    inverse, log_J = np.empty((S, 4, LANES)), np.empty((S, LANES))
+    theta, pull, stiff = np.empty((Q, LANES)), np.empty((S, LANES)), np.empty((Q, LANES))
+    push, rows, K = np.empty((S, n, 2, LANES)), np.empty((Q, n, 2, LANES)), np.empty((4, LANES))
+    for b in range(B):
+        gather(u, nodes[b], ue)
+        block = (gradient[b], weight[b], sample[b], projection[b])
+        _volume_states(ue, mu[b], lmbda[b], block, H, inverse, log_J, theta, pull)
+        _pushed(inverse, sample[b] if sample.shape[1] else gradient[b], push)
+        _theta_rows(push, projection[b], rows)
         for q in range(Q):
-            for j in range(2 * n):
-                if none:
-                    rows[q, j] = push[q, j // 2, j % 2]
-                else:
-                    value = 0.0
-                    for s in range(S):
-                        value += P[q, s] * push[s, j // 2, j % 2]
-                    rows[q, j] = value
+            for i in range(LANES):
+                stiff[q, i] = weight[b, q, i] * lmbda[b, i]
         for k in range(n):
             for m in range(k, n):
-                shear = 0.0
-                for q in range(Q):
-                    shear += weight[e, q] * (
-                        gradient[e, q, k, 0] * gradient[e, q, m, 0]
-                        + gradient[e, q, k, 1] * gradient[e, q, m, 1]
-                    )
-                shear *= mu[e]
-                for i in range(2):
-                    for j in range(2):
-                        value = shear if i == j else 0.0
-                        for q in range(Q):
-                            value += lmbda[e] * weight[e, q] * rows[q, 2 * k + i] * rows[q, 2 * m + j]
-                        for s in range(S):
-                            value -= volume[s] * push[s, k, j] * push[s, m, i]
-                        K[2 * k + i, 2 * m + j] = value
-                        K[2 * m + j, 2 * k + i] = value
+                _pair(k, m, stiff, rows, pull, push, K)
+                _shear(k, m, gradient[b], weight[b], mu[b], K)
+                _store(K, k, m, b * LANES, out)
     return out
 
 
-@njit(cache=True, error_model="numpy")
-def smallest_J(u: Floats, nodes: Ints, sample: Floats) -> float:
+@compiled
+def smallest_J(u: Floats, cells: Cells) -> float:
     """Smallest volume ratio over all cells and sample points."""
-    smallest = np.inf
-    for e in range(nodes.shape[0]):
-        for s in range(sample.shape[1]):
-            a, b, c, d = _deformation(u, nodes[e], sample[e, s])
-            smallest = min(smallest, a * d - b * c)
+    n = cells.gradient.shape[2]
+    ue, H, smallest = np.empty((n, 2, LANES)), np.empty((4, LANES)), np.inf
+    points = cells.sample if cells.sample.shape[1] else cells.gradient
+    for b in range(len(points)):
+        gather(u, cells.nodes[b], ue)
+        for s in range(points.shape[1]):
+            displacement_gradient(ue, points[b, s], H)
+            for i in range(LANES):
+                smallest = min(smallest, (1.0 + H[0, i]) * (1.0 + H[3, i]) - H[1, i] * H[2, i])
     return smallest
 
 
-@njit(cache=True, error_model="numpy")
-def viscous_forces(
-    u: Floats, rate: Floats, nodes: Ints, gradient: Floats, weight: Floats, strain0: Floats
-) -> Floats:
-    """Nodal forces (N, 2) of S = 2 rate (E - E0) with `rate` (E,) = eta / time step and E0 (E, Q, 2, 2)."""
-    out = np.zeros_like(u)
-    F, S = np.empty((2, 2)), np.empty((2, 2))
-    for e in range(nodes.shape[0]):
-        if rate[e] == 0.0:
-            continue
-        for q in range(weight.shape[1]):
-            _viscous_point(u, nodes[e], gradient[e, q], rate[e] * weight[e, q], strain0[e, q], F, S)
-            p00 = F[0, 0] * S[0, 0] + F[0, 1] * S[1, 0]
-            p01 = F[0, 0] * S[0, 1] + F[0, 1] * S[1, 1]
-            p10 = F[1, 0] * S[0, 0] + F[1, 1] * S[1, 0]
-            p11 = F[1, 0] * S[0, 1] + F[1, 1] * S[1, 1]
-            for k in range(nodes.shape[1]):
-                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
-                out[nodes[e, k], 0] += p00 * gx + p01 * gy
-                out[nodes[e, k], 1] += p10 * gx + p11 * gy
-    return out
-
-
-@njit(cache=True, error_model="numpy")
-def _viscous_point(u: Any, cell: Any, gradient: Any, rate: float, strain0: Any, F: Any, S: Any) -> None:
-    """F (2, 2) and S = 2 rate (E - E0) of one point."""
-    a, b, c, d = _deformation(u, cell, gradient)
-    F[0, 0], F[0, 1], F[1, 0], F[1, 1] = a, b, c, d
-    S[0, 0] = 2.0 * rate * (0.5 * (a * a + c * c - 1.0) - strain0[0, 0])
-    S[1, 1] = 2.0 * rate * (0.5 * (b * b + d * d - 1.0) - strain0[1, 1])
-    S[0, 1] = S[1, 0] = 2.0 * rate * (0.5 * (a * b + c * d) - strain0[0, 1])
-
-
-@njit(cache=True, error_model="numpy")
-def add_viscous_tangent(
-    u: Floats, rate: Floats, nodes: Ints, gradient: Floats, weight: Floats, strain0: Floats, cells: Floats
-) -> None:
-    """Add the tangents of `viscous_forces` to the cell matrices (E, 2 n, 2 n)."""
-    n = nodes.shape[1]
-    F, S = np.empty((2, 2)), np.empty((2, 2))
-    push = np.empty((n, 2))
-    for e in range(nodes.shape[0]):
-        if rate[e] == 0.0:
-            continue
-        for q in range(weight.shape[1]):
-            r = rate[e] * weight[e, q]
-            _viscous_point(u, nodes[e], gradient[e, q], r, strain0[e, q], F, S)
-            b00 = F[0, 0] * F[0, 0] + F[0, 1] * F[0, 1]
-            b01 = F[0, 0] * F[1, 0] + F[0, 1] * F[1, 1]
-            b11 = F[1, 0] * F[1, 0] + F[1, 1] * F[1, 1]
-            for k in range(n):
-                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
-                push[k, 0] = F[0, 0] * gx + F[0, 1] * gy
-                push[k, 1] = F[1, 0] * gx + F[1, 1] * gy
-            for k in range(n):
-                gx, gy = gradient[e, q, k, 0], gradient[e, q, k, 1]
-                sx, sy = S[0, 0] * gx + S[0, 1] * gy, S[1, 0] * gx + S[1, 1] * gy
-                for m in range(n):
-                    hx, hy = gradient[e, q, m, 0], gradient[e, q, m, 1]
-                    inner = r * (gx * hx + gy * hy)
-                    stress = sx * hx + sy * hy
-                    cells[e, 2 * k, 2 * m] += stress + inner * b00 + r * push[m, 0] * push[k, 0]
-                    cells[e, 2 * k, 2 * m + 1] += inner * b01 + r * push[m, 0] * push[k, 1]
-                    cells[e, 2 * k + 1, 2 * m] += inner * b01 + r * push[m, 1] * push[k, 0]
-                    cells[e, 2 * k + 1, 2 * m + 1] += stress + inner * b11 + r * push[m, 1] * push[k, 1]
+@compiled
+def energy(u: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> float:
+    """Stored energy."""
+    nodes, gradient, weight, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    S = sample.shape[1] or Q
+    ue, H, theta = np.empty((n, 2, LANES)), np.empty((Q, 4, LANES)), np.empty((Q, LANES))
+    inverse, log_J = np.empty((S, 4, LANES)), np.empty((S, LANES))
+    total = 0.0
+    for b in range(B):
+        gather(u, nodes[b], ue)
+        _states(ue, gradient[b], sample[b], H, inverse, log_J)
+        _theta(log_J, projection[b], theta)
+        for q in range(Q):
+            for i in range(LANES):
+                # F:F - 2 - 2 theta, without the 2 that would swallow the digits of small strains
+                shear = 2.0 * (H[q, 0, i] + H[q, 3, i] - theta[q, i])
+                shear += H[q, 0, i] ** 2 + H[q, 1, i] ** 2 + H[q, 2, i] ** 2 + H[q, 3, i] ** 2
+                volume = lmbda[b, i] * theta[q, i] ** 2
+                total += 0.5 * weight[b, q, i] * (mu[b, i] * shear + volume)
+    return total

@@ -25,17 +25,20 @@ import numpy as np
 from evfem import pad as outline
 from evfem.attraction import Attraction
 from evfem.body import Body
-from evfem.condensed import Condensed, Motion, Step, Unknown
-from evfem.contact import OPEN, ContactNotSolved
+from evfem.condensed import Motion, Step, Unknown
+from evfem.contact import OPEN, STICK, ContactNotSolved
 from evfem.interface import Interface
-from evfem.linear import Singular, make_condensation
-from evfem.mesh import Floats, Ints
-from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Linearised, Record, State, StepFailed, Target
+from evfem.linearisation import Linearisation
+from evfem.mesh import Floats
+from evfem.mixing import Mixing
+from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, State, StepFailed, Target
 
-#: renew the factorisation when more iterations than this would be needed with the old one
-PATIENCE = 5
 MAX_ITERATIONS = 40
 SMALLEST_J = 0.05
+#: under a prescribed force the bone moves at most this share of the body's height in one iteration
+LONGEST_STRIDE = 0.05
+#: a step begins at most so many last steps ahead
+LONGEST_GUESS = 1.5
 #: the voltage is given, at its lower or upper limit, or an unknown settled by the friction force
 NONE, LOW, HIGH, FREE = "none", "low", "high", "free"
 
@@ -55,22 +58,12 @@ class Equilibrium:
         self.body, self.pad, self.surface, self.attraction = body, pad, surface, attraction
         self.tolerance, self.threads = tolerance, threads
         self.interface = Interface(pad, body.space.mesh.points, surface, tolerance)
-        self.record = Record()
         self.points = body.space.mesh.points
-        self.candidates: Ints = np.zeros(0, dtype=np.int64)
-        # attraction that falls more slowly than this share of the pad's foundation modulus is left to
-        # iterations
-        depth = float(np.ptp(self.points[:, 1]))
-        self.stride = 0.05 * depth
-        self.soft = 0.02 * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
-        self._factor: Any = None
-        self._linearised: Linearised | None = None
-        self._condensed: Any = None
-        self._touching: Any = np.zeros(pad.nodes.size, dtype=bool)
-        self._frozen = False
-        self._outdated = False
+        self.linear = Linearisation(body, self.interface, attraction, tolerance, threads)
+        self.record = self.linear.record
+        self.stride = LONGEST_STRIDE * float(np.ptp(self.points[:, 1]))
+        self._mixing = Mixing()
         self._steering = NONE
-        self._stiffest = 0.0
 
     # -- what a state is
 
@@ -86,6 +79,7 @@ class Equilibrium:
             voltage,
             zero,
             np.zeros(2),
+            np.zeros_like(u),
             np.zeros_like(u),
         )
         attraction = self.attraction_at(state, state, voltage)
@@ -105,14 +99,35 @@ class Equilibrium:
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
     ) -> State:
         """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the
-        current one if given; iterations begin at `start` (default `old`). Raises `StepFailed`."""
-        travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
-        self._touching, self._frozen = old.status != OPEN, frozen is not None
-        state = self._first_guess(start or old, target)
-        self.choose_candidates(state, 1.2 * travel)
-        self._begin(old, target.duration)
-        self.interface.pins.begin(self.positions(old.u)[:, 0])
-        self._steering = self._first_steering(old, target)
+        current one if given; iterations begin at `start` (default `old`). A wished friction force that
+        a sticking pad cannot give leaves the voltage as it is. Raises `StepFailed`."""
+        try:
+            found = self._try(old, target, frozen, start)
+        except StepFailed:
+            if target.tangential_force is None:
+                raise
+            found = None
+        if found is not None and not (self._steering == HIGH and _sticks(found)):
+            return found
+        # friction hardly depends on the voltage of a pad that sticks: such a wish has no sensible answer, and
+        # the voltage stays as it is
+        held = self._try(old, replace(target, tangential_force=None, voltage=old.voltage), frozen, start)
+        if not _sticks(held):
+            raise StepFailed("the wished friction force was not found", self.record.residuals)
+        return held
+
+    def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
+        try:
+            return self._find(old, target, frozen, start or old)
+        except ContactNotSolved as error:
+            self.linear.forget()
+            raise StepFailed(f"contact: {error}", self.record.residuals) from error
+        except StepFailed:
+            self.linear.forget()
+            raise
+
+    def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
+        state = self._begin(old, target, frozen is not None, start)
         history: list[float] = []
         for _ in range(MAX_ITERATIONS):
             state, balance = self._balance(old, state, target, frozen)
@@ -124,25 +139,70 @@ class Equilibrium:
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
             if arrived and balance.residual <= self.tolerance and self._accepts(old, state, target):
-                return replace(state, velocity=self.body.velocity(state.u))
+                return replace(state, velocity=self.body.velocity(state.u), trend=state.u - old.u)
             if not arrived:
                 history[-1] = max(history[-1], 1.0)
             if len(history) > 8 and history[-1] > 1e3 * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
-            self._renew(state, history)
-            state = self._advance(old, state, target, balance)
+            state = self._iterate(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
 
-    @staticmethod
-    def _first_guess(state: State, target: Target) -> State:
-        """Where iterations begin: the present state, carried along with the bone if nothing touches."""
+    def _begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
+        """Prepare everything for a step, and say where its iterations start."""
+        self.linear.begin(old, frozen)
+        state = self._first_guess(start, target)
+        travel = abs(target.bone[1] - old.bone[1]) if target.force is None else 0.0
+        self.linear.choose_candidates(state, 1.2 * travel)
+        self.linear.start_clock(old, target.duration)
+        self._mixing.reset()
+        self.interface.pins.begin(self.positions(old.u)[:, 0])
+        self._steering = self._first_steering(old, target)
+        return state
+
+    def _iterate(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """The next iterate, with the factorisation at hand if that does and a new one if not."""
+        if self.linear.renew(state, self.record.residuals):
+            self._mixing.reset()
+        try:
+            after = self._advance(old, state, target, balance)
+        except ContactNotSolved:
+            # an older tangent may ask for what no contact can give
+            if self.linear.made_at(state):
+                raise
+            self.linear.factorise(state)
+            self._mixing.reset()
+            after = self._advance(old, state, target, balance)
+        mixed = self._mixing.next_iterate(state, after)
+        # what is given is kept to the last digit
+        bone = after.bone if target.force is None else np.array([after.bone[0], mixed.bone[1]])
+        return replace(mixed, bone=bone, voltage=after.voltage if self._steering != FREE else mixed.voltage)
+
+    def _first_guess(self, state: State, target: Target) -> State:
+        """Where iterations begin: the present state moved on along its trend, or with the bone if nothing
+        touches.
+        """
         if target.tangential_force is None:
             state = replace(state, voltage=target.voltage)
-        if target.force is not None or (state.status != OPEN).any():
+        if (state.status != OPEN).any():
+            return self._extrapolated(state, target)
+        if target.force is not None:
             return state
         return replace(state, u=state.u + (target.bone - state.bone), bone=target.bone.copy())
+
+    def _extrapolated(self, state: State, target: Target) -> State:
+        """As far along the last step's displacements as the bone's next step is along its last one."""
+        bone = self.body.space.mesh.node_sets["bone"][0]
+        last, way = state.trend[bone], target.bone - state.bone
+        axis = 0 if target.force is not None else int(np.argmax(np.abs(way)))
+        if way[axis] * last[axis] <= 0.0:
+            return state
+        share = min(float(way[axis] / last[axis]), LONGEST_GUESS)
+        u = state.u + share * state.trend
+        if not self.body.tissue.smallest_J(u) > SMALLEST_J:
+            return state
+        return replace(state, u=u, bone=u[bone].copy())
 
     @staticmethod
     def _first_steering(old: State, target: Target) -> str:
@@ -152,14 +212,6 @@ class Equilibrium:
 
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         return self.obeys_contact(old, state) and self._wish_met(old, state, target)
-
-    def _begin(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
-        dynamics = self.body.dynamics
-        if dynamics is None:
-            return
-        self._outdated = not 0.67 * dynamics.step <= duration <= 1.5 * dynamics.step
-        dynamics.begin(old.u, old.velocity, duration)
 
     def _balance(
         self, old: State, state: State, target: Target, frozen: Floats | None
@@ -187,7 +239,7 @@ class Equilibrium:
         """Forces (N/mm) below which the balance is rounding of displacements that contain the bone's
         travel.
         """
-        return 4.0 * float(np.finfo(float).eps) * self._stiffest * float(np.abs(state.bone).max())
+        return 4.0 * float(np.finfo(float).eps) * self.linear.stiffest * float(np.abs(state.bone).max())
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
         """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from
@@ -197,21 +249,17 @@ class Equilibrium:
             return np.zeros_like(state.contact_force)
         return self.attraction.forces(self.positions(state.u), voltage, old.status != OPEN)
 
-    def forget(self) -> None:
-        """Drop the factorisation, so that the next iteration starts from a fresh one."""
-        self._factor = None
-
     def _advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells
         would collapse."""
-        saved, g = self._factor.forward(-balance.forces)
-        known = self.interface.describe(old, state, self.candidates, self._fall(state))
+        saved, g = self.linear.factor.forward(-balance.forces)
+        known = self.interface.describe(old, state, self.linear.candidates, self.linear.fall(state))
         bone = target.bone - state.bone
         unknowns: tuple[Unknown, ...] = ()
         if target.force is not None:
             bone = np.array([bone[0], 0.0])
-            unknowns = (Unknown(-self._condensed.schur[:, -1], 1, -target.force),)
-        step = Step(self._condensed, known, g, bone, unknowns)
+            unknowns = (Unknown(-self.linear.condensed.schur[:, -1], 1, -target.force),)
+        step = Step(self.linear.condensed, known, g, bone, unknowns)
         squared = 0.0
         if self._steering == FREE:
             found, saved, squared = self._steer(step, state, target, saved)
@@ -227,9 +275,9 @@ class Equilibrium:
                 # go part of the way, the way the missing force pushes
                 bone[1] = np.copysign(self.stride, missing if flies else bone[1])
                 found = self._solve(replace(step, bone=bone, unknowns=()))
-        delta = self.body.expand(self._factor.backward(saved, np.concatenate([found.moved, bone])))
+        delta = self.body.expand(self.linear.factor.backward(saved, np.concatenate([found.moved, bone])))
         share = self._largest_share(state.u, delta)
-        c = self.candidates
+        c = self.linear.candidates
         force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
         force[c], status[c] = found.force, found.status
         whole = share == 1.0 and target.force is None
@@ -246,10 +294,7 @@ class Equilibrium:
         )
 
     def _solve(self, step: Step) -> Motion:
-        try:
-            found = step.solve()
-        except ContactNotSolved as error:
-            raise StepFailed(f"contact: {error}", self.record.residuals) from error
+        found = step.solve()
         self.record.contact_solves += found.solves
         return found
 
@@ -260,8 +305,10 @@ class Equilibrium:
         assert self.attraction is not None
         assert target.tangential_force is not None
         nodal = np.zeros_like(state.u)
-        nodal[self.pad.nodes] = self.attraction.forces(self.positions(state.u), KILOVOLT, self._touching)
-        unit, push = self._factor.forward(self.body.reduce(nodal))
+        nodal[self.pad.nodes] = self.attraction.forces(
+            self.positions(state.u), KILOVOLT, self.linear.touching
+        )
+        unit, push = self.linear.factor.forward(self.body.reduce(nodal))
         steered = replace(step, unknowns=(*step.unknowns, Unknown(push, 0, target.tangential_force)))
         found = self._solve(steered)
         now, most = (state.voltage / KILOVOLT) ** 2, (target.voltage / KILOVOLT) ** 2
@@ -294,96 +341,6 @@ class Equilibrium:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return share
 
-    # -- candidates and factorisation
-
-    def choose_candidates(self, state: State, reach: float) -> None:
-        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the
-        present set does not do.
-        """
-        gap = outline.frame(self.surface, self.positions(state.u)).gap
-        steep = self._fall(state) > self.soft * self.pad.length(self.positions(state.u)[:, 0])
-        needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
-        if not needed.any():
-            needed[np.argmin(np.where(self.pad.free, gap, np.inf))] = True
-        if needed[self.candidates].sum() != needed.sum():
-            wider = self.pad.free & ((gap <= max(2.0 * reach, 4.0 * self.interface.length)) | needed)
-            self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
-            self._factor = None
-
-    def _renew(self, state: State, history: list[float]) -> None:
-        """Factorise at the present state where there is no factorisation, the old one stalls, or a new
-        one saves iterations.
-        """
-        if self._factor is not None and not self._outdated and not self._stale(history):
-            return
-        self._outdated = False
-        if self._factor is None:
-            unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
-            self._factor = make_condensation(
-                self.body.pattern, np.concatenate([unknowns, self.body.bone]), self.threads
-            )
-            self.record.backend = type(self._factor).__name__
-        try:
-            upper = self.body.tangent(state.u)
-            self._factor.factorise(upper)
-        except Singular as error:
-            raise StepFailed(f"the tangent is singular ({error})", history) from error
-        self._condensed = Condensed.make(self._factor.schur, self._coupling(state))
-        self._stiffest = float(upper[self.body.pattern.diagonal].max())
-        dynamics = self.body.dynamics
-        begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        self._linearised = Linearised(state.u, state.voltage, self._touching, self._frozen, begin, seconds)
-        self.record.factorisations += 1
-
-    @property
-    def carried(self) -> Linearised | None:
-        """Where the factorisation was made that the next step may use, if there is one."""
-        return None if self._factor is None else self._linearised
-
-    def linearise(self, state: State, at: Linearised) -> None:
-        """Make the factorisation again that a run which goes on from `state` had made at `at`."""
-        self._touching, self._frozen = at.touching, at.frozen
-        if self.body.dynamics is not None:
-            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
-        self._renew(replace(state, u=at.u, voltage=at.voltage), [])
-
-    def _stale(self, history: list[float]) -> bool:
-        if len(history) < 2:
-            return False
-        before, now = history[-2:]
-        if now > 0.1 or now > 0.5 * before:
-            return True
-        if now <= self.tolerance:
-            return False
-        return bool(np.log(self.tolerance / now) / np.log(now / before) > PATIENCE)
-
-    def _fall(self, state: State) -> Floats:
-        """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""
-        if self.attraction is None or state.voltage == 0.0 or self._frozen:
-            return np.zeros(self.pad.nodes.size)
-        return self.attraction.fall(self.positions(state.u), state.voltage, self._touching)
-
-    def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for its fall with a node's own gap, which belongs
-        to the contact problem: what is left are changes of tributary lengths. None without attraction.
-        """
-        if self.attraction is None or state.voltage == 0.0 or self._frozen:
-            return None
-        position, c = self.positions(state.u), self.candidates
-        whole = self.attraction.stiffness(position, state.voltage, self._touching)
-        unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
-        rows = whole[unknowns]
-        inner = np.asarray(rows[:, unknowns].toarray())
-        # nodes beyond the candidates move along with their neighbours, so that sliding changes no length
-        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
-        index = np.arange(unknowns.size)
-        inner[index, 2 * (index // 2)] += beyond
-        normal = outline.normals(outline.frame(self.surface, position[c]))
-        own = self._fall(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
-        blocks = inner.reshape(c.size, 2, c.size, 2)
-        blocks[np.arange(c.size), :, np.arange(c.size)] -= own
-        return inner
-
     # -- acceptance
 
     def obeys_contact(self, old: State, state: State) -> bool:
@@ -392,9 +349,13 @@ class Equilibrium:
         """
         sunk = self.interface.deepest(state)
         if sunk is not None:
-            self.choose_candidates(state, max(0.0, sunk))
+            self.linear.choose_candidates(state, max(0.0, sunk))
             return False
         return self.interface.obeyed(old, state)
+
+
+def _sticks(state: State) -> bool:
+    return bool((state.status == STICK).any())
 
 
 class RigidOutline(Equilibrium):

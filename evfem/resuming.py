@@ -32,10 +32,10 @@ def carried_arrays(equilibrium: Equilibrium) -> dict[str, Any]:
     """What an equilibrium solver takes with it to the next step; of the same shapes with and without a
     factorisation.
     """
-    at, dynamics = equilibrium.carried, equilibrium.body.dynamics
+    at, dynamics = equilibrium.linear.carried, equilibrium.body.dynamics
     nowhere = np.zeros_like(equilibrium.points)
     return {
-        "candidates": equilibrium.candidates,
+        "candidates": equilibrium.linear.candidates,
         "factorised": np.array(at is not None),
         "factor_u": nowhere if at is None else at.u,
         "factor_begin": nowhere if at is None else at.begin,
@@ -84,7 +84,7 @@ def state_of(arrays: Mapping[str, np.ndarray]) -> State:
 
 def carry_on(equilibrium: Equilibrium, state: State, arrays: Mapping[str, np.ndarray]) -> None:
     """Put an equilibrium solver where it was after the step that led to `state`."""
-    equilibrium.candidates = arrays["candidates"].astype(np.int64)
+    equilibrium.linear.candidates = arrays["candidates"].astype(np.int64)
     if arrays["factorised"]:
         at = Linearised(
             u=arrays["factor_u"],
@@ -94,6 +94,6 @@ def carry_on(equilibrium: Equilibrium, state: State, arrays: Mapping[str, np.nda
             begin=arrays["factor_begin"],
             duration=float(arrays["factor_duration"]),
         )
-        equilibrium.linearise(state, at)
+        equilibrium.linear.restore(state, at)
     if equilibrium.body.dynamics is not None:
         equilibrium.body.dynamics.step = float(arrays["duration"])

@@ -206,7 +206,7 @@ class Run:
             "factorisations": record.factorisations,
             "contact_solves": record.contact_solves,
             "cuts": self.stepper.cuts,
-            "candidates": int(self.model.equilibrium.candidates.size),
+            "candidates": int(self.model.equilibrium.linear.candidates.size),
             "backend": record.backend,
         }
         return Result.from_rows(

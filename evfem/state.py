@@ -25,7 +25,8 @@ class StepFailed(ArithmeticError):
 class State:
     """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's
     normal and tangent (P, 2), their statuses (P,), the bone's translation (2,), voltage, attraction on the
-    pad nodes (P, 2), forces on the bone (2,), nodal velocities (N, 2) in mm/s."""
+    pad nodes (P, 2), forces on the bone (2,), nodal velocities (N, 2) in mm/s, and the displacements of the
+    step that led here (N, 2)."""
 
     u: Floats
     contact_force: Floats
@@ -35,6 +36,7 @@ class State:
     attraction: Floats
     reaction: Floats
     velocity: Floats
+    trend: Floats
 
 
 @dataclass(frozen=True, eq=False)

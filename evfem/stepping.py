@@ -15,7 +15,7 @@ from evfem.newton import Equilibrium
 from evfem.state import State, StepFailed, Target
 
 SMALLEST_PART = 1.0 / 1024.0
-EASY = 6
+EASY = 8
 GROWTH = 1.25
 
 #: from the share of the way that is done (0 to 1) and the next one to the target there
@@ -45,7 +45,6 @@ class Stepper:
                 new = self.solve(state, path(done, share))
             except StepFailed:
                 self.cuts += 1
-                self.equilibrium.forget()
                 self.part = 0.5 * (share - done)
                 if self.part < SMALLEST_PART:
                     self.part = 1.0

@@ -9,8 +9,8 @@ import pytest
 
 import evfem
 
-#: the studies run on their own, and the compiled kernels cannot be imported without evfem[fast]
-LEFT_OUT = {"evfem.studies", "evfem.kernels"}
+#: the studies run on their own, and the compiled loops cannot be imported without evfem[fast]
+LEFT_OUT = {"evfem.studies", "evfem.lanes", "evfem.kernels", "evfem.viscous"}
 MODULES = sorted(
     m.name
     for m in pkgutil.walk_packages(evfem.__path__, "evfem.")
