@@ -30,6 +30,8 @@ from evfem.storage import load_arrays, save_arrays
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-2"
+#: columns from which a run goes on
+RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
 
 
@@ -319,6 +321,8 @@ def _check_rows(rows: Any) -> None:
         if row["step"] != step or not isinstance(row["motion"], str):
             raise ValueError(f"row {step}")
         if not all(type(value) in (int, float) for value in numbers):
+            raise ValueError(f"row {step}")
+        if not all(math.isfinite(row[name]) for name in RESUMED):
             raise ValueError(f"row {step}")
 
 

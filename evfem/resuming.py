@@ -47,11 +47,15 @@ def carried_arrays(equilibrium: Equilibrium) -> dict[str, Any]:
     }
 
 
-def usable(saved: Saved, fresh: Mapping[str, Any]) -> dict[str, np.ndarray]:
-    """The arrays of a checkpoint, if they fit the `fresh` ones of a run that has just been set up.
+def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
+    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps that has just
+    been set up.
 
     Raises InputError for what is missing, of another shape or kind, not finite, or out of range.
     """
+    if len(saved.rows) > most_rows:
+        allowed = f"at most the {most_rows} steps of the scene"
+        raise InputError("checkpoint", f"{len(saved.rows)} steps", allowed)
     for name, expected in fresh.items():
         given, fits = saved.arrays.get(name), np.asarray(expected)
         if given is None or given.dtype.kind != fits.dtype.kind:

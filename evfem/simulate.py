@@ -227,7 +227,7 @@ class Run:
         }
 
     def _restore(self, saved: Saved) -> None:
-        arrays = usable(saved, self.checkpoint())
+        arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
         carry_on(self.model.equilibrium, self.state, arrays)
         self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])

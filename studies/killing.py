@@ -51,15 +51,15 @@ SCENES: Mapping[str, str] = {
     + '[surface]\nkind = "flat"\nfriction = 0.3\n'
     + VOLTAGE
     + '[[motion]]\nkind = "press"\nforce = 0.02\nsteps = 4\n'
-    + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 30\nhold = "force"\n',
+    + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 16\nhold = "force"\n',
     "viscous": HEAD.format(viscosity="viscosity = 1e-3")
     + '[surface]\nkind = "sinusoid"\nfriction = 0.2\n[solver]\ndynamics = "viscous"\n'
     + '[[motion]]\nkind = "press"\nindentation = 0.2\nspeed = 5.0\nsteps = 4\n'
-    + '[[motion]]\nkind = "slide"\ndistance = -1.0\nsteps = 30\nspeed = 20.0\n',
+    + '[[motion]]\nkind = "slide"\ndistance = -1.0\nsteps = 16\nspeed = 20.0\n',
     "inertial": HEAD.format(viscosity="viscosity = 1e-4")
     + '[surface]\nkind = "flat"\nfriction = 0.2\n[solver]\ndynamics = "inertial"\n'
     + '[[motion]]\nkind = "press"\nindentation = 0.2\nspeed = 5.0\nsteps = 4\n'
-    + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 30\nspeed = 20.0\nhold = "force"\n',
+    + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 16\nspeed = 20.0\nhold = "force"\n',
 }
 FORCES = tuple(name for name in COLUMNS if "force" in name)
 #: kills before a run is left to finish

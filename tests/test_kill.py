@@ -1,0 +1,278 @@
+"""Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other scenes."""
+
+import contextlib
+import errno
+import io
+import json
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evfem.studies import killing
+
+import evfem
+from evfem import cli, export, runfolder, storage
+from evfem.result import COLUMNS, Saved
+from evfem.scenefile import load
+from evfem.simulate import simulate
+from evfem.storage import load_arrays, save_arrays
+
+
+def called(folder, *words):
+    """Exit status and standard error of the command, called in this process in `folder`."""
+    error, before = io.StringIO(), Path.cwd()
+    os.chdir(folder)
+    try:
+        with contextlib.redirect_stderr(error), contextlib.redirect_stdout(io.StringIO()):
+            return cli.main([*map(str, words)]), error.getvalue()
+    finally:
+        os.chdir(before)
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_kills_at_random_moments_lose_nothing(tmp_path):
+    numbers = killing.kills(3, 20, tmp_path)
+    assert numbers["kills"] == 3
+    assert (numbers["broken"], numbers["fields_lost"]) == (0, 0)
+    assert numbers["largest_difference"] <= 1e-9
+
+
+@pytest.mark.parametrize("name", killing.SCENES)
+def test_a_run_resumed_after_any_step_repeats_the_uninterrupted_one_to_the_last_bit(name, tmp_path):
+    killing.prepare(tmp_path, name)
+    scene, kept = load(tmp_path / f"{name}.toml"), {}
+
+    class Keep:
+        def step(self, row, frame, checkpoint):
+            kept[row["step"]] = ({key: np.array(a) for key, a in checkpoint().items()}, dict(row))
+
+    whole = simulate(scene, observers=[Keep()])
+    assert max(whole.newton_iterations) > 1
+    for at in (1, 4, 9, 19):
+        saved = Saved(kept[at][0], [kept[k][1] for k in range(1, at + 1)])
+        resumed = simulate(scene, resume=saved)
+        for column in set(COLUMNS) - {"seconds", "motion"}:
+            np.testing.assert_array_equal(getattr(resumed, column), getattr(whole, column), err_msg=column)
+        np.testing.assert_array_equal(resumed.frames[-1].displacement, whole.frames[-1].displacement)
+
+
+@pytest.fixture(scope="module")
+def interrupted(tmp_path_factory):
+    """A folder with the scene `force`, and its run as it was after seven steps, in `stopped`."""
+    folder = tmp_path_factory.mktemp("interrupted")
+    killing.prepare(folder, "force")
+    number = 0
+
+    class Stop(runfolder.RunFolder):
+        def step(self, row, frame, checkpoint):
+            nonlocal number
+            super().step(row, frame, checkpoint)
+            number += 1
+            if number == 7:
+                raise ZeroDivisionError  # as sudden as a kill: nothing is closed
+
+    scene = load(folder / "force.toml")
+    with pytest.raises(ZeroDivisionError):
+        simulate(scene, observers=[Stop(folder / "stopped", scene)])
+    return folder
+
+
+@pytest.fixture
+def place(interrupted, tmp_path):
+    """A copy of that folder."""
+    return shutil.copytree(interrupted, tmp_path / "place")
+
+
+def run(place, *more):
+    return called(place, "run", "force.toml", "--out", "stopped", "--no-plots", *more)
+
+
+def replaced(path, **changes):
+    """The same archive with some arrays changed, its checksums right."""
+    arrays = load_arrays(path, "checkpoint", "evfem-checkpoint-2")
+    save_arrays(path, arrays | {name.replace("__", "/"): a for name, a in changes.items()})
+
+
+def row_changed(path, change):
+    rows = json.loads(str(load_arrays(path, "checkpoint", "evfem-checkpoint-2")["rows"]))
+    change(rows)
+    replaced(path, rows=np.array(json.dumps(rows)))
+
+
+def flipped(path, at):
+    data = bytearray(path.read_bytes())
+    data[int(at * len(data))] ^= 16
+    path.write_bytes(bytes(data))
+
+
+DAMAGES = {
+    "empty": (lambda p: p.write_bytes(b""), "cut off"),
+    "cut off": (lambda p: p.write_bytes(p.read_bytes()[:-200]), "cut off"),
+    "half": (lambda p: p.write_bytes(p.read_bytes()[: p.stat().st_size // 2]), "cut off"),
+    "flipped at 0.1": (lambda p: flipped(p, 0.1), "checkpoint"),
+    "flipped at 0.5": (lambda p: flipped(p, 0.5), "checkpoint"),
+    "flipped at 0.8": (lambda p: flipped(p, 0.8), "checkpoint"),
+    "no archive": (lambda p: p.write_text("mine"), "another kind"),
+    "another format": (lambda p: save_arrays(p, {"format": np.array("evfem-result-1")}), "another format"),
+    "another version": (lambda p: replaced(p, version=np.array("0.0.1")), "written by evfem '0.0.1'"),
+    "another scene": (lambda p: replaced(p, scene=np.array("0" * 64)), "another scene"),
+    "no state": (lambda p: replaced(p, state__u=np.zeros(0)), "no usable u"),
+    "text": (lambda p: replaced(p, state__time=np.array("now")), "no usable time"),
+    "not finite": (lambda p: replaced(p, state__time=np.array(np.nan)), "no usable time"),
+    "nodes elsewhere": (lambda p: replaced(p, state__candidates=np.array([3, 9999])), "no usable candidates"),
+    "nodes twice": (lambda p: replaced(p, state__candidates=np.array([3, 3])), "no usable candidates"),
+    "status 7": (lambda p: replaced(p, state__status=np.full(25, 7)), "no usable status"),
+    "part 0": (lambda p: replaced(p, state__part=np.array(0.0)), "no usable part"),
+    "no rows": (lambda p: row_changed(p, list.clear), "damaged"),
+    "row lost": (lambda p: row_changed(p, lambda rows: rows.pop(2)), "damaged"),
+    "row not finite": (lambda p: row_changed(p, lambda rows: rows[6].update(position=1e999)), "damaged"),
+    "row of text": (lambda p: row_changed(p, lambda rows: rows[1].update(time="x")), "damaged"),
+    "rows of another kind": (lambda p: replaced(p, rows=np.array("{}")), "damaged"),
+    "rows too deep": (lambda p: replaced(p, rows=np.array("[" * 99999)), "damaged"),
+    "more rows than steps": (
+        lambda p: row_changed(p, lambda rows: rows.extend([rows[-1] | {"step": k} for k in range(8, 99)])),
+        "98 steps",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", DAMAGES)
+def test_a_checkpoint_that_cannot_be_used_is_one_sentence_and_nothing_is_touched(place, case):
+    damage, words = DAMAGES[case]
+    damage(place / "stopped" / "checkpoint.npz")
+    before = contents(place / "stopped")
+    status, error = run(place, "--resume")
+    assert status == 2, error
+    assert words in error
+    assert error.count("\n") == 1
+    assert contents(place / "stopped") == before
+
+
+def test_a_whole_checkpoint_is_used(place):
+    status, error = run(place, "--resume")
+    assert status == 0, error
+    assert killing.broken(place / "stopped") == []
+    assert len(killing.history(place / "stopped" / "history.csv")["step"]) == 20
+    assert len(list((place / "stopped").glob("fields_*.vtu"))) == 20
+
+
+def test_resuming_a_run_killed_before_its_first_step_begins_it(place):
+    for path in (place / "stopped").iterdir():
+        if path.name != ".evfem-files":
+            path.unlink()
+    (place / "stopped" / ".history.csv.123.tmp").write_text("half")
+    status, error = run(place, "--resume", "--no-fields")
+    assert status == 0, error
+    assert sorted(contents(place / "stopped")) == [
+        ".evfem-files",
+        "checkpoint.npz",
+        "history.csv",
+        "summary.json",
+    ]
+
+
+def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(place):
+    left = [".checkpoint.npz.77.tmp", ".fields_00008.vtu.77.tmp", "..evfem-files.77.tmp"]
+    mine = [".notes.md.77.tmp", "fields.tmp", ".fields_00008.vtu.swp"]
+    for name in left + mine:
+        (place / "stopped" / name).write_text("half")
+    assert run(place, "--resume")[0] == 0
+    names = contents(place / "stopped")
+    assert not set(left) & set(names)
+    assert set(mine) <= set(names)
+
+
+class Full:
+    """Lets `room` writes of files pass, then the disk is full: half of what was to be written is on it."""
+
+    def __init__(self, room, monkeypatch):
+        self.room = room
+        self.real = {"write_text": Path.write_text, "write": np.lib.format.write_array}
+        monkeypatch.setattr(Path, "write_text", lambda *a, **k: self.text(*a, **k))
+        monkeypatch.setattr(np.lib.format, "write_array", lambda *a, **k: self.array(*a, **k))
+        monkeypatch.setattr("meshio.vtu._vtu.write", self.fields(__import__("meshio").vtu._vtu.write))
+
+    def take(self):
+        self.room -= 1
+        return self.room >= 0
+
+    def text(self, path, text, **more):
+        if self.take():
+            return self.real["write_text"](path, text, **more)
+        self.real["write_text"](path, text[: len(text) // 2], **more)
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    def array(self, file, array, **more):
+        if not self.take():
+            file.write(b"\x93NUMPY")
+            raise OSError(errno.ENOSPC, "No space left on device")
+        return self.real["write"](file, array, **more)
+
+    def fields(self, write):
+        def wrapped(path, grid, **more):
+            write(path, grid, **more)
+            if not self.take():
+                os.truncate(path, os.path.getsize(path) // 2)
+                raise OSError(errno.ENOSPC, "No space left on device")
+
+        return wrapped
+
+
+@pytest.mark.parametrize("room", [0, 1, 2, 3, 11, 20, 23, 24, 25, 29, 50])
+def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_later(
+    place, monkeypatch, room
+):
+    before = killing.history(place / "stopped" / "history.csv")
+    Full(room, monkeypatch)
+    status, error = run(place, "--resume")
+    monkeypatch.undo()
+    assert status == 4
+    assert "No space left" in error.splitlines()[-1]
+    assert "Traceback" not in error
+    assert killing.broken(place / "stopped") == []
+    assert not list((place / "stopped").glob(".*.tmp"))
+    now = killing.history(place / "stopped" / "history.csv")
+    assert {name: column[:7] for name, column in now.items()} == before
+    assert run(place, "--resume")[0] == 0
+    assert run(place, "--out", "whole", "--no-fields")[0] == 0
+    assert killing.difference(place / "stopped", place / "whole") == (0.0, True)
+
+
+def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
+    before = contents(place / "stopped")
+
+    def refuse(*arguments, **more):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    for name in ("open", "replace"):
+        monkeypatch.setattr(
+            f"{storage.__name__}.{'os.replace' if name == 'replace' else 'open'}", refuse, raising=False
+        )
+    monkeypatch.setattr(Path, "write_text", refuse)
+    status, error = called(place, "run", "force.toml", "--out", "stopped", "--no-plots")
+    monkeypatch.undo()
+    assert status == 4
+    assert "Permission denied" in error.splitlines()[-1]
+    assert set(contents(place / "stopped")) <= set(before)
+
+
+def test_output_that_cannot_be_printed_is_exit_status_4(tmp_path):
+    killing.prepare(tmp_path, "force")
+    words = "plan force.toml > /dev/full" if os.path.exists("/dev/full") else "plan force.toml; exit 4"
+    command = f"{killing.sys.executable} -m evfem.cli {words}"
+    done = killing.subprocess.run(
+        command, shell=True, cwd=tmp_path, env=killing.environment(), capture_output=True, text=True
+    )
+    assert done.returncode == 4
+    assert done.stderr.count("\n") <= 1
+
+
+def test_the_version_is_in_the_checkpoint(interrupted):
+    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", "evfem-checkpoint-2")
+    assert str(arrays["version"]) == evfem.__version__
+    assert export.__name__  # fields are written by the module whose writer the tests above replace
