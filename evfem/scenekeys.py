@@ -203,7 +203,7 @@ def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
 
 def unknown(key: str, name: str, known: list[str]) -> InputError:
     """The error for a key that does not exist, with the one that may have been meant."""
-    close = difflib.get_close_matches(name, known, n=1)
+    close = difflib.get_close_matches(name[:40], known, n=1)
     hint = f"{close[0]}? (" if close else ""
     return InputError(key, "an unknown key", hint + ", ".join(known) + (")" if close else ""))
 

@@ -1,0 +1,371 @@
+"""Hostile input: damaged files of every format, and files made to take all memory or time, get a sentence."""
+
+import base64
+import io
+import tracemalloc
+import zipfile
+import zlib
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from evfem.studies import fuzzing
+from fakes import fake_result, square_mesh
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from evfem import meshfile, result, tables
+from evfem.errors import InputError
+from evfem.scenefile import load, loads
+from evfem.signals import VoltageProfile
+from evfem.surfaces import Flat, Profile, Sinusoid
+
+SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
+
+
+@pytest.mark.parametrize("kind", fuzzing.FORMATS)
+def test_damaged_files_are_read_or_refused_with_one_sentence(kind):
+    @settings(
+        max_examples=50, deadline=None, derandomize=True, database=None, suppress_health_check=HealthCheck
+    )
+    @given(st.randoms(use_true_random=False))
+    def check(rng):
+        assert fuzzing.try_file(kind, rng).fault == ""
+
+    check()
+
+
+def test_the_counts_of_a_fuzz_add_up(monkeypatch):
+    monkeypatch.setattr(fuzzing, "FORMATS", {"profile": fuzzing.FORMATS["profile"]})
+    numbers = fuzzing.fuzz(20, 1)["profile"]
+    assert numbers["inputs"] == 20
+    assert numbers["accepted"] + numbers["refused"] + numbers["not_converged"] == 20
+    assert min(numbers["accepted"], numbers["refused"]) > 0
+
+
+@pytest.mark.parametrize(
+    ("status", "error", "untouched", "words"),
+    [
+        (1, "", True, "exit status 1"),
+        (-1, "ValueError: x", True, "ValueError"),
+        (0, "Traceback (most recent call last):", True, "Traceback"),
+        (3, "x.py:1: RuntimeWarning: overflow\n", True, "overflow"),
+        (2, "one\ntwo\n", True, "not one sentence"),
+        (2, "evfem: one\n", False, "changed the folder"),
+        (2, "evfem: one\n", True, ""),
+        (0, "step 1 of 1\n", False, ""),
+    ],
+)
+def test_what_counts_as_a_failure(status, error, untouched, words):
+    fault = fuzzing._fault(status, error, untouched)
+    assert words in fault
+    assert bool(fault) == bool(words)
+
+
+def test_a_file_that_takes_too_long_or_runs_code_is_a_failure(monkeypatch, tmp_path):
+    monkeypatch.setattr(fuzzing, "LONGEST", 0.05)
+    monkeypatch.setattr(fuzzing.cli, "main", lambda words: [None for _ in iter(int, 1)])
+    assert fuzzing._called(tmp_path, ["plan"])[0] == -2
+    monkeypatch.setattr(fuzzing.cli, "main", lambda words: (tmp_path / "owned").write_text("") and 0)
+    assert fuzzing._called(tmp_path, ["plan"])[0] == -3
+
+
+@contextmanager
+def little_memory(megabytes):
+    """Fails when the block needs more than that."""
+    tracemalloc.start()
+    try:
+        yield
+        assert tracemalloc.get_traced_memory()[1] < megabytes * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+# -- scenes and tables
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (SCENE + "steps = 1000000000\n", r"motion\[0\].steps"),
+        (SCENE + "steps = 0x" + "f" * 100_000 + "\n", r"motion\[0\].steps"),
+        (SCENE.replace("0.05", "9" * 4000), r"motion\[0\].force"),
+        (
+            SCENE + "steps = 600000\n" + SCENE[SCENE.index("[[m") :] + "steps = 600000\n",
+            "1200000 steps in all",
+        ),
+        (SCENE.replace("force", "f" * 10**6), "an unknown key"),
+        (SCENE.replace("'press'", "'" + "p" * 10**6 + "'"), r"motion\[0\].kind"),
+        (SCENE.replace("'press'", '"two\\nlines"'), r"given two\\nlines"),
+        (SCENE.replace("'flat'", "'profile'\nfile = \"a\\u0000b\""), "surface.file"),
+        (SCENE.replace("'flat'", "'profile'\nfile = '" + "long/" * 2000 + "'"), "surface.file"),
+        (SCENE + "[finger" + ".a" * 3000 + "]\n", "finger"),
+        (SCENE + "[finger]\nwidth = " + "[" * 2000 + "]" * 2000, "finger.width|TOML"),
+        (SCENE + "[finger.materials.dermis]\nlaw = 'neo_hookean'\nE = 0x" + "f" * 9999 + "\nnu = 0.3", "E"),
+    ],
+)
+def test_scenes_beyond_the_limits_are_one_short_line(text, key):
+    with little_memory(60), pytest.raises(InputError, match=key) as caught:
+        loads(text)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 1500
+
+
+def test_files_beyond_the_limits_are_not_read(tmp_path):
+    scene, table = tmp_path / "scene.toml", tmp_path / "scan.csv"
+    with open(scene, "wb") as file:
+        file.truncate(5 * 2**20)
+    with little_memory(2), pytest.raises(InputError, match="at most 4 MB"):
+        load(scene)
+    with open(table, "wb") as file:
+        file.truncate(100 * 2**20)
+    scene.write_text(SCENE.replace("'flat'", "'profile'\nfile = 'scan.csv'"))
+    with little_memory(2), pytest.raises(InputError, match="at most 64 MB"):
+        load(scene)
+    mesh = SCENE + "[finger]\nmesh = 'm.vtu'\n[finger.materials.a]\nlaw = 'neo_hookean'\nE = 1.0\nnu = 0.3\n"
+    scene.write_text(mesh)
+    with open(tmp_path / "m.vtu", "wb") as file:
+        file.truncate(200 * 2**20)
+    with little_memory(2), pytest.raises(InputError, match="at most 128 MB"):
+        load(scene)
+    with little_memory(2), pytest.raises(InputError, match="more than 128 MB"):
+        meshfile.read(tmp_path / "m.vtu")
+
+
+def test_rows_beyond_the_limit_are_refused(tmp_path, monkeypatch):
+    assert tables.MOST_ROWS == 1_000_000
+    monkeypatch.setattr(tables, "MOST_ROWS", 1000)
+    path = tmp_path / "signal.csv"
+    path.write_text("position,voltage\n" + "0,1\n" * 1000)
+    assert len(VoltageProfile.from_csv(path).position) == 1000
+    path.write_text("position,voltage\n" + "0,1\n" * 1001 + "not reached\n")
+    with pytest.raises(InputError, match="at most 1000 rows"):
+        VoltageProfile.from_csv(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: Sinusoid(terms=[[0.1, 1.0, 0.0]] * 1001), "1000 rows"),
+        (lambda: Sinusoid(terms=[[1e300, 1.0, 0.0]]), "within 1e3 mm"),
+        (lambda: Flat(friction=1e300), "0 to 100"),
+        (lambda: Flat(friction=10**400), "0 to 100"),
+        (lambda: Flat(friction=[[0.0, 0.1]] * 10_001), "10000 rows"),
+        (lambda: Flat(y=1e300), "within 1e3 mm"),
+        (lambda: Profile([0.0, 1e-12], [0.0, 1.0]), "1e-09 mm apart"),
+        (lambda: Profile([0.0, 1.0], [0.0, 1e300]), "within 1000 mm"),
+        (lambda: Profile(np.arange(1_000_002.0), np.zeros(1_000_002)), "at most 1000000"),
+        (lambda: VoltageProfile([0.0, 1.0], [0.0, 1e300]), "within 1e[+]06 V"),
+        (lambda: VoltageProfile(np.zeros(1_000_002), np.zeros(1_000_002)), "at most 1000000"),
+    ],
+)
+def test_numbers_beyond_the_limits_are_refused(make, words):
+    with pytest.raises(InputError, match=words):
+        make()
+
+
+# -- meshes
+
+
+def vtu(cells="", head="", attributes="", points="0 0 0"):
+    """A .vtu file with one array of each kind."""
+    return (
+        f'<?xml version="1.0"?>{head}<VTKFile type="UnstructuredGrid" {attributes}><UnstructuredGrid>'
+        '<Piece NumberOfPoints="1" NumberOfCells="1">'
+        f'<Points><DataArray type="Float64" NumberOfComponents="3">{points}</DataArray></Points>'
+        f"<Cells>{cells}</Cells></Piece></UnstructuredGrid></VTKFile>"
+    ).encode()
+
+
+def compressed(data, declared):
+    """An array in VTK's compressed form that says that it has `declared` bytes."""
+    packed = zlib.compress(data)
+    header = np.array([1, declared, declared, len(packed)], dtype="<u8").tobytes()
+    text = (base64.b64encode(header) + base64.b64encode(packed)).decode()
+    return vtu(attributes='header_type="UInt64" compressor="vtkZLibDataCompressor"').replace(
+        b'NumberOfComponents="3">0 0 0', b'NumberOfComponents="3" format="binary">' + text.encode()
+    )
+
+
+LAUGHS = '<!DOCTYPE a [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;">]>'
+ARRAY = '<DataArray type="Int64" Name="{}">{}</DataArray>'
+POLYHEDRON = "".join(
+    ARRAY.format(name, text)
+    for name, text in [
+        ("connectivity", "0"),
+        ("offsets", "1"),
+        ("types", "42"),
+        ("faces", "4611686018427387904 -1"),
+    ]
+)
+MSH = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{}\n1 0 0 0\n$EndNodes\n$Elements\n{}\n$EndElements\n"
+VERTEX = "1\n1 15 2 1 1 1"
+BLOCK = "1 1 1 1\n0 1 15 1\n1 1"
+MSH_4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n{}\n$EndNodes\n$Elements\n{}\n$EndElements\n"
+BOMBS = {
+    "entities.vtu": (vtu(head=LAUGHS), "document type"),
+    "utf-16.vtu": (vtu(head=LAUGHS).decode().encode("utf-16"), "document type"),
+    "polyhedra.vtu": (vtu(POLYHEDRON), "type 42"),
+    "zlib.vtu": (compressed(bytes(20 * 2**20), 2**40), "more than 128 MB"),
+    "zlib-small.vtu": (compressed(bytes(60 * 2**20), 24), "offsets or types"),
+    "points.vtu": (vtu().replace(b'Points="1"', b'Points="9999999999"'), "coordinates of 9999999999"),
+    "elements.vtu": (vtu(cells="<a/>" * 300_000), "more than 100000"),
+    "attributes.vtu": (vtu(attributes=" ".join(f'a{k}=""' for k in range(300_000))), "more than 100000"),
+    "nodes.msh": (MSH.format(10**12, VERTEX), "number of nodes"),
+    "elements.msh": (MSH.format(1, f"{10**12}\n1 15 2 1 1 1"), "number of elements"),
+    "tags.msh": (MSH.format(1, "1\n1 15 1000000000000 1 1 1"), "number of elements"),
+    "tag.msh": (MSH.format(1, "1\n1 15 2 1 1 4611686018427387904"), "out of range"),
+    "data.msh": (MSH.format(1, VERTEX) + "$NodeData\n1000000000000\n$EndNodeData\n", "two-dimensional"),
+    "open.msh": (MSH.format(1, VERTEX) + "$A\n" * 100_000, "without its end"),
+    "binary.msh": (MSH.replace("2.2 0", "2.2 1").format(1, 1), "binary"),
+    "blocks.msh": (MSH_4.format("1000000000000 1 1 1\n0 1 0 1\n1\n0 0 0", BLOCK), "number of nodes"),
+    "block.msh": (MSH_4.format("1 1 1 1\n0 1 0 1000000000000\n1\n0 0 0", BLOCK), "shorter"),
+    "names.msh": (
+        "$PhysicalNames\n1\n" + "".join(f'1 {k} "a{k}"\n' for k in range(2000)) + "$EndPhysicalNames\n"
+        + MSH.format(1, VERTEX),
+        "no .MeshFormat|1000 physical names",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BOMBS)
+def test_meshes_made_to_take_all_memory_or_time_get_a_sentence(name, tmp_path):
+    content, words = BOMBS[name]
+    (tmp_path / name).write_bytes(content.encode() if isinstance(content, str) else content)
+    with little_memory(150), pytest.raises(InputError, match=words) as caught:
+        meshfile.read(tmp_path / name, {"a": 0})
+    assert caught.value.key == "finger.mesh"
+    assert "\n" not in str(caught.value)
+
+
+def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
+    from evfem.mesh import Mesh
+    from evfem.meshcheck import check
+
+    n = 60_000
+    points = np.zeros((n, 2))
+    points[1] = 10.0, 0.0
+    points[2] = 0.0, 10.0
+    cells = np.column_stack([np.zeros(n - 2, int), np.ones(n - 2, int), np.arange(2, n)])
+    mesh = Mesh(points, cells, "triangle", np.zeros(n - 2, int), {"a": 0}, {})
+    with little_memory(60), pytest.raises(InputError, match="nodes in the same place"):
+        check(mesh)
+
+
+def test_an_outline_of_many_short_and_many_long_edges_is_refused():
+    from evfem.mesh import Mesh
+    from evfem.meshcheck import check
+
+    n = 6000  # a fan of needles: edges as long as the finger beside each other
+    angle = np.linspace(0.0, 1.0, n)
+    rim = 10.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    rim[1::2] *= 0.5
+    points = np.vstack([[0.0, 0.0], rim])
+    cells = np.column_stack([np.zeros(n - 1, int), np.arange(1, n), np.arange(2, n + 1)])
+    sets = {"pad": np.array([1, 2]), "bone": np.array([0, n])}
+    mesh = Mesh(points, cells, "triangle", np.zeros(n - 1, int), {"a": 0}, sets)
+    with little_memory(1500), pytest.raises(InputError, match="too close for their lengths"):
+        check(mesh)
+
+
+# -- archives
+
+
+def archive(path, members, compression=zipfile.ZIP_STORED):
+    with zipfile.ZipFile(path, "w", compression) as file:
+        for name, content in members.items():
+            file.writestr(name, content)
+
+
+def npy(array):
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+def header(shape, descr="<f8"):
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text.encode()
+
+
+class Payload:
+    def __reduce__(self):
+        return open, ("owned", "w")
+
+
+def pickled():
+    held = np.empty(1, dtype=object)
+    held[0] = Payload()
+    return npy(held)
+
+
+FORM = npy(np.array(result.RESULT_FORMAT))
+ARCHIVES = {
+    "huge shape": {"a.npy": header("(1000000000000,)") + bytes(8)},
+    "huge product": {"a.npy": header("(4294967296, 4294967296)") + bytes(8)},
+    "huge text": {"a.npy": header("()", "<U999999999") + bytes(8)},
+    "objects": {"a.npy": pickled()},
+    "records": {"a.npy": npy(np.zeros(2, dtype=[("a", "f8"), ("b", "i4")]))},
+    "times": {"a.npy": npy(np.zeros(2, dtype="M8[s]"))},
+    "code": {"a.npy": header("__import__('os').system('touch owned')")},
+    "too long": {"a.npy": npy(np.zeros(3)) + bytes(8)},
+    "no array": {"a.npy": b"mine"},
+    "many members": {f"{k}.npy": b"" for k in range(10_001)},
+}
+
+
+@pytest.mark.parametrize("case", ARCHIVES)
+def test_archives_made_to_take_memory_or_to_run_code_get_a_sentence(case, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    archive("run.npz", {"format.npy": FORM} | ARCHIVES[case])
+    with little_memory(60), pytest.raises(InputError, match="cut off or of another kind"):
+        result.load("run.npz")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
+
+
+def test_compressed_archives_are_refused_before_they_are_inflated(tmp_path):
+    archive(tmp_path / "run.npz", {"format.npy": FORM, "a.npy": npy(np.zeros(10**7))}, zipfile.ZIP_DEFLATED)
+    with little_memory(5), pytest.raises(InputError, match="another kind"):
+        result.load(tmp_path / "run.npz")
+
+
+def test_an_archive_keeps_its_order_of_bytes_and_of_axes(tmp_path):
+    fake_result().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    arrays["mesh/points"] = np.asfortranarray(arrays["mesh/points"]).astype(">f8")
+    with open(tmp_path / "other.npz", "wb") as file:
+        np.savez(file, **arrays)
+    read = result.load(tmp_path / "other.npz")
+    np.testing.assert_array_equal(read.mesh.points, square_mesh().points)
+    assert read.mesh.points.dtype == float
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("mesh/cells", np.full((4, 4), 99)),
+        ("mesh/cells", np.zeros((4, 3), int)),
+        ("mesh/cells", np.zeros((4, 4))),
+        ("mesh/points", np.zeros(9)),
+        ("mesh/region", np.zeros(3, int)),
+        ("mesh/region_names", np.array("[1]")),
+        ("mesh/region_names", np.array("[" * 99_999)),
+        ("mesh/set/pad", np.array([-1])),
+        ("history/motion", np.zeros(4)),
+        ("history/voltage", np.array(["a"] * 4)),
+        ("history/voltage", np.zeros((4, 1))),
+        ("provenance", np.array("[]")),
+        ("frames/gap", np.zeros(3)),
+        ("format", np.array([result.RESULT_FORMAT])),
+    ],
+)
+def test_results_whose_arrays_do_not_fit_get_a_sentence(name, value, tmp_path):
+    fake_result().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as file:
+        arrays = {key: file[key] for key in file.files} | {name: value}
+    with open(tmp_path / "run.npz", "wb") as file:
+        np.savez(file, **arrays)
+    with pytest.raises(InputError, match=r"damaged|another format") as caught:
+        result.load(tmp_path / "run.npz")
+    assert "\n" not in str(caught.value)
