@@ -1,8 +1,8 @@
 """Hard cases: does it converge to the right physics, or say why not, and what does it cost?
 
-Every case states its expected physics and is judged by a number; one that does not converge is listed with its
-message. Outcomes: passed; refused or stopped with a sentence, where that is right; wrong; not converged; error.
-Beside json, csv and picture the table is written as stability.md.
+Every case states its expected physics and is judged by a number; one that does not converge is listed with
+its message. Outcomes: passed; refused or stopped with a sentence, where that is right; wrong; not converged;
+error. Beside json, csv and picture the table is written as stability.md.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ HEAD = (
 ASSUMPTIONS = {
     "outcomes": "passed; refused, stopped: with a sentence, as expected; wrong; not converged; error",
     "steps": "requested steps; parts: as many as were accepted; cuts: attempts that failed and were halved",
-    "force": "largest sum of all forces in any step over the largest force; not with inertia, which carries it",
-    "energy": "energy at the end that no column has, over the largest; trapezoidal works, second order in the "
-    "step; what a snap sets free is lost, not balanced",
+    "force": "largest sum of all forces in any step over the largest force; left out with inertia",
+    "energy": "energy at the end that no column has, over the largest; trapezoidal works, second order in "
+    "the step; what a snap sets free is lost, not balanced",
     "cpu_s": "process time, without imports and compilation; two processes at a time",
     "meshes": "coarse ones; the physics judged here does not need finer ones",
 }

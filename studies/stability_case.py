@@ -1,7 +1,7 @@
 """What a case of the study of stability is, how it is run, and what is recorded of it.
 
-A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances, and
-returns whether the physics is as expected and a sentence with the numbers. Whatever it raises is recorded.
+A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances,
+and returns whether the physics is as expected and a sentence with the numbers. What it raises is recorded.
 """
 
 from __future__ import annotations
@@ -210,10 +210,10 @@ def judge(case: Case) -> Found:
 def _warm_up() -> None:
     """Load and compile what the first simulation of a process would have to pay for."""
     from evfem.electrostatics import Kaczmarek
-    from evfem.scene import Hover, Press, Slide
+    from evfem.motion import Hover, Motion, Press, Slide
     from evfem.surfaces import Display
 
     from .stability_scenes import block, finger
 
-    motion = [Hover(0.1), Press(indentation=0.05, steps=1), Slide(0.1, steps=1)]
+    motion: list[Motion] = [Hover(0.1), Press(indentation=0.05, steps=1), Slide(0.1, steps=1)]
     simulate(Scene(finger(block()), Display(), Kaczmarek(), 100.0, motion))

@@ -33,13 +33,13 @@ GROUPS = (PULL_IN, THIN, VOLTAGE)
 
 
 def _hysteresis(log: Log, law: str, top: float) -> Verdict:
-    up, down = VoltageRamp(top, steps=20), VoltageRamp(0.0, steps=20)
+    up, down = VoltageRamp(top, steps=10), VoltageRamp(0.0, steps=10)
     result = log.simulate(scene(pad(), Display(), Hover(0.05), up, down, law=LAWS[law]))
     touching = result.contact_width > 0.0
-    if touching[0] or not touching[20] or touching[-1]:
+    if touching[0] or not touching[10] or touching[-1]:
         return False, "open, closed and open again at 0 V, full voltage and 0 V: not so"
-    snap_in = float(result.voltage[1:21][touching[1:21]].min())
-    let_go = float(result.voltage[21:][~touching[21:]].max())
+    snap_in = float(result.voltage[1:11][touching[1:11]].min())
+    let_go = float(result.voltage[11:][~touching[11:]].max())
     left = float(np.abs(result.frames[-1].displacement - [0.0, 0.05]).max())
     good = 0.0 < let_go < snap_in and left < 1e-9
     return good, f"snaps in by {snap_in:g} V, lets go by {let_go:g} V; {left:.0e} mm left at the end"
@@ -124,8 +124,8 @@ for _law in LAWS:
 class FixedCharge:
     """Strong-Troxel's law with the charge per area given instead of the voltage.
 
-    "voltage" is what this charge makes of the layers and the first gap; it then changes with the gap. Where the
-    gap is uniform, so is the charge of an electrode: the plate is charge-controlled.
+    "voltage" is what this charge makes of the layers and the first gap; it then changes with the gap. Where
+    the gap is uniform, so is the charge of an electrode: the plate is charge-controlled.
     """
 
     def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
@@ -154,10 +154,8 @@ def _charge(log: Log) -> Verdict:
     travel = (GAP - float(gap[peak])) / a
     falls = bool((np.diff(voltage[peak:]) < 0.0).all()) and peak < len(voltage) - 5
     good = abs(off) < 2e-3 and falls and abs(travel - 1 / 3) < 0.02
-    return (
-        good,
-        f"peak {off:+.3%} off the formula at travel {travel:.3f} (g0 + s), then down to {voltage[-1] / voltage[peak]:.2f}",
-    )
+    fall = voltage[-1] / voltage[peak]
+    return good, f"peak {off:+.3%} off the formula at travel {travel:.3f} (g0 + s), then down to {fall:.2f}"
 
 
 @PULL_IN.case(

@@ -124,7 +124,7 @@ def _body(mesh: Mesh, length: float, stress: float) -> MeshedFinger:
 
 
 def _units(log: Log, length: float, stress: float) -> Verdict:
-    """Forces per mm go with length times stress, energies with its square, voltages with length sqrt(stress)."""
+    """Forces go with length times stress, energies with length^2 stress, voltages with its root."""
     mesh, ends = block(12, 6, sag=0.4), []
     for a, b in ((1.0, 1.0), (length, stress)):
         display = Display(Layer(0.09 * a, 3.35), friction=0.5)

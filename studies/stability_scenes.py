@@ -113,7 +113,7 @@ def finger(mesh: Mesh, E: float = 0.1, nu: float = 0.4, viscosity: float = 0.0) 
 
 def benchmark(level: int = 0, **materials: tuple[float, float]) -> MeshedFinger:
     """Half a finger between two ellipses, tissue and skin; E (MPa) and nu of a region can be replaced."""
-    return layered(benchmark_mesh(level), **(BENCHMARK | materials))
+    return layered(benchmark_mesh(level), **{**BENCHMARK, **materials})
 
 
 def layered(mesh: Mesh, **materials: tuple[float, float]) -> MeshedFinger:

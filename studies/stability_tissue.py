@@ -21,7 +21,6 @@ from evfem.surfaces import Flat, Profile, Sinusoid
 from .stability_case import Group, Log, Verdict
 from .stability_scenes import (
     benchmark,
-    benchmark_mesh,
     block,
     finger,
     grid,
