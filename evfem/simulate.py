@@ -47,8 +47,9 @@ def simulate(
 
     `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)`
     after every converged step (`frame` is None on steps without fields, `checkpoint()` gives the arrays to
-    resume from) and `finished(result)`. `resume` continues from such arrays and rows. Raises `NotConverged`,
-    with the result so far, and leaves everything up to the last good step with the observers.
+    resume from) and `finished(result)`. `resume` continues from such arrays and rows, to the same numbers as
+    without the interruption; the result then has all rows, but fields only of the steps since. Raises
+    `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
     """
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads):

@@ -169,37 +169,41 @@ def kills(count: int, seed: int, out: Path) -> dict[str, float]:
     the largest force, kills before the first step was stored, and CPU seconds.
     """
     rng, begin = Random(seed), _cpu_seconds()
-    lengths: dict[str, float] = {}
+    lengths: dict[str, tuple[float, float]] = {}
     numbers = dict.fromkeys(("kills", "rounds", "broken", "fields_lost", "same_to_the_last_digit"), 0.0)
     numbers |= {"largest_difference": 0.0, "before_the_first_step": 0.0}
     while numbers["kills"] < count:
         name = list(SCENES)[int(numbers["rounds"]) % len(SCENES)]
-        whole = out / f"{name}-whole"
         if name not in lengths:
-            command = prepare(out, name)
-            start = time.perf_counter()
-            finish(out, [*command, "--out", whole.name])
-            lengths[name] = time.perf_counter() - start
-        _round(out, name, (rng, lengths[name], count), numbers)
+            lengths[name] = _whole(out, name)
+        _round(out, name, (rng, *lengths[name], count), numbers)
     return numbers | {"cpu_s": _cpu_seconds() - begin}
 
 
-def _round(out: Path, name: str, plan: tuple[Random, float, int], numbers: dict[str, float]) -> None:
+def _whole(out: Path, name: str) -> tuple[float, float]:
+    """Run a scene that nobody touches: seconds of it all, and from its first file to its last."""
+    command, whole, start = prepare(out, name), out / f"{name}-whole", time.perf_counter()
+    finish(out, [*command, "--out", whole.name])
+    seconds = time.perf_counter() - start
+    return seconds, 1e-9 * (_written(whole / "summary.json") - _written(whole / "fields_00001.vtu"))
+
+
+def _round(out: Path, name: str, plan: tuple[Random, float, float, int], numbers: dict[str, float]) -> None:
     """Kill a run until it has been hit `IN_A_ROW` times or is done, let it finish, compare."""
-    rng, length, count = plan
+    rng, length, computing, count = plan
     folder = out / f"{name}-{int(numbers['rounds'])}"
     run = [*prepare(out, name), "--out", folder.name]
     for _ in range(IN_A_ROW):
-        if numbers["kills"] >= count:
-            break
         resume = ["--resume"] if (folder / ".evfem-files").exists() else []
         if rng.random() < 0.25:  # at any moment, else once it computes
             hit = kill(out, run + resume, rng.uniform(0.0, length))
         else:
-            hit = kill(out, run + resume, rng.uniform(0.0, 0.3 * length), folder / "history.csv")
+            hit = kill(out, run + resume, rng.uniform(0.0, 0.6 * computing), folder / "history.csv")
         numbers["kills"] += hit
         numbers["broken"] += len(broken(folder))
         numbers["before_the_first_step"] += hit and not (folder / "checkpoint.npz").exists()
+        if not hit or numbers["kills"] >= count:
+            break
     finish(out, run + (["--resume"] if (folder / ".evfem-files").exists() else []))
     _judge(out, name, folder, numbers)
 
