@@ -24,10 +24,13 @@ _NAMES = {
     "motion": ("Hover", "Press", "Slide", "VoltageRamp"),
     "plan": ("plan",),
     "result": ("Checkpoint", "Frame", "Result"),
+    "samples": ("Normal", "Samples", "Uniform"),
     "scene": ("Boundary", "Output", "Region", "Scene", "Solver", "default_scene", "form", "grad"),
     "signalfile": ("Playback", "read_signal", "write_signal"),
     "signals": ("Amplifier", "VoltageProfile"),
     "simulate": ("simulate",),
+    "sweep": ("SweepResult", "sweep"),
+    "sweepfile": ("Sweep",),
     "surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
 }

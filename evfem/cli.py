@@ -65,6 +65,10 @@ def parser() -> argparse.ArgumentParser:
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
     study.set_defaults(function=_study)
 
+    sweep = commands.add_parser("sweep", help="run many scenes side by side and write one table of all")
+    _sweep_options(sweep)
+    sweep.set_defaults(function=_sweep)
+
     mesh = commands.add_parser("mesh", parents=[scene], help="write the finger's mesh as .vtu or .msh")
     mesh.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh")
     mesh.set_defaults(function=_mesh)
@@ -73,6 +77,18 @@ def parser() -> argparse.ArgumentParser:
     _signal_options(voltage)
     voltage.set_defaults(function=_signal)
     return top
+
+
+def _sweep_options(sweep: argparse.ArgumentParser) -> None:
+    sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml", help="what is varied, and in which scene")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out")
+    sweep.add_argument(
+        "--resume", action="store_true", help="do not compute finished points of the folder again"
+    )
+    sweep.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
+    )
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
@@ -230,6 +246,26 @@ def _studies() -> ModuleType:
         if error.name != "evfem.studies":
             raise
         raise InputError("study", "a checkout", "an installed evfem: pip install .") from error
+
+
+def _sweep(given: argparse.Namespace) -> int:
+    from evfem.sweep import sweep, told
+    from evfem.sweepfile import load
+    from evfem.sweepfolder import TABLE
+
+    plan = load(given.sweep)
+    path = given.out or Path(f"{plan.name}-out")
+    workers, scheduler = given.workers, given.scheduler
+    try:
+        result = sweep(plan, path, resume=given.resume, workers=workers, scheduler=scheduler, progress=True)
+    except KeyboardInterrupt:
+        return _say(f"interrupted; finished points are in {path}, go on with --resume", INTERRUPTED)
+    wrong = [row for row in result.rows if row["status"] != "done"]
+    for row in wrong[:3]:
+        print(f"evfem: point {row['point']}: {row['message']}", file=sys.stderr)
+    points = result.provenance["points"]
+    print(f"{points['requested']} points: {told(points)}; table in {path / TABLE}", flush=True)
+    return NOT_CONVERGED if wrong else DONE
 
 
 def _mesh(given: argparse.Namespace) -> int:

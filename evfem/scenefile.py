@@ -54,14 +54,30 @@ def load(path: str | Path) -> Scene:
     Raises InputError for whatever cannot be used, StorageError when the disk refuses.
     """
     path = Path(path)
-    _check_size("scene", path, LARGEST_SCENE)
+    return loads(read_text("scene", path), path.parent, path.stem)
+
+
+def read_text(key: str, path: Path) -> str:
+    """The text of a TOML file; errors call the file `key`."""
+    _check_size(key, path, LARGEST_SCENE)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InputError("scene", f"{path}, which is not UTF-8 text", "a scene in TOML") from error
+        raise InputError(key, f"{path}, which is not UTF-8 text", f"a {key} in TOML") from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
-    return loads(text, path.parent, path.stem)
+
+
+def tables_of(key: str, text: str) -> dict[str, Any]:
+    """The tables of a TOML text of our version; errors call the text `key`."""
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML") from error
+    if tables.get("version") != VERSION or isinstance(tables["version"], bool):
+        given = shown(tables["version"]) if "version" in tables else "nothing"
+        raise InputError("version", given, f"version = {VERSION}")
+    return tables
 
 
 def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
@@ -71,13 +87,7 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     >>> loads(text).motion
     (Press(force=0.05, indentation=None, steps=10, speed=None),)
     """
-    try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError("scene", f"no valid TOML: {error}", "a scene in TOML") from error
-    if tables.get("version") != VERSION or isinstance(tables["version"], bool):
-        given = shown(tables["version"]) if "version" in tables else "nothing"
-        raise InputError("version", given, f"version = {VERSION}")
+    tables = tables_of("scene", text)
     top = parse(SceneTable, tables, "")
     folder = Path(folder)
     table = top.electrostatics

@@ -31,13 +31,16 @@ FLOORS = {
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
-        "motion scene scenekeys scenefile result plan stepping model ledger resuming simulate rendering",
+        "motion scene scenekeys scenefile result samples sweepfile plan stepping model ledger resuming simulate rendering",
     ),
-    "edges": ({"numpy", "meshio", "matplotlib"}, "export plotting report runfolder cli"),
+    "edges": (
+        {"numpy", "meshio", "matplotlib", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
+        "export plotting report runfolder sweepfolder pools sweep cli",
+    ),
 }
 ORDER = [name for _, names in FLOORS.values() for name in names.split()]
 #: packages that take long to load, and the modules that are themselves loaded only when they are there
-LATE = {"skfem", "meshio", "matplotlib", "numba", "pypardiso", "tqdm"}
+LATE = {"skfem", "meshio", "matplotlib", "numba", "pypardiso", "tqdm", "distributed", "pyarrow"}
 COMPILED = {"lanes", "kernels", "viscous"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 
