@@ -93,7 +93,7 @@ def sweep(
     pool = open_pool(workers, scheduler)
     run = _Run(plan, None if out is None else SweepFolder(Path(out), resume), progress)
     try:
-        compute(run.waiting(), pool, run.keep)
+        compute(evaluate, run.waiting(), pool, run.keep)
     finally:
         run.close()
     return run.result()
@@ -107,15 +107,19 @@ class _Run:
         self.points = plan.points()
         self.answers: dict[str, Answer] = {}
         self.keys = [self._key(point.text, point.index) for point in self.points]
-        refused = list(self.answers.values())
+        refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
-            raise InputError("sweep", f"no valid point: {refused[0].message}", "at least one valid scene")
+            first = self.answers[self.keys[0]].message
+            raise InputError("sweep", f"no valid point: {first}", "at least one valid scene")
         if folder is not None:
             folder.open()
             for key in set(self.keys) - set(self.answers):
                 if (kept := folder.read(key)) is not None:
                     self.answers[key] = kept
         self.reused = len(self.answers) - len(refused)
+        if progress and refused:
+            count = sum(key in refused for key in self.keys)
+            print(f"{count} of {len(self.keys)} points are no valid scene", file=sys.stderr, flush=True)
         self.written = clock.perf_counter()
         self.bar = _Progress(len(set(self.keys)), self.answers, progress)
 
@@ -220,28 +224,36 @@ def _output(result: Any, name: str) -> float | None:
     return float(found) if math.isfinite(found) else None
 
 
-def compute(waiting: Mapping[str, Job], pool: Open, keep: Callable[[str, Answer], None]) -> None:
-    """Give every job to a pool, and every answer to `keep` as soon as it is there.
+def compute(
+    function: Callable[[Any], Answer],
+    waiting: Mapping[str, Any],
+    pool: Open,
+    keep: Callable[[str, Answer], None],
+) -> None:
+    """Give `function` and every job to a pool, and every answer to `keep` as soon as it is there.
 
     When a process dies, the jobs it may have died of are tried once more, each alone.
     """
     jobs = deque(waiting.items())
     while jobs:
         with pool() as opened:
-            suspects = _drain(opened, jobs, keep)
+            suspects = _drain(function, opened, jobs, keep)
         for key, job in suspects:
-            keep(key, _alone(job))
+            keep(key, _alone(function, job))
 
 
 def _drain(
-    pool: Pool, jobs: deque[tuple[str, Job]], keep: Callable[[str, Answer], None]
-) -> list[tuple[str, Job]]:
+    function: Callable[[Any], Answer],
+    pool: Pool,
+    jobs: deque[tuple[str, Any]],
+    keep: Callable[[str, Answer], None],
+) -> list[tuple[str, Any]]:
     """Work until nothing is left; returns the jobs in hand if the pool broke."""
-    flying: dict[Future[Answer], tuple[str, Job]] = {}
+    flying: dict[Future[Answer], tuple[str, Any]] = {}
     try:
         while jobs or flying:
             while jobs and len(flying) < pool.window:
-                future = pool.executor.submit(evaluate, jobs[0][1])
+                future = pool.executor.submit(function, jobs[0][1])
                 flying[future] = jobs.popleft()
             done, _ = wait(flying, return_when=FIRST_COMPLETED)
             for future in done:
@@ -263,10 +275,10 @@ def _answer(future: Future[Answer]) -> Answer:
         return Answer("failed", 0.0, f"{type(error).__name__}: {error}", {})
 
 
-def _alone(job: Job) -> Answer:
+def _alone(function: Callable[[Any], Answer], job: Any) -> Answer:
     try:
         with processes(1) as pool:
-            return pool.executor.submit(evaluate, job).result()
+            return pool.executor.submit(function, job).result()
     except BrokenExecutor:
         return Answer("failed", 0.0, "its process died; perhaps the memory was not enough", {})
 

@@ -77,7 +77,8 @@ class Sweep:
     folder: Path = Path()
 
     def __post_init__(self) -> None:
-        put(self, grid=dict(self.grid), outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
+        grid = {name: _entry(name, entry) for name, entry in self.grid.items()}
+        put(self, grid=grid, outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
         motions = len(self.tables.get("motion", ()))
         for output in self.outputs:
             _check_output(output, motions)
@@ -136,6 +137,13 @@ class Sweep:
             for key, value in parameters.items():
                 _put_in(scene, key, value)
             yield Point(index, labels, parameters, tomli_w.dumps(scene))
+
+
+def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
+    """An entry of the grid, checked and in Python's own types."""
+    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
+    rows = _axis(name, entry)
+    return {label[name]: row for label, row in rows} if rows[0][0] else [row[name] for _, row in rows]
 
 
 def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
