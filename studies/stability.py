@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from evfem.storage import write_text
 
-from . import stability_contact, stability_electric, stability_same, stability_tissue
+from . import stability_contact, stability_electric, stability_lost, stability_same, stability_tissue
 from .common import Series, Study, make_folder
 from .parallel import side_by_side
 from .stability_case import PASSED, Case, Found, judge
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 GROUPS = tuple(
     group
-    for module in (stability_tissue, stability_electric, stability_contact, stability_same)
+    for module in (stability_tissue, stability_electric, stability_contact, stability_same, stability_lost)
     for group in module.GROUPS
 )
 CASES: Mapping[str, Case] = {case.key: case for group in GROUPS for case in group.cases}

@@ -314,7 +314,7 @@ for _ridges, _mu, _depth in ((False, 0.5, 1.5), (True, 0.5, 1.5), (False, 1.0, 0
     )(partial(_at_once, ridges=_ridges, mu=_mu, depth=_depth))
 
 
-@STEPS.case("3 mm in one step", "the force of thirty steps (no friction)", True)
+@STEPS.case("3 mm in one step", "the force of thirty steps (no friction)")
 def _deep_at_once(log: Log) -> Verdict:
     forces = [
         float(

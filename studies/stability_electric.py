@@ -138,7 +138,9 @@ class FixedCharge:
         return 0.0 * gap * voltage
 
 
-@PULL_IN.case("unstable branch", "a given charge per area: voltage rises to the formula's and falls again")
+@PULL_IN.case(
+    "unstable branch", "a given charge per area: voltage rises to the formula's and falls again", quick=True
+)
 def _charge(log: Log) -> Verdict:
     plate = Plate(StrongTroxel(), 10.0)
     exact, a = plate.exact, GAP + 0.38 / 1650.0 + 0.01 / 3.35
@@ -208,7 +210,7 @@ for _law in LAWS:
         )(partial(_thin, law=_law, thickness=_thickness))
 
 
-@THIN.case("bare electrode", "no insulator: the skin's own layer still limits the force", quick=True)
+@THIN.case("bare electrode", "no insulator: the skin's own layer still limits the force")
 def _bare(log: Log) -> Verdict:
     return _thin(log, "kaczmarek", 0.0)
 
@@ -266,7 +268,7 @@ def _full(log: Log) -> Verdict:
     return abs(ratio - 0.3) < 1e-6, f"F_t/F_n = {ratio:.7f}, F_e = {result.electrostatic_force[-1]:.3f} N/mm"
 
 
-@VOLTAGE.case("attraction alone holds", "no load on the bone: contact carries the attraction", quick=True)
+@VOLTAGE.case("attraction alone holds", "no load on the bone: contact carries the attraction")
 def _alone(log: Log) -> Verdict:
     worst = 0.0
     for body in (finger(block(8, 3, sag=0.4)), pad()):

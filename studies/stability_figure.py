@@ -18,24 +18,25 @@ MARKS = {
     "passed": ("o", COLOURS["kaczmarek"], "passed"),
     "refused": ("s", COLOURS["fe"], "refused with a sentence, as expected"),
     "stopped": ("D", COLOURS["fe"], "stopped with a sentence, as expected"),
-    "wrong": ("X", "#D55E00", "physics not as expected"),
+    "wrong": ("P", "#D55E00", "physics not as expected"),
     "not converged": ("X", "#D55E00", "not converged"),
-    "error": ("X", "#D55E00", "error"),
+    "error": ("v", "#D55E00", "error"),
 }
 BAD = "#D55E00"
 ROW = 0.155  # inches
+#: widths of names, iterations, cuts and seconds
+WIDTHS = [1.5, 1.0, 0.7, 0.16]
 
 
 def draw(found: list[Found]) -> Figure:
-    """Two columns with as many rows each as nearly as groups allow."""
+    """Two columns of groups, about equally long."""
     columns = _columns(found)
     rows = max(_height(column) for column in columns)
-    figure = new_figure(ROW * rows + 1.1, 13.0)
-    grid = figure.add_gridspec(1, 2 * len(columns), width_ratios=[1.0, 1.0] * len(columns))
+    figure = new_figure(ROW * rows + 1.2, 6.5 * len(columns))
+    grid = figure.add_gridspec(1, len(WIDTHS) * len(columns), width_ratios=WIDTHS * len(columns))
     for place, column in enumerate(columns):
-        first = figure.add_subplot(grid[2 * place])
-        second = figure.add_subplot(grid[2 * place + 1])
-        _column(first, second, column, rows)
+        axes = [figure.add_subplot(grid[len(WIDTHS) * place + i]) for i in range(len(WIDTHS))]
+        _column(axes, column, rows)
     _legend(figure, found)
     return figure
 
@@ -43,7 +44,7 @@ def draw(found: list[Found]) -> Figure:
 def _columns(found: list[Found]) -> list[list[Found]]:
     """The cases split between two groups, so that both halves are about as long."""
     starts = [i for i in range(1, len(found)) if found[i].group != found[i - 1].group]
-    if not starts or len(found) < 30:
+    if not starts or len(found) < 20:
         return [found]
     cut = min(starts, key=lambda i: abs(_height(found[:i]) - _height(found[i:])))
     return [found[:cut], found[cut:]]
@@ -54,66 +55,64 @@ def _height(column: list[Found]) -> int:
     return len(column) + 2 * len({one.group for one in column})
 
 
-def _column(left: Axes, right: Axes, column: list[Found], rows: int) -> None:
-    y, labels, previous = 0.0, [], ""
+def _column(axes: list[Axes], column: list[Found], rows: int) -> None:
+    y, previous = 0.0, ""
     for one in column:
         if one.group != previous:
             y += 1.0 if previous else 0.0
-            members = [each for each in column if each.group == one.group]
-            good = sum(each.good for each in members)
-            title = f"{one.group}: {good} of {len(members)}"
-            colour = "black" if good == len(members) else BAD
-            left.text(
-                0.0, y, title, fontsize=8, fontweight="bold", color=colour, va="center",
-                transform=left.get_yaxis_transform(),
-            )  # fmt: skip
+            _heading(axes[0], [each for each in column if each.group == one.group], y)
             y, previous = y + 1.0, one.group
-        _row(left, right, one, y)
-        labels.append((y, one))
+        _row(axes, one, y)
         y += 1.0
-    for ax in (left, right):
-        ax.set_ylim(rows - 0.3, -0.8)
-        ax.set_yticks([])
+    for ax in axes:
+        ax.set(ylim=(rows - 0.3, -0.8), yticks=[])
         ax.spines[["top", "right", "left"]].set_visible(False)
         ax.tick_params(labelsize=7)
-    left.set_xlim(-0.02, 1.0)
-    left.set_xticks([])
-    left.spines["bottom"].set_visible(False)
-    right.set_xscale("symlog", linthresh=1.0)
-    right.set_xlim(0.0, 600.0)
-    right.set_xticks([0, 1, 3, 10, 30, 100, 300], ["0", "1", "3", "10", "30", "100", "300"])
-    right.grid(axis="x", color="#DDDDDD", linewidth=0.5)
-    right.set_axisbelow(True)
-    right.set_xlabel("iterations per step; cuts; CPU seconds", fontsize=8)
+        ax.set_axisbelow(True)
+    for ax in (axes[0], axes[3]):
+        ax.set(xlim=(0.0, 1.0), xticks=[])
+        ax.spines["bottom"].set_visible(False)
+    _scale(axes[1], 1.0, [0, 1, 2, 5, 10, 20, 50, 100], "iterations per step")
+    _scale(axes[2], 1.0, [0, 1, 3, 10, 30, 100], "cuts")
+    axes[3].set_xlabel("CPU s", fontsize=8)
 
 
-def _row(left: Axes, right: Axes, one: Found, y: float) -> None:
+def _heading(ax: Axes, group: list[Found], y: float) -> None:
+    good = sum(one.good for one in group)
+    colour = "black" if good == len(group) else BAD
+    title = f"{group[0].group}: {good} of {len(group)}"
+    ax.text(0.0, y, title, fontsize=8, fontweight="bold", color=colour, va="center")
+
+
+def _scale(ax: Axes, linear: float, ticks: list[int], label: str) -> None:
+    ax.set_xscale("symlog", linthresh=linear)
+    ax.set_xlim(0.0, 1.3 * max(ticks[-1], ax.dataLim.x1 if np.isfinite(ax.dataLim.x1) else 0.0))
+    ax.set_xticks(ticks, [str(tick) for tick in ticks])
+    ax.grid(axis="x", color="#DDDDDD", linewidth=0.5)
+    ax.set_xlabel(label, fontsize=8)
+
+
+def _row(axes: list[Axes], one: Found, y: float) -> None:
     marker, colour, _ = MARKS[one.outcome]
-    left.plot(0.03, y, marker, color=colour, markersize=5 if one.good else 6, clip_on=False)
-    left.text(0.07, y, one.name, fontsize=7, va="center", color="black" if one.good else BAD)
-    if one.steps:
-        right.barh(y, one.iterations / one.steps, height=0.62, color=COLOURS["kaczmarek"], alpha=0.45)
-    if one.cuts:
-        right.plot(one.cuts, y, "|", color="black", markersize=7, markeredgewidth=1.8)
-    right.plot(np.maximum(one.cpu_s, 1e-3), y, ".", color=COLOURS["strong_troxel"], markersize=5)
+    axes[0].plot(0.04, y, marker, color=colour, markersize=5 if one.good else 6, clip_on=False)
+    axes[0].text(0.08, y, one.name, fontsize=7, va="center", color="black" if one.good else BAD)
+    bar = COLOURS["kaczmarek"] if one.good else BAD
+    # a run that never got to the end of a step has spent everything on the first one
+    axes[1].barh(y, one.iterations / max(one.steps, 1), height=0.62, color=bar, alpha=0.55)
+    axes[2].barh(y, one.cuts, height=0.62, color=COLOURS["neutral"])
+    axes[3].text(1.0, y, f"{one.cpu_s:.1f}", fontsize=6.5, va="center", ha="right", color=COLOURS["neutral"])
 
 
 def _legend(figure: Figure, found: list[Found]) -> None:
     from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
 
     seen = [name for name in MARKS if any(one.outcome == name for one in found)]
-    handles: list[Line2D | Patch] = [
+    handles = [
         Line2D([], [], marker=MARKS[name][0], color=MARKS[name][1], linestyle="", label=MARKS[name][2])
         for name in seen
     ]
-    handles += [
-        Patch(color=COLOURS["kaczmarek"], alpha=0.45, label="iterations per step"),
-        Line2D([], [], marker="|", color="black", linestyle="", markeredgewidth=1.8, label="cut attempts"),
-        Line2D([], [], marker=".", color=COLOURS["strong_troxel"], linestyle="", label="CPU seconds"),
-    ]
     good = sum(one.good for one in found)
     figure.legend(
-        handles=handles, loc="outside upper center", ncols=4, fontsize=7.5, frameon=False,
+        handles=handles, loc="outside upper center", ncols=len(seen), fontsize=7.5, frameon=False,
         title=f"{good} of {len(found)} cases end as they should",
     )  # fmt: skip

@@ -203,14 +203,12 @@ def _sharper(surface: object) -> Verdict:
     return bool(found), found[0] if found else "neither the plan nor a warning says so"
 
 
-@MESHES.case(
-    "profile sharper than the nodes", "a warning: nodes 0.5 mm apart miss grooves of 0.1 mm", quick=True
-)
+@MESHES.case("profile sharper than the nodes", "a warning: nodes 0.5 mm apart miss grooves of 0.1 mm")
 def _unresolved(_: Log) -> Verdict:
     x = np.arange(-5.0, 5.001, 0.05)
     return _sharper(Profile(x, np.where(np.round(x / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0))
 
 
-@MESHES.case("wave shorter than the nodes", "a warning: nodes 0.5 mm apart miss waves of 0.2 mm", quick=True)
+@MESHES.case("wave shorter than the nodes", "a warning: nodes 0.5 mm apart miss waves of 0.2 mm")
 def _short_wave(_: Log) -> Verdict:
     return _sharper(Sinusoid(terms=[[0.005, 2.0 * np.pi / 0.2, 0.0]], friction=0.0))
