@@ -98,6 +98,8 @@ def draw(runs: list[Run]) -> Figure:
 
 
 def _panel(ax: Axes, scene: str, curves: list[Series]) -> None:
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     for curve in curves:
         _, package, element = curve.name.split()
         name, colour, marker = STYLE[package]
@@ -106,4 +108,8 @@ def _panel(ax: Axes, scene: str, curves: list[Series]) -> None:
         ax.plot(curve.x, curve.y, style, color=colour, marker=marker, markerfacecolor=face, label=label)
     ax.axhspan(1e-4, UNCERTAINTY[scene], color=COLOURS["neutral"], alpha=0.15, label="reference uncertain")
     ax.set(xscale="log", yscale="log", xlabel="CPU seconds")
+    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter(NullFormatter())  # its labels would overlap where the axis is short
+    ax.tick_params(axis="x", labelsize="small")
     ax.set_title(f"Scene {scene}", loc="left", fontsize="medium")
