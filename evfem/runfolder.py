@@ -151,9 +151,14 @@ def saved(path: Path, scene: Scene) -> Saved | None:
     """
     if (path / STATE).is_file():
         return Checkpoint(path / STATE).read(scene.digest())
-    if (path / MANIFEST).is_file() and not _present(path):
+    if (path / MANIFEST).is_file() and _without_a_row(path / HISTORY):
         return None
     raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
+
+
+def _without_a_row(history: Path) -> bool:
+    with _storing(history):
+        return not history.exists() or history.stat().st_size <= len(csv_header())
 
 
 def _present(path: Path) -> list[str]:

@@ -14,7 +14,7 @@ from evfem.studies import killing
 
 import evfem
 from evfem import cli, export, runfolder, storage
-from evfem.result import COLUMNS, Saved
+from evfem.result import COLUMNS, Saved, csv_header
 from evfem.scenefile import load
 from evfem.simulate import simulate
 from evfem.storage import load_arrays, save_arrays
@@ -161,19 +161,27 @@ def test_a_whole_checkpoint_is_used(place):
     assert len(list((place / "stopped").glob("fields_*.vtu"))) == 20
 
 
-def test_resuming_a_run_killed_before_its_first_step_begins_it(place):
+@pytest.mark.parametrize("written", [[], ["history.csv"], ["history.csv", "fields_00001.vtu"]])
+def test_resuming_a_run_killed_before_its_first_step_was_stored_begins_it(place, written):
     for path in (place / "stopped").iterdir():
-        if path.name != ".evfem-files":
+        if path.name not in (".evfem-files", *written):
             path.unlink()
+    if written:
+        (place / "stopped" / "history.csv").write_text(csv_header())
     (place / "stopped" / ".history.csv.123.tmp").write_text("half")
     status, error = run(place, "--resume", "--no-fields")
     assert status == 0, error
-    assert sorted(contents(place / "stopped")) == [
-        ".evfem-files",
-        "checkpoint.npz",
-        "history.csv",
-        "summary.json",
-    ]
+    names = [".evfem-files", "checkpoint.npz", "history.csv", "summary.json"]
+    assert sorted(contents(place / "stopped")) == names
+
+
+def test_a_history_without_its_checkpoint_is_not_overwritten(place):
+    (place / "stopped" / "checkpoint.npz").unlink()
+    before = contents(place / "stopped")
+    status, error = run(place, "--resume")
+    assert status == 2
+    assert "without checkpoint.npz" in error
+    assert contents(place / "stopped") == before
 
 
 def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(place):
