@@ -39,8 +39,8 @@ ASSUMPTIONS = {
     "them, and form_cpu_s what of it went into the forms",
     "peak_MB": "largest resident memory of the process, interpreter and imports (imported_MB) included",
     "contact": "evfem exact; peers: penalty of 1000 N/mm per mm at every node, below 0.1 um of penetration, "
-    "the same spring for sticking friction; GetFEM's own augmented Lagrangian takes as many iterations on "
-    "larger matrices and did not converge in B",
+    "the same spring for sticking friction; GetFEM's own brick, an augmented Lagrangian, takes as many "
+    "iterations in A on larger matrices, and full Newton steps with it did not converge in B",
     "solver": "evfem and FElupe PARDISO; FEniCSx MUMPS by PETSc (CHOLMOD is as fast on L2, UMFPACK and "
     "SuperLU are slower); GetFEM its own interface to MUMPS, which analyses every matrix anew; symmetric "
     "where the tangent is (A)",
