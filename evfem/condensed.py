@@ -34,7 +34,8 @@ class Candidates:
     contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
     interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
     for the penalty variant, which thereby needs no other solver. `fall` (c,) N/mm per mm: how fast the
-    attraction falls with the gap; `rise` (c,): slope of the friction coefficient in 1/mm.
+    attraction falls with the gap; `closing` (c,) N/mm: what it gains when the gap closes; `rise` (c,): slope
+    of the friction coefficient in 1/mm.
     """
 
     frame: Frame
@@ -44,6 +45,7 @@ class Candidates:
     friction: Floats
     softness: Floats
     fall: Floats
+    closing: Floats
     rise: Floats
 
     @property
@@ -67,7 +69,7 @@ class Candidates:
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses (c,), the
-    bone's step (2,), number of dense contact solves.
+    extra unknowns, number of dense contact solves, and whether the attraction's fall had to be reduced.
     """
 
     moved: Floats
@@ -75,6 +77,7 @@ class Motion:
     status: Ints
     extra: Floats
     solves: int
+    reduced: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +120,7 @@ class Step:
     back.
 
     `residual` g (m,) of the forward solve; `bone` (2,) the bone's known step; `unknowns` what else moves the
-    body.
+    body; `snap`: nodes that the body cannot hold against the attraction close at once.
     """
 
     body: Condensed
@@ -125,6 +128,7 @@ class Step:
     residual: Floats
     bone: Floats
     unknowns: tuple[Unknown, ...] = ()
+    snap: bool = False
 
     def solve(self) -> Motion:
         """Contact among the candidates, their motion, and the extra unknowns."""
@@ -149,7 +153,7 @@ class Step:
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(2, -1).T
-        return Motion(moved, force, status, found.extra, solves)
+        return Motion(moved, force, status, found.extra, solves, found.reduced)
 
     def _along_normal(self, moved: Floats) -> Floats:
         return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
@@ -186,7 +190,8 @@ class Step:
         compliance[np.diag_indices_from(compliance)] += known.softness[near].T.ravel()
         border = self._border(rows, free, (C, W), turning, axes) if self.unknowns else None
         problem = ContactProblem(start, compliance, known.friction[near], border)
-        found = solve_pulled(problem, Pull(known.fall[near], known.frame.normal_gap[near]), status)
+        pull = Pull(known.fall[near], known.frame.normal_gap[near], known.closing[near])
+        found = solve_pulled(problem, pull, status, self.snap)
         force = np.einsum("ak,kab->kb", (found.force + found.relief).reshape(2, -1), axes).ravel()
         return found, force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
 

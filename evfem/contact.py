@@ -16,7 +16,8 @@ BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 ========  ==========================  =================================================
 
 The attraction of an open node falls with its gap: its `relief` is one more unknown there, f = fall (g -
-level). A closed node needs none, its gap is known; so a thin insulator's steep law acts only where it can.
+level). A closed node needs none, its gap is known: the attraction is what it is at g = 0, its `closing` more
+than at the present gap. So a thin insulator's steep law acts only where it can.
 
 A warm-started active set changes all violated nodes at once: open -> slip the way it is moving when the gap
 closes, slip -> open when it pulls, stick -> slip with the sign of its force when it leaves the cone, slip ->
@@ -58,11 +59,12 @@ class Border:
 @dataclass(frozen=True)
 class Pull:
     """An attraction of open nodes that falls by `fall` (k,) per unit of gap from its value at the gap
-    `level` (k,).
+    `level` (k,), and grows by `closing` (k,) when the gap closes.
     """
 
     fall: Floats
     level: Floats
+    closing: Floats
 
 
 @dataclass(frozen=True)
@@ -87,8 +89,8 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), what open nodes are pulled less (2 k,), statuses (k,), the extra unknowns (p,),
-    new gaps and slips (2 k,), and the number of dense solves.
+    """Contact forces (2 k,), what nodes are pulled less (2 k,), statuses (k,), the extra unknowns (p,), new
+    gaps and slips (2 k,), the number of dense solves, and whether the attraction's fall had to be reduced.
     """
 
     force: Floats
@@ -97,6 +99,7 @@ class ContactSolution:
     extra: Floats
     state: Floats
     solves: int
+    reduced: bool = False
 
 
 def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> ContactSolution:
@@ -132,39 +135,60 @@ def _active_set(problem: ContactProblem, status: Ints, limit: int) -> ContactSol
     raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")
 
 
-def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints) -> ContactSolution:
+def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints, snap: bool = False) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted. Where the body could not hold the attraction's fall
-    (the pad snaps) the linearised problem has no solution or the wrong one; then the fall is reduced to what
-    it can hold.
+    (the pad snaps) the linearised problem has no solution or the wrong one. Then the fall is reduced to what
+    it can hold, which goes the right way in small steps, or with `snap` the nodes that are being lost close.
     """
     if not pull.fall.any():
         return solve_contact(problem, status)
-    k = problem.size
+    pulled = replace(problem, pull=pull)
     root = np.sqrt(pull.fall)
-    gain = root[:, None] * problem.compliance[:k, :k] * root
+    gain = root[:, None] * problem.compliance[: problem.size, : problem.size] * root
     if np.abs(gain).sum(axis=1).max() < STABLE:
-        return solve_contact(replace(problem, pull=pull), status)
-    try:
-        found = solve_contact(replace(problem, pull=pull), status)
-        if _feedback(problem, pull, found.status) < 1.0:
+        return solve_contact(pulled, status)
+    for start in (status, _snapped(problem, pull, status)) if snap else (status,):
+        try:
+            found = solve_contact(pulled, start)
+        except ContactNotSolved:
+            continue
+        if _feedback(problem, pull, found.status)[0] < 1.0:
             return found
-    except ContactNotSolved:
-        pass
-    reduced = pull.fall * (STABLE / max(_feedback(problem, pull, np.full(k, OPEN)), STABLE))
-    return solve_contact(replace(problem, pull=replace(pull, fall=reduced)), status)
+    share = STABLE / max(_feedback(problem, pull, np.full(problem.size, OPEN))[0], STABLE)
+    held = replace(problem, pull=replace(pull, fall=share * pull.fall))
+    return replace(solve_contact(held, status), reduced=True)
 
 
-def _feedback(problem: ContactProblem, pull: Pull, status: Ints) -> float:
-    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held."""
+def _feedback(problem: ContactProblem, pull: Pull, status: Ints) -> tuple[float, Floats]:
+    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held, and
+    the gaps (k,) that grow with it.
+    """
     k, C = problem.size, problem.compliance
     free, closed = np.flatnonzero((status == OPEN) & (pull.fall > 0.0)), np.flatnonzero(status != OPEN)
+    mode = np.zeros(k)
+    if not free.size:
+        return 0.0, mode
     held = C[np.ix_(free, free)]
     if closed.size:
         rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
         held = held - C[np.ix_(free, rows)] @ np.linalg.solve(C[np.ix_(rows, rows)], C[np.ix_(rows, free)])
     root = np.sqrt(pull.fall[free])
     gain = root[:, None] * held * root
-    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T)).max(initial=0.0))
+    factors, modes = np.linalg.eigh(0.5 * (gain + gain.T))
+    mode[free] = modes[:, -1] / root
+    return float(factors[-1]), mode
+
+
+def _snapped(problem: ContactProblem, pull: Pull, status: Ints) -> Ints:
+    """Statuses (k,) with those open nodes closed that move most in the mode that is being lost, if it is on
+    its way to the surface.
+    """
+    factor, mode = _feedback(problem, pull, status)
+    drift = solve_contact(problem, status).state[: problem.size] - pull.level
+    if factor < 1.0 or drift @ (pull.fall * mode**2) >= 0.0:
+        return status
+    lost = (np.abs(mode) > 0.5 * np.abs(mode).max()) & (drift < 0.0)
+    return np.where(lost, STICK, status)
 
 
 def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
@@ -184,7 +208,10 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
     right = -problem.start[rows]
+    relief = np.zeros(2 * k)
     if problem.pull is not None:
+        relief[active] = -problem.pull.closing[active]
+        right -= C[rows] @ relief
         own = np.arange(rows.size - pulled.size, rows.size)
         matrix[own, own] -= 1.0 / problem.pull.fall[pulled]
         right[own] += problem.pull.level[pulled]
@@ -192,12 +219,12 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         row = border.row[:, rows]
         row[:, : active.size] += border.row[:, k + active] * ratio[active]
         matrix = np.block([[matrix, border.effect[rows]], [row, border.pivot]])
-        right = np.append(right, border.value)
+        right = np.append(right, border.value - border.row @ relief)
     try:
         x = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
         raise ContactNotSolved(str(error)) from error
-    force, relief = np.zeros(2 * k), np.zeros(2 * k)
+    force = np.zeros(2 * k)
     contact = rows.size - pulled.size
     force[rows[:contact]] = x[:contact]
     relief[pulled] = x[contact : rows.size]

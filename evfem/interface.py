@@ -36,6 +36,15 @@ class Interface:
         """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
         return self.points + u[self.pad.nodes]
 
+    def resting(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface: below a thin
+        insulator the rounding of their gaps would be a force.
+        """
+        position = self.positions(state.u)
+        touching = state.status != OPEN
+        position[touching, 1] -= outline.frame(self.surface, position).gap[touching]
+        return position
+
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
         frame = outline.frame(self.surface, self.positions(state.u))
@@ -43,8 +52,10 @@ class Interface:
         slope, stretch = frame.slope, frame.stretch
         return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
 
-    def describe(self, old: State, state: State, c: Ints, fall: Floats) -> Candidates:
-        """What the contact problem has to know of the candidates c; `fall` (P,) of the attraction."""
+    def describe(self, old: State, state: State, c: Ints, fall: Floats, closing: Floats) -> Candidates:
+        """What the contact problem has to know of the candidates c; `fall` (P,) of the attraction, and what
+        it gains when a node closes (P,).
+        """
         position = self.positions(state.u)[c]
         frame = outline.frame(self.surface, position)
         softness = self._softness(old)[c]
@@ -53,7 +64,15 @@ class Interface:
         friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
         rise = np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape)
         return Candidates(
-            frame, slip, state.contact_force[c], state.status[c], friction, softness, fall[c], rise
+            frame,
+            slip,
+            state.contact_force[c],
+            state.status[c],
+            friction,
+            softness,
+            fall[c],
+            closing[c],
+            rise,
         )
 
     def _origin(self, old: State) -> Floats:

@@ -16,7 +16,7 @@ from evfem import pad as outline
 from evfem.attraction import Attraction
 from evfem.body import Body
 from evfem.condensed import Condensed
-from evfem.contact import OPEN
+from evfem.contact import OPEN, STICK
 from evfem.interface import Interface
 from evfem.linear import Singular, make_condensation
 from evfem.mesh import Floats, Ints
@@ -152,7 +152,18 @@ class Linearisation:
         """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
-        return self.attraction.fall(self.interface.positions(state.u), state.voltage, self.touching)
+        return self.attraction.fall(self.interface.resting(state), state.voltage, self.touching)
+
+    def closing(self, state: State) -> Floats:
+        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+            return np.zeros(self.pad.nodes.size)
+        everywhere = replace(state, status=np.full_like(state.status, STICK))
+        now, closed = (
+            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching)[:, 1]
+            for s in (state, everywhere)
+        )
+        return np.maximum(now - closed, 0.0)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for its fall with a node's own gap, which belongs
@@ -160,7 +171,7 @@ class Linearisation:
         """
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return None
-        position, c = self.interface.positions(state.u), self.candidates
+        position, c = self.interface.resting(state), self.candidates
         whole = self.attraction.stiffness(position, state.voltage, self.touching)
         unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
         rows = whole[unknowns]

@@ -35,6 +35,8 @@ from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, State, StepFailed, Ta
 
 MAX_ITERATIONS = 40
 SMALLEST_J = 0.05
+#: so many iterations in a row that cannot hold the attraction show that nodes are being lost to it
+LOST = 3
 #: under a prescribed force the bone moves at most this share of the body's height in one iteration
 LONGEST_STRIDE = 0.05
 #: a step begins at most so many last steps ahead
@@ -64,6 +66,7 @@ class Equilibrium:
         self.stride = LONGEST_STRIDE * float(np.ptp(self.points[:, 1]))
         self._mixing = Mixing()
         self._steering = NONE
+        self._reduced = 0
 
     # -- what a state is
 
@@ -158,7 +161,7 @@ class Equilibrium:
         self.linear.start_clock(old, target.duration)
         self._mixing.reset()
         self.interface.pins.begin(self.positions(old.u)[:, 0])
-        self._steering = self._first_steering(old, target)
+        self._steering, self._reduced = self._first_steering(old, target), 0
         return state
 
     def _iterate(self, old: State, state: State, target: Target, balance: Balance) -> State:
@@ -247,19 +250,20 @@ class Equilibrium:
         """
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return self.attraction.forces(self.positions(state.u), voltage, old.status != OPEN)
+        return self.attraction.forces(self.interface.resting(state), voltage, old.status != OPEN)
 
     def _advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """One outer iteration: solve the contact problem of the linearised body, move, shorten where cells
         would collapse."""
         saved, g = self.linear.factor.forward(-balance.forces)
-        known = self.interface.describe(old, state, self.linear.candidates, self.linear.fall(state))
+        pull = self.linear.fall(state), self.linear.closing(state)
+        known = self.interface.describe(old, state, self.linear.candidates, *pull)
         bone = target.bone - state.bone
         unknowns: tuple[Unknown, ...] = ()
         if target.force is not None:
             bone = np.array([bone[0], 0.0])
             unknowns = (Unknown(-self.linear.condensed.schur[:, -1], 1, -target.force),)
-        step = Step(self.linear.condensed, known, g, bone, unknowns)
+        step = Step(self.linear.condensed, known, g, bone, unknowns, self._reduced >= LOST)
         squared = 0.0
         if self._steering == FREE:
             found, saved, squared = self._steer(step, state, target, saved)
@@ -296,6 +300,7 @@ class Equilibrium:
     def _solve(self, step: Step) -> Motion:
         found = step.solve()
         self.record.contact_solves += found.solves
+        self._reduced = self._reduced + 1 if found.reduced else 0
         return found
 
     def _steer(self, step: Step, state: State, target: Target, saved: Floats) -> tuple[Motion, Floats, float]:
@@ -306,7 +311,7 @@ class Equilibrium:
         assert target.tangential_force is not None
         nodal = np.zeros_like(state.u)
         nodal[self.pad.nodes] = self.attraction.forces(
-            self.positions(state.u), KILOVOLT, self.linear.touching
+            self.interface.resting(state), KILOVOLT, self.linear.touching
         )
         unit, push = self.linear.factor.forward(self.body.reduce(nodal))
         steered = replace(step, unknowns=(*step.unknowns, Unknown(push, 0, target.tangential_force)))

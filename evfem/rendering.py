@@ -212,24 +212,19 @@ def replay(
 
 
 def exact(
-    reference: Recording,
-    display: Surface,
-    law: ForceLaw,
-    largest_voltage: float = 10_000.0,
-    start: float | None = None,
+    reference: Recording, display: Surface, law: ForceLaw, largest_voltage: float = 10_000.0
 ) -> Recording:
     """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
 
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as
-    its equation; where that lies outside, the voltage stays at its limit. The voltage found is in
-    `result.voltage`. Before the position `start` (mm) it stays 0: while the contact sticks, attraction
-    hardly changes the friction force, and a wish above what sticking gives cannot be met.
+    its equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
+    attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
+    was. The voltage found is in `result.voltage`; `Comparison.unmet` says where
+    the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
-    wish = felt.tangential_force
-    if start is not None:
-        wish = np.where(felt.position < start, -np.max(np.abs(wish)), wish)
-    return replay(reference, display, law, FollowForce(felt.position, wish, largest_voltage))
+    wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
+    return replay(reference, display, law, wish)
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,6 +233,10 @@ class Comparison:
 
     `position` (n,) mm, `error` (n,) N/mm = rendered - reference; `pearson` is nan where a force is constant.
     `voltage_difference` (V) is the largest one between the two runs.
+
+    >>> found = Comparison(np.arange(3.0), np.array([1e-3, 0.0, 1e-9]), 0.99, 0.01, 0.0)
+    >>> found.largest_error, found.unmet(1e-6).tolist()
+    (0.001, [True, False, False])
     """
 
     position: Array
@@ -250,6 +249,10 @@ class Comparison:
     def largest_error(self) -> float:
         """Largest deviation of the friction force in N/mm."""
         return float(np.max(np.abs(self.error)))
+
+    def unmet(self, tolerance: float) -> Array:
+        """Where the wish was missed by more than `tolerance` (N/mm), (n,) bool."""
+        return np.abs(self.error) > tolerance
 
 
 def compare(reference: Result, rendered: Result) -> Comparison:

@@ -12,7 +12,6 @@ import numpy as np
 
 from evfem.electrostatics import Kaczmarek, Layer, Layers
 from evfem.encoding import AreaLaw, Encoding
-from evfem.errors import NotConverged
 from evfem.fingerpad import TABLE_2, Electrical, FingerPad
 from evfem.materials import NeoHookean
 from evfem.rendering import (
@@ -37,8 +36,6 @@ JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0
 SKIN, AREA = 0.20, AreaLaw(112.0)
 #: a display with less friction than this share of the texture's own is not taken seriously
 LEAST_SHARE = 0.2
-#: how far behind full slip (mm) exact encoding may have to begin
-STARTS = (0.0, 0.05, 0.1, 0.2, 0.4)
 ASSUMPTIONS = {
     "load": "0.05 N/mm at first (0.5 N over 10 mm, the light touch of section 3.2.5); the paper prints none",
     "held": "the indentation reached is held while sliding, the display is pressed to the reference's load",
@@ -202,24 +199,11 @@ def render(case: Case) -> Outcome:
 def _replayed(kind: str, case: Case, reference: Recording, friction: float, signal: Signal) -> Recording:
     display = Display(friction=friction)
     if kind == "exact":
-        return _exact(reference, display)
+        return exact(reference, display, Kaczmarek())
     if kind == "thick":
         finger = pad(replace(case, skin=0.38))
         reference = replace(reference, scene=replace(reference.scene, finger=finger))
     return replay(reference, display, Kaczmarek(), signal.profile)
-
-
-def _exact(reference: Recording, display: Display) -> Recording:
-    """Exact encoding from the first step on; where sticking contact leaves a wish without a solution, from
-    full slip on or soon after.
-    """
-    slip = reference.full_slip or 0.0
-    for start in (None, *(slip + later for later in STARTS[:-1])):
-        try:
-            return exact(reference, display, Kaczmarek(), start=start)
-        except NotConverged:
-            continue
-    return exact(reference, display, Kaczmarek(), start=slip + STARTS[-1])
 
 
 def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:

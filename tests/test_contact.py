@@ -14,7 +14,9 @@ from evfem.contact import (
     Border,
     ContactNotSolved,
     ContactProblem,
+    Pull,
     solve_contact,
+    solve_pulled,
 )
 
 
@@ -256,3 +258,42 @@ def test_nothing_touches_nothing_pushes():
     assert not found.force.any()
     assert found.status.tolist() == [OPEN, OPEN]
     np.testing.assert_allclose(found.state, problem.start)
+
+
+def lost(gap, fall=30.0, closing=12.0):
+    """A node of compliance 0.1 mm per N/mm at the gap 1 mm, drawn to `gap` by an attraction it cannot hold:
+    its fall times the compliance is 3, so what it moves returns to it threefold.
+    """
+    problem = ContactProblem(np.array([gap, 0.0]), 0.1 * np.eye(2), np.zeros(1))
+    return problem, Pull(np.array([fall]), np.array([1.0]), np.array([closing]))
+
+
+def test_a_node_that_cannot_be_held_moves_the_right_way_or_snaps():
+    problem, pull = lost(gap=0.98)
+    slow = solve_pulled(problem, pull, np.array([OPEN]))
+    # with the fall reduced to nine tenths of what can be held the way is ten times the free one
+    assert slow.reduced
+    assert slow.state[0] == pytest.approx(1.0 - 0.02 / (1.0 - 0.9), rel=1e-12)
+    quick = solve_pulled(problem, pull, np.array([OPEN]), snap=True)
+    # closed, it presses with what the attraction gains less what the spring takes
+    assert not quick.reduced
+    assert quick.status.tolist() == [FORWARD]
+    assert quick.force[0] == pytest.approx(12.0 - 0.98 / 0.1, rel=1e-12)
+
+
+def test_a_node_on_its_way_up_does_not_snap():
+    problem, pull = lost(gap=1.02)
+    found = solve_pulled(problem, pull, np.array([OPEN]), snap=True)
+    assert found.reduced
+    assert found.status.tolist() == [OPEN]
+    assert found.state[0] > 1.0
+
+
+def test_an_attraction_that_can_be_held_is_taken_whole_and_a_closed_node_feels_all_of_it():
+    problem, pull = lost(gap=0.98, fall=5.0)
+    held = solve_pulled(problem, pull, np.array([OPEN]))
+    assert not held.reduced
+    assert held.state[0] == pytest.approx(1.0 - 0.02 / (1.0 - 0.5), rel=1e-12)
+    pressed = solve_pulled(problem, pull, np.array([FORWARD]))
+    assert pressed.status.tolist() == [FORWARD]
+    assert pressed.force[0] == pytest.approx(12.0 - 0.98 / 0.1, rel=1e-12)

@@ -70,6 +70,19 @@ def test_thin_insulators(thickness):
     assert result.electrostatic_force[4] > 5.0 * thick.electrostatic_force[-1]
 
 
+def test_a_thin_insulator_by_strong_troxels_law():
+    """200 nm at 140 V: up to 1 MPa that falls within a fraction of a micrometre, so nodes snap one by one.
+    Touching nodes are on the surface to the last digit; the rounding of their gaps would be a force.
+    """
+    surface = Display(Layer(2e-4, 3.35), friction=0.3)
+    voltage = {"law": StrongTroxel(), "voltage": 140.0}
+    result = run(surface, Press(force=0.05, steps=5), Slide(0.6, steps=3), **voltage)
+    assert result.electrostatic_force[4] > 20.0 * 0.05
+    np.testing.assert_allclose(result.applied_force[:5], 0.01 * np.arange(1, 6), rtol=1e-6)
+    balance = result.normal_force - result.electrostatic_force - result.applied_force
+    assert np.abs(balance).max() < 1e-7 * result.normal_force.max()
+
+
 def test_snapping_in_and_letting_go_at_another_voltage():
     """Hover at 0.05 mm: the pad jumps to contact between 2000 and 5000 V and lets go at a lower voltage."""
     up, down = VoltageRamp(5000.0, steps=20), VoltageRamp(0.0, steps=20)

@@ -21,7 +21,7 @@ from evfem.rendering import (
     voltage_for,
 )
 from evfem.scene import Scene, Solver
-from evfem.signals import Amplifier, VoltageProfile
+from evfem.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.surfaces import Display, Flat, Sinusoid
 
 PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)
@@ -161,15 +161,20 @@ def test_where_the_wish_is_below_the_displays_own_friction(jump):
     assert (signal.profile(found.result.position[slide][own]) == 0.0).all()
 
 
-def test_the_voltage_waits_for_its_start(jump):
-    found = exact(jump, Display(friction=0.25), Kaczmarek(), start=0.55)
+def test_a_wish_beyond_what_a_sticking_pad_gives_waits_for_full_slip(jump):
+    felt = apparent_friction(jump.result)
+    wish = FollowForce(felt.position, 1.2 * felt.tangential_force, 10_000.0)
+    found = replay(jump, Display(friction=0.3), Kaczmarek(), wish)
     slide = np.array(found.result.motion) == "slide"
-    early = found.result.position[slide] < 0.55
-    assert found.result.voltage[slide][early].max() == 0.0
-    assert found.result.voltage[slide][~early].min() > 500.0
-    error = compare(jump.result, found.result).error
-    assert np.abs(error[~early]).max() < 1e-10
-    assert error[early][-1] == pytest.approx(-0.05 * 0.02, rel=0.05)
+    voltage, force = found.result.voltage[slide], found.result.applied_tangential_force[slide]
+    sticks = found.result.position[slide] < jump.full_slip
+    assert sticks.any()
+    assert voltage[sticks].max() == 0.0
+    np.testing.assert_allclose(force[~sticks], 1.2 * felt.tangential_force[1:][~sticks], rtol=1e-7)
+    assert voltage[~sticks].min() > 500.0
+    unmet = compare(jump.result, found.result).unmet(0.05 * felt.tangential_force.max())
+    assert not unmet[sticks].any()  # the same friction, so the same force as the reference
+    assert unmet[~sticks].all()
 
 
 def test_a_limited_voltage_reproduces_as_much_as_it_can(jump):
