@@ -4,8 +4,8 @@
 Scenes go through `evfem plan`; profiles, voltage files and meshes through `evfem run` of one step on a small
 square; checkpoints through `evfem run --resume`; saved results through `evfem.result.load`. A failure is
 anything but exit status 0, 2 or 3, a message of more than one line, a warning, anything left behind by a
-refused file, more than `LONGEST` CPU seconds, or a file that a pickled object would have made. The other half,
-runs that are killed, is in `evfem.studies.killing`.
+refused file, more than `LONGEST` CPU seconds, or a file that a pickled object would have made. The other
+half, runs that are killed, is in `evfem.studies.killing`.
 """
 
 from __future__ import annotations
