@@ -38,7 +38,6 @@ class Log:
     energy_error: float = 0.0
     refused: bool = False
     stopped: bool = False
-    results: list[Result] = field(default_factory=list)
 
     def simulate(self, scene: Scene) -> Result:
         """The result of a scene; a step that does not converge is logged and raised again."""
@@ -78,7 +77,7 @@ class Log:
         if len(result.step):
             if scene.solver.dynamics != "inertial":  # there mass carries the difference
                 self.force_error = max(self.force_error, float(out_of_balance(result).max()))
-            self.energy_error = max(self.energy_error, abs(lost_energy(result)), key=abs)
+            self.energy_error = max(self.energy_error, abs(lost_energy(result)))
 
 
 def out_of_balance(result: Result) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -75,6 +75,8 @@ class Plate:
     def scene(self, *motion: VoltageRamp, law: Any = None) -> Scene:
         """Hover, then ramps of the voltage."""
         mesh = block(4, 4, width=WIDTH, height=self.thickness)
+        sides = np.flatnonzero(np.abs(mesh.points[:, 0]) > 0.499 * WIDTH)
+        mesh = replace(mesh, node_sets={**mesh.node_sets, "sides": sides})
         body = MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=NU)}, SKIN)
         whole = scene(
             body, Display(THIN_LAYER), Hover(GAP), *motion, law=law or self.law, coupling=self.solver

@@ -72,7 +72,7 @@ def _column(axes: list[Axes], column: list[Found], rows: int) -> None:
     for ax in (axes[0], axes[3]):
         ax.set(xlim=(0.0, 1.0), xticks=[])
         ax.spines["bottom"].set_visible(False)
-    _scale(axes[1], 1.0, [0, 1, 2, 5, 10, 20, 50, 100], "iterations per step")
+    _scale(axes[1], 1.0, [0, 1, 3, 10, 30, 100], "iterations per step")
     _scale(axes[2], 1.0, [0, 1, 3, 10, 30, 100], "cuts")
     axes[3].set_xlabel("CPU s", fontsize=8)
 

@@ -41,8 +41,7 @@ def grid(x: Floats, y: Floats) -> Mesh:
     node = np.arange(rows * columns).reshape(rows, columns)
     corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
     cells = np.stack([c.ravel() for c in corners], axis=1)
-    sides = np.concatenate([node[:, 0], node[:, -1]])
-    sets = {"pad": node[0].copy(), "bone": node[-1].copy(), "sides": np.unique(sides)}
+    sets = {"pad": node[0].copy(), "bone": node[-1].copy()}
     points = np.column_stack([x.ravel(), y.ravel()])
     return Mesh(points, cells, "quad", np.zeros(len(cells), dtype=int), {"tissue": 0}, sets)
 

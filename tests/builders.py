@@ -2,40 +2,17 @@
 
 import numpy as np
 from evfem.studies.benchmark import benchmark_mesh
+from evfem.studies.stability_scenes import INSULATOR, SKIN, block, finger
 
-from evfem.electrostatics import Kaczmarek, Layer
-from evfem.fingerpad import Electrical, MeshedFinger
+from evfem.electrostatics import Kaczmarek
+from evfem.fingerpad import MeshedFinger
 from evfem.materials import NeoHookean
-from evfem.mesh import Mesh
 from evfem.scene import Output, Press, Scene, Slide, Solver
 from evfem.surfaces import Display
 
+__all__ = ["INSULATOR", "SKIN", "balance", "benchmark_finger", "benchmark_scene", "block", "finger"]
+
 BENCHMARK_LAWS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
-SKIN = Electrical(stratum_corneum_thickness=0.38, stratum_corneum_eps_r=1650.0)
-INSULATOR = Layer(thickness=0.09, eps_r=3.35)
-
-
-def grid(x, y):
-    """Quads on points x, y of shape (rows, columns), both growing; `pad` the first row, `bone` the last."""
-    rows, columns = x.shape
-    node = np.arange(rows * columns).reshape(rows, columns)
-    corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
-    cells = np.stack([c.ravel() for c in corners], axis=1)
-    sets = {"pad": node[0].copy(), "bone": node[-1].copy()}
-    points = np.column_stack([x.ravel(), y.ravel()])
-    return Mesh(points, cells, "quad", np.zeros(len(cells), dtype=int), {"tissue": 0}, sets)
-
-
-def block(columns=8, rows=4, width=4.0, height=2.0, sag=0.0):
-    """A block with its lower side at y = 0 in the middle and `sag` mm higher at both ends."""
-    x, t = np.meshgrid(np.linspace(-width / 2, width / 2, columns + 1), np.linspace(0.0, 1.0, rows + 1))
-    low = sag * (2.0 * x / width) ** 2
-    return grid(x, low + t * (height - low))
-
-
-def finger(mesh, E=0.1, nu=0.4, viscosity=0.0):
-    """A body of one neo-Hookean material."""
-    return MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=nu)}, SKIN, viscosity)
 
 
 def benchmark_finger(level=0):
