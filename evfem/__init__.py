@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 
 _NAMES = {
     "electrostatics": ("Kaczmarek", "Layer", "Layers", "StrongTroxel", "eps_0"),
-    "errors": ("EvfemError", "InputError", "NotConverged", "StorageError"),
+    "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     "fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
     "materials": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
     "mesh": ("Mesh",),
@@ -41,6 +41,7 @@ _MODULES = (
     "materials",
     "meshfile",
     "plotting",
+    "protocols",
     "reference",
     "rendering",
     "result",

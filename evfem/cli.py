@@ -20,6 +20,7 @@ import evfem
 from evfem.errors import InputError, NotConverged, StorageError
 
 if TYPE_CHECKING:
+    from evfem.protocols import Observer
     from evfem.runfolder import RunFolder
     from evfem.scene import Scene
 
@@ -177,7 +178,7 @@ def _run(given: argparse.Namespace) -> int:
     resume = saved(path, scene) if given.resume else None
     folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
     progress = sys.stderr.isatty()
-    observers = [folder] if progress else [folder, _Milestones()]
+    observers: list[Observer] = [folder] if progress else [folder, _Milestones()]
     try:
         result = simulate(scene, progress=progress, observers=observers, resume=resume)
     except NotConverged as error:

@@ -18,17 +18,18 @@ complex (for derivatives by complex step); scalars give a float.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.constants import epsilon_0 as eps_0
 
 from evfem.errors import InputError
+from evfem.protocols import ForceLaw
 from evfem.tensor import STEP
 from evfem.values import Values, at_least, plain
 
-__all__ = ["Kaczmarek", "Law", "Layer", "Layers", "StrongTroxel", "eps_0", "traction_derivative"]
+__all__ = ["Kaczmarek", "Layer", "Layers", "StrongTroxel", "eps_0", "traction_derivative"]
 
 
 @dataclass(frozen=True)
@@ -74,13 +75,6 @@ class Layers:
         return cls(
             sum(layer.thickness / layer.eps_r for layer in layers), sum(layer.thickness for layer in layers)
         )
-
-
-class Law(Protocol):
-    """What the package needs of a force law; `traction_derivative` (same arguments) is optional."""
-
-    def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Attraction in MPa, > 0, for gaps in mm (open > 0) and volts; complex-safe."""
 
 
 def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Values]:
@@ -185,7 +179,7 @@ class Kaczmarek:
         return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * _log1p_ratio(ratio))
 
 
-def traction_derivative(law: Law, gap: Values, voltage: Values, layers: Layers) -> Values:
+def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
     """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on `traction`.
 
     A law that drops the imaginary part (it takes absolute values, say) is differenced with a step of

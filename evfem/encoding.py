@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from evfem.electrostatics import Law, Layers
+from evfem.electrostatics import Layers
 from evfem.errors import InputError
+from evfem.protocols import ForceLaw
 from evfem.values import Values, above, at_least, finite, plain
 
 Floats = npt.NDArray[np.float64]
@@ -98,7 +99,7 @@ class Encoding:
     1776.73
     """
 
-    law: Law
+    law: ForceLaw
     layers: Layers
     area: AreaLaw
     friction: float

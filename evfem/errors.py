@@ -71,5 +71,12 @@ class NotConverged(EvfemError, RuntimeError):
         return type(self), (self.step, self.residuals, self.advice, self.result)
 
 
+class StopRun(EvfemError):
+    """Raised by an observer's `step` to end a run after that step; the result so far is returned.
+
+    The text says why, and stands in the result's provenance under `stopped`.
+    """
+
+
 class StorageError(EvfemError, OSError):
     """A file or folder could not be read or written; data written before are untouched."""

@@ -23,6 +23,7 @@ from evfem.materials import NeoHookean
 from evfem.mesh import Mesh, raised
 from evfem.meshcheck import check
 from evfem.outline import Ellipse, Ridges
+from evfem.protocols import Material
 from evfem.section import FULL, ZONE, Divisions, Section
 
 #: Young's modulus (MPa) and Poisson's ratio of each region: Table 2 of the paper.
@@ -145,7 +146,7 @@ class FingerPad:
     bone_height: float = 5.0
     bone_offset: float = 1.0
     resolution: str = "medium"
-    materials: Mapping[str, Any] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
     electrical: Electrical = field(default_factory=Electrical)
     viscosity: float = 0.0
 
@@ -260,7 +261,7 @@ class MeshedFinger:
     """
 
     source: str | os.PathLike[str] | Mesh
-    materials: Mapping[str, Any]
+    materials: Mapping[str, Material]
     electrical: Electrical = field(default_factory=Electrical)
     viscosity: float = 0.0
     regions: Mapping[str, int] | None = None

@@ -13,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from evfem.electrostatics import Law, Layer, Layers, eps_0
+from evfem.electrostatics import Layer, Layers, eps_0
 from evfem.errors import InputError
+from evfem.protocols import ForceLaw
 from evfem.values import Values, above, at_least, plain
 
 Outline = Literal["rectangle", "ellipse"]
@@ -32,7 +33,7 @@ def capacitor_force(area: Values, voltage: Values, thickness: Values, eps_r: Val
     return plain(np.asarray(0.5 * eps_0 * eps_r * area * (np.asarray(voltage) / thickness) ** 2))
 
 
-def plate_force(law: Law, area: Values, gap: Values, voltage: Values, layers: Layers) -> Values:
+def plate_force(law: ForceLaw, area: Values, gap: Values, voltage: Values, layers: Layers) -> Values:
     """Force in N on a flat pad of `area` in mm^2: equations (3) and (5) at gap 0, (6) and (7) above it."""
     area = at_least("area", area, 0.0, "an area in mm^2, not negative")
     gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
@@ -92,7 +93,12 @@ def _pole_distance(gap: Values, height: Values, layers: Layers) -> Values:
 
 
 def pad_force(
-    law: Law, pad: EllipsoidalPad, gap: Values, voltage: Values, layers: Layers, over: Outline = "rectangle"
+    law: ForceLaw,
+    pad: EllipsoidalPad,
+    gap: Values,
+    voltage: Values,
+    layers: Layers,
+    over: Outline = "rectangle",
 ) -> Values:
     """Force in N on an ellipsoidal pad at lowest air gap `gap` in mm: (8a) or (8b) with (24), 1e-10 relative.
 
@@ -119,7 +125,7 @@ def pad_force(
     return plain(np.concatenate(pieces).reshape(shape)) if pieces else np.zeros(shape)
 
 
-def _pad_force_batch(law: Law, columns: list[npt.NDArray[Any]], over: Outline) -> npt.NDArray[Any]:
+def _pad_force_batch(law: ForceLaw, columns: list[npt.NDArray[Any]], over: Outline) -> npt.NDArray[Any]:
     gap, voltage, reduced, thickness, width, height, length = columns
     near = _pole_distance(gap, height, Layers(reduced, thickness))
     v, weight_v = _near_pole(near, np.full_like(near, np.pi / 2.0))
@@ -135,7 +141,7 @@ def _pad_force_batch(law: Law, columns: list[npt.NDArray[Any]], over: Outline) -
 
 
 def pad_force_per_depth(
-    law: Law, pad: EllipsoidalPad, gap: Values, voltage: Values, layers: Layers
+    law: ForceLaw, pad: EllipsoidalPad, gap: Values, voltage: Values, layers: Layers
 ) -> Values:
     """Force in N/mm per depth on the lower half of the elliptic cross-section of `pad`, 1e-10 relative.
 

@@ -55,7 +55,7 @@ def make_model(scene: Scene) -> Model:
     needed = plan_on(scene, mesh, element)
     space = make_space(mesh, element)
     pad = outline.make_pad(mesh)
-    surface, first_gap = placed(scene.surface, mesh.points[pad.nodes])
+    surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
     terms = [
         make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary")
@@ -110,7 +110,7 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) ->
 
 def _check_quadratic(scene: Scene) -> None:
     """The squared voltage can be an unknown only of laws that are proportional to it."""
-    layers = Layers.of(scene.surface.insulator)
+    layers = Layers.of(scene.ground.insulator)
     assert scene.law is not None
     once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
     if not np.isclose(twice, 4.0 * once, rtol=1e-9):

@@ -152,7 +152,7 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
         return None
     from evfem.electrostatics import Layers
 
-    layers = Layers.of(scene.surface.insulator)
+    layers = Layers.of(scene.ground.insulator)
     traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
     softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
     depth = float(np.ptp(mesh.points[:, 1]))
@@ -171,15 +171,15 @@ def largest_voltage(scene: Scene) -> float:
 
 
 def _contact(scene: Scene) -> Term:
-    shape = "a flat surface" if scene.surface.is_flat else "a textured surface: its slope and curvature enter"
+    shape = "a flat surface" if scene.ground.is_flat else "a textured surface: its slope and curvature enter"
     return Term("contact", True, shape)
 
 
 def _friction(scene: Scene) -> Term:
     return Term(
         "friction",
-        bool(scene.surface.has_friction),
-        "Coulomb" if scene.surface.has_friction else "friction coefficient is 0 everywhere",
+        bool(scene.ground.has_friction),
+        "Coulomb" if scene.ground.has_friction else "friction coefficient is 0 everywhere",
     )
 
 

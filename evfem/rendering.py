@@ -18,8 +18,9 @@ from evfem.contact import OPEN, STICK
 from evfem.encoding import Encoding, share_not_renderable
 from evfem.errors import InputError
 from evfem.motion import Press, Slide
+from evfem.protocols import ForceLaw, Observer, Surface
 from evfem.result import Frame, Result, Row
-from evfem.scene import ForceLaw, Scene, Surface
+from evfem.scene import Scene
 from evfem.signals import Amplifier, FollowForce, VoltageProfile, carrier_amplitude
 from evfem.simulate import simulate
 from evfem.tensor import Array
@@ -40,7 +41,7 @@ class Recording:
     full_slip: float | None
 
 
-def record(scene: Scene, observers: Sequence[Any] = ()) -> Recording:
+def record(scene: Scene, observers: Sequence[Observer] = ()) -> Recording:
     """Simulate `scene` and watch for full slip; `observers` as in `simulate`."""
     watch = _SlipWatch()
     result = simulate(scene, observers=(*observers, watch))

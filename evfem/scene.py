@@ -7,7 +7,7 @@ start.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -15,6 +15,8 @@ from evfem.checks import choice, count, put, real
 from evfem.digest import digest
 from evfem.errors import InputError
 from evfem.motion import HOLDS, Hover, Motion, Press, Slide, VoltageRamp
+from evfem.ownsurface import completed
+from evfem.protocols import CompleteSurface, ForceLaw, Surface, WeakForm
 from evfem.signals import FollowForce, VoltageProfile
 
 __all__ = [
@@ -26,7 +28,6 @@ __all__ = [
     "HOLDS",
     "Boundary",
     "Finger",
-    "ForceLaw",
     "Form",
     "Hover",
     "Motion",
@@ -36,7 +37,6 @@ __all__ = [
     "Scene",
     "Slide",
     "Solver",
-    "Surface",
     "Term",
     "VoltageRamp",
     "default_scene",
@@ -71,34 +71,6 @@ class Finger(Protocol):
         """The mesh with elements of that order."""
 
 
-@runtime_checkable
-class Surface(Protocol):
-    """What a scene needs of a rigid counter-surface: `Flat`, `Display`, `Sinusoid` and `Profile` have it."""
-
-    @property
-    def insulator(self) -> Any:
-        """Layer over the electrode, or None."""
-
-    @property
-    def has_friction(self) -> bool:
-        """Whether the friction coefficient is positive anywhere."""
-
-    @property
-    def is_flat(self) -> bool:
-        """Whether height, slope and curvature are zero everywhere."""
-
-    def height(self, x: Any) -> Any:
-        """Height of the profile at x (mm)."""
-
-
-@runtime_checkable
-class ForceLaw(Protocol):
-    """An electrostatic law: `traction` in MPa, positive when it attracts."""
-
-    def traction(self, gap: Any, voltage: Any, layers: Any) -> Any:
-        """Attraction at a gap (mm) and a voltage (V)."""
-
-
 @dataclass(frozen=True)
 class Region:
     """A named region of the mesh, for `Scene.with_term`."""
@@ -117,7 +89,7 @@ class Boundary:
 class Form:
     """A user's weak form: `function(u, v, w)` is the integrand of a residual, linear in `v`."""
 
-    function: Callable[[Any, Any, Any], Any]
+    function: WeakForm
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
         """The integrand at quadrature points."""
@@ -129,7 +101,7 @@ class Form:
         return getattr(self.function, "__name__", type(self.function).__name__)
 
 
-def form(function: Callable[[Any, Any, Any], Any]) -> Form:
+def form(function: WeakForm) -> Form:
     """Mark `function(u, v, w)` as a weak form: the residual's integrand; its tangent comes by complex step.
 
     `u` and `v` are the displacement (mm) and its test function with gradient, `w` carries the
@@ -254,6 +226,11 @@ class Scene:
         _check_dynamics(self)
 
     @property
+    def ground(self) -> CompleteSurface:
+        """The surface with all that contact asks of it, derived where it is the user's own."""
+        return completed(self.surface)
+
+    @property
     def total_steps(self) -> int:
         """Number of requested steps, which is the number of rows of the history."""
         return sum(motion.steps for motion in self.motion)
@@ -275,8 +252,7 @@ def _check_parts(scene: Scene) -> None:
     if not isinstance(scene.finger, Finger):
         raise InputError("finger", scene.finger, "a FingerPad or a MeshedFinger")
     real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
-    if not isinstance(scene.surface, Surface):
-        raise InputError("surface", scene.surface, "Flat, Display, Sinusoid or Profile")
+    completed(scene.surface)
     if not isinstance(scene.solver, Solver):
         raise InputError("solver", scene.solver, "a Solver")
     if not isinstance(scene.output, Output):
@@ -316,7 +292,7 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
         raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
-    elif scene.surface.insulator is None:
+    elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
 
@@ -340,7 +316,7 @@ def _check_motion(scene: Scene) -> None:
 
 def _check_dynamics(scene: Scene) -> None:
     solver = scene.solver
-    if solver.contact == "penalty" and scene.surface.has_friction and solver.penalty_tangential is None:
+    if solver.contact == "penalty" and scene.ground.has_friction and solver.penalty_tangential is None:
         allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
         raise InputError("solver.penalty_tangential", "nothing", allowed)
     if solver.dynamics == "quasistatic":

@@ -339,6 +339,6 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
         table["voltage_profile"] = [list(row) for row in rows]
     else:
         table["voltage"] = scene.voltage
-    insulator = scene.surface.insulator
+    insulator = scene.ground.insulator
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}

@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from evfem.errors import NotConverged
+from evfem.errors import NotConverged, StopRun
 from evfem.ledger import SUMS, Ledger, frame_of
 from evfem.model import Model, make_model
 from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.protocols import Observer
 from evfem.result import Frame, Result, Saved, provenance
 from evfem.resuming import carried_arrays, carry_on, state_arrays, state_of, usable
 from evfem.scene import Scene
@@ -40,14 +41,16 @@ class Request:
 
 
 def simulate(
-    scene: Scene, *, progress: bool = False, observers: Sequence[Any] = (), resume: Saved | None = None
+    scene: Scene, *, progress: bool = False, observers: Sequence[Observer] = (), resume: Saved | None = None
 ) -> Result:
     """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how
     they came about.
 
     `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)`
     after every converged step (`frame` is None on steps without fields, `checkpoint()` gives the arrays to
-    resume from) and `finished(result)`. `resume` continues from such arrays and rows, to the same numbers as
+    resume from) and `finished(result)`, see `evfem.protocols`. One that raises `StopRun` in `step` ends the
+    run after that step: the result so far, with the fields of its last step, is returned, and has the reason
+    in its provenance under `stopped`. `resume` continues from such arrays and rows, to the same numbers as
     without the interruption; the result then has all rows, but fields only of the steps since. Raises
     `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
     """
@@ -56,19 +59,25 @@ def simulate(
         return _simulate(scene, progress, observers, resume)
 
 
-def _simulate(scene: Scene, progress: bool, observers: Sequence[Any], resume: Saved | None) -> Result:
+def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resume: Saved | None) -> Result:
     run = Run(scene, resume)
     total = scene.total_steps
     _tell(observers, "started", run.model.mesh, scene, total)
     bar = _progress_bar(progress, total, len(run.rows))
+    reasons: list[str] = []
     try:
         for request in run.requests():
             frame = run.advance(request)
-            _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+            reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
             bar.update(1)
+            if reasons:
+                run.keep_last_frame()
+                break
     finally:
         bar.close()
     result = run.result()
+    if reasons:
+        result.provenance["stopped"] = "; ".join(reasons)
     _tell(observers, "finished", result)
     return result
 
@@ -197,6 +206,11 @@ class Run:
         self.frames.append(frame_of(self.model, self.state, row))
         return self.frames[-1]
 
+    def keep_last_frame(self) -> None:
+        """The fields of the last step, wanted or not."""
+        if not self.frames or self.frames[-1].step != self.rows[-1]["step"]:
+            self.frames.append(frame_of(self.model, self.state, self.rows[-1]))
+
     def result(self) -> Result:
         """Everything up to the last converged step."""
         record = self.model.equilibrium.record
@@ -251,11 +265,20 @@ def _duration(motion: Motion, start: dict[str, float]) -> float:
     return abs(end - start["indentation"]) / motion.steps / speed
 
 
-def _tell(observers: Sequence[Any], event: str, *arguments: Any) -> None:
+def _tell(observers: Sequence[Observer], event: str, *arguments: Any) -> list[str]:
+    """Tell every observer; the reasons of those who want the run to end."""
+    reasons = []
     for observer in observers:
         method: Callable[..., None] | None = getattr(observer, event, None)
-        if method is not None:
+        if method is None:
+            continue
+        try:
             method(*arguments)
+        except StopRun as stop:
+            if event != "step":
+                raise
+            reasons.append(str(stop) or type(observer).__name__)
+    return reasons
 
 
 def _progress_bar(progress: bool, total: int, done: int) -> Any:

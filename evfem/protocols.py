@@ -1,0 +1,143 @@
+"""Parts of your own: any object with the right method is a law, a material, a surface, a form or an observer.
+
+Nothing is inherited and nothing registered; the object goes where the package's own goes. What is called
+optional may be there or not. Arrays have any trailing shape; a method that takes complex numbers gets exact
+derivatives (`evfem.tensor.complex_step`), another one differences.
+
+| part | goes to | needs |
+|---|---|---|
+| electrostatic law | `Scene(law=...)` | `ForceLaw` |
+| material | `FingerPad(materials={region: ...})` | `StressLaw` or `EnergyLaw` |
+| surface | `Scene(surface=...)` | `Surface` |
+| weak form | `Scene.with_term(evfem.form(...), on=...)` | `WeakForm` |
+| observer | `simulate(observers=[...])` | any of `Starting`, `Stepping`, `Finishing` |
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol, runtime_checkable
+
+
+@runtime_checkable
+class ForceLaw(Protocol):
+    """An electrostatic law.
+
+    Optional methods of the same arguments: `traction_derivative` (MPa/mm), and `potential` (N/mm), whose
+    derivative by the gap is the traction, needed for `direction="normal"`.
+    """
+
+    def traction(self, gap: Any, voltage: Any, layers: Any) -> Any:
+        """Attraction in MPa, positive when it attracts, at gaps in mm (positive when open) and voltages in V.
+
+        `layers.reduced` is the sum of thickness / permittivity of the solid layers, `layers.thickness` that
+        of their thicknesses, in mm. Complex-safe, or it is differenced.
+        """
+
+
+@runtime_checkable
+class StressLaw(Protocol):
+    """A material by its stress. Optional: `psi` too, `viscosity` in s, `density` in t/mm3."""
+
+    def P(self, F: Any) -> Any:
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3, ...)."""
+
+
+@runtime_checkable
+class EnergyLaw(Protocol):
+    """A material by its energy alone; stress and tangent are derived, so `psi` must be complex-safe."""
+
+    def psi(self, F: Any) -> Any:
+        """Energy per reference volume (...) in MPa at the deformation gradient F (3, 3, ...)."""
+
+
+Material = StressLaw | EnergyLaw
+
+
+class WeakForm(Protocol):
+    """What `evfem.form` marks as a weak form: a function, or any object that can be called like one."""
+
+    def __call__(self, u: Any, v: Any, w: Any) -> Any:
+        """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
+        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary.
+        """
+
+
+@runtime_checkable
+class Surface(Protocol):
+    """A rigid surface by its height.
+
+    Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0); `y`, the
+    height (mm) at which the profile lies (without it or None: first touch); `insulator`, a `Layer`. Optional
+    methods of x: `slope` and `curvature`, which are derived otherwise; `friction_coefficient`, instead of
+    `friction`.
+    """
+
+    def height(self, x: Any) -> Any:
+        """Height (mm) of the profile at x (mm, any shape)."""
+
+
+@runtime_checkable
+class CompleteSurface(Surface, Protocol):
+    """Everything that contact asks of a surface; `evfem.ownsurface.completed` gives it to any `Surface`."""
+
+    @property
+    def y(self) -> float | None:
+        """Height of the profile's zero (mm), None for first touch at the start."""
+
+    @property
+    def insulator(self) -> Any:
+        """Layer over the electrode, or None."""
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether height, slope and curvature are zero everywhere."""
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the friction coefficient is positive anywhere."""
+
+    @property
+    def friction_jumps(self) -> Any:
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on."""
+
+    def slope(self, x: Any) -> Any:
+        """Derivative of the height."""
+
+    def curvature(self, x: Any) -> Any:
+        """Second derivative of the height (1/mm)."""
+
+    def friction_coefficient(self, x: Any) -> Any:
+        """Friction coefficient, real."""
+
+    def friction_slope(self, x: Any) -> Any:
+        """Derivative of the friction coefficient (1/mm), jumps left out."""
+
+    def shifted(self, y: float) -> Any:
+        """The same surface at the height `y` (mm)."""
+
+
+class Starting(Protocol):
+    """An observer that is told when a run starts."""
+
+    def started(self, mesh: Any, scene: Any, total_steps: int, /) -> None:
+        """The mesh is made, no step is solved yet."""
+
+
+class Stepping(Protocol):
+    """An observer that is told of every converged step, and may end the run by raising `evfem.StopRun`."""
+
+    def step(self, row: Mapping[str, Any], frame: Any, checkpoint: Callable[[], dict[str, Any]], /) -> None:
+        """`row` is the step's row of the history, `frame` its fields (None on steps without), `checkpoint()`
+        gives the arrays to resume from.
+        """
+
+
+class Finishing(Protocol):
+    """An observer that is told when a run has reached its end, or was stopped."""
+
+    def finished(self, result: Any, /) -> None:
+        """The result is complete up to the last step."""
+
+
+Observer = Starting | Stepping | Finishing
