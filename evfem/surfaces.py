@@ -257,7 +257,8 @@ class Profile(_Surface):
         """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left end."""
         from scipy.interpolate import PchipInterpolator
 
-        inner = PchipInterpolator(self.x, self.samples).c
+        with np.errstate(over="ignore"):  # slopes next to nothing have infinite inverses, and so vanish
+            inner = PchipInterpolator(self.x, self.samples).c
         ends = np.zeros((4, 2))
         ends[3] = self.samples[0], self.samples[-1]
         return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)

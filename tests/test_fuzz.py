@@ -164,6 +164,12 @@ def test_numbers_beyond_the_limits_are_refused(make, words):
         make()
 
 
+def test_heights_next_to_nothing_make_a_level_profile():
+    profile = Profile([0.0, 1.0, 2.0, 3.0], [0.0, 5e-324, 1.0, 1.0])
+    assert np.isfinite(profile.slope(np.linspace(0.0, 3.0, 31))).all()
+    assert profile.height(1.0) == 5e-324
+
+
 # -- meshes
 
 
