@@ -31,6 +31,7 @@ _NAMES = {
     "simulate": ("simulate",),
     "sweep": ("SweepResult", "sweep"),
     "sweepfile": ("Sweep",),
+    "strategy": ("Strategy",),
     "surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
 }

@@ -2,7 +2,8 @@
 serves.
 
 A factorisation is kept across iterations and steps. It is made again when the contact candidates change, when
-the residual stalls, when the time step is another one, or when more than `PATIENCE` iterations would be left.
+the residual stalls, when the time step is another one, or when more iterations than the
+strategy's `patience` would be left.
 """
 
 from __future__ import annotations
@@ -20,10 +21,8 @@ from evfem.contact import OPEN, STICK
 from evfem.interface import Interface
 from evfem.linear import Singular, make_condensation
 from evfem.mesh import Floats, Ints
-from evfem.state import Linearised, Record, State, StepFailed
+from evfem.state import Limits, Linearised, Record, State, StepFailed
 
-#: renew the factorisation when more iterations than this would be needed with the old one
-PATIENCE = 8
 #: candidates are chosen so many times more than needed, as every new choice costs an analysis of the matrix
 SPARE = 1.5
 #: an attraction that falls with the gap by more than this share of the tissue's shear modulus over its height
@@ -39,11 +38,10 @@ class Linearisation:
         body: Body,
         interface: Interface,
         attraction: Attraction | None,
-        tolerance: float,
-        threads: int,
+        limits: Limits,
     ) -> None:
-        self.body, self.interface, self.attraction = body, interface, attraction
-        self.pad, self.tolerance, self.threads = interface.pad, tolerance, threads
+        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.pad = interface.pad
         self.record = Record()
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
@@ -106,7 +104,7 @@ class Linearisation:
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             kept = np.concatenate([unknowns, self.body.bone])
-            self.factor = make_condensation(self.body.pattern, kept, self.threads)
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
             self.record.backend = type(self.factor).__name__
         upper = self.body.tangent(state.u)
         try:
@@ -142,9 +140,10 @@ class Linearisation:
         before, now = history[-2:]
         if now > 0.1 or now > 0.5 * before:
             return True
-        if now <= self.tolerance:
+        tolerance = self.limits.tolerance
+        if now <= tolerance:
             return False
-        return bool(np.log(self.tolerance / now) / np.log(now / before) > PATIENCE)
+        return bool(np.log(tolerance / now) / np.log(now / before) > self.limits.strategy.patience)
 
     # -- the attraction's part
 

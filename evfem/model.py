@@ -22,6 +22,7 @@ from evfem.newton import Equilibrium, RigidOutline
 from evfem.plan import plan_on, scene_mesh
 from evfem.scene import Scene
 from evfem.signals import FollowForce
+from evfem.state import Limits
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +68,9 @@ def make_model(scene: Scene) -> Model:
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
     solve = Equilibrium if needed.has("tissue") else RigidOutline
-    equilibrium = solve(body, pad, surface, attraction, solver.tolerance, solver.threads)
+    equilibrium = solve(
+        body, pad, surface, attraction, Limits(solver.tolerance, solver.strategy, solver.threads)
+    )
     if solver.contact == "penalty":
         normal = float(solver.penalty_normal or 0.0)
         equilibrium.interface.penalties = (normal, solver.penalty_tangential or normal)

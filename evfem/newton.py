@@ -27,20 +27,18 @@ from evfem.attraction import Attraction
 from evfem.body import Body
 from evfem.condensed import Motion, Step, Unknown
 from evfem.contact import OPEN, STICK, ContactNotSolved
+from evfem.findings import findings
 from evfem.interface import Interface
 from evfem.linearisation import Linearisation
 from evfem.mesh import Floats
 from evfem.mixing import Mixing
-from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, State, StepFailed, Target
+from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Limits, State, StepFailed, Target
 
-MAX_ITERATIONS = 40
 SMALLEST_J = 0.05
 #: so many iterations in a row that cannot hold the attraction show that nodes are being lost to it
 LOST = 3
 #: under a prescribed force the bone moves at most this share of the body's height in one iteration
 LONGEST_STRIDE = 0.05
-#: a step begins at most so many last steps ahead
-LONGEST_GUESS = 1.5
 #: the voltage is given, at its lower or upper limit, or an unknown settled by the friction force
 NONE, LOW, HIGH, FREE = "none", "low", "high", "free"
 
@@ -54,19 +52,19 @@ class Equilibrium:
         pad: outline.Pad,
         surface: Any,
         attraction: Attraction | None,
-        tolerance: float,
-        threads: int = 1,
+        limits: Limits,
     ) -> None:
         self.body, self.pad, self.surface, self.attraction = body, pad, surface, attraction
-        self.tolerance, self.threads = tolerance, threads
-        self.interface = Interface(pad, body.space.mesh.points, surface, tolerance)
+        self.tolerance, self.strategy = limits.tolerance, limits.strategy
+        self.interface = Interface(pad, body.space.mesh.points, surface, limits.tolerance)
         self.points = body.space.mesh.points
-        self.linear = Linearisation(body, self.interface, attraction, tolerance, threads)
+        self.linear = Linearisation(body, self.interface, attraction, limits)
         self.record = self.linear.record
         self.stride = LONGEST_STRIDE * float(np.ptp(self.points[:, 1]))
         self._mixing = Mixing()
         self._steering = NONE
         self._reduced = 0
+        self._seen: tuple[State, Balance] | None = None
 
     # -- what a state is
 
@@ -122,18 +120,19 @@ class Equilibrium:
     def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
         try:
             return self._find(old, target, frozen, start or old)
-        except ContactNotSolved as error:
+        except (ContactNotSolved, StepFailed) as error:
             self.linear.forget()
-            raise StepFailed(f"contact: {error}", self.record.residuals) from error
-        except StepFailed:
-            self.linear.forget()
-            raise
+            reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
+            failed = StepFailed(reason, self.record.residuals)
+            failed.findings = "" if self._seen is None else findings(self.body, *self._seen)
+            raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
         state = self._begin(old, target, frozen is not None, start)
         history: list[float] = []
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(self.strategy.iterations):
             state, balance = self._balance(old, state, target, frozen)
+            self._seen = state, balance
             arrived = target.bone[0] == state.bone[0] and (
                 target.force is not None or target.bone[1] == state.bone[1]
             )
@@ -150,7 +149,7 @@ class Equilibrium:
             state = self._iterate(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.status != OPEN)
             self.record.iterations += 1
-        raise StepFailed(f"no equilibrium in {MAX_ITERATIONS} iterations", history)
+        raise StepFailed(f"no equilibrium in {self.strategy.iterations} iterations", history)
 
     def _begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
         """Prepare everything for a step, and say where its iterations start."""
@@ -201,7 +200,7 @@ class Equilibrium:
         axis = 0 if target.force is not None else int(np.argmax(np.abs(way)))
         if way[axis] * last[axis] <= 0.0:
             return state
-        share = min(float(way[axis] / last[axis]), LONGEST_GUESS)
+        share = min(float(way[axis] / last[axis]), self.strategy.reach)
         u = state.u + share * state.trend
         if not self.body.tissue.smallest_J(u) > SMALLEST_J:
             return state

@@ -18,6 +18,7 @@ from evfem.motion import HOLDS, Hover, Motion, Press, Slide, VoltageRamp
 from evfem.ownsurface import completed
 from evfem.protocols import CompleteSurface, ForceLaw, Surface, WeakForm
 from evfem.signals import FollowForce, VoltageProfile
+from evfem.strategy import Strategy
 
 __all__ = [
     "CONTACTS",
@@ -137,7 +138,7 @@ class Solver:
 
     `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free residual over
     max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go with `contact="penalty"`
-    alone.
+    alone. `strategy` says how hard steps are tried.
     """
 
     element: str | None = None
@@ -147,8 +148,11 @@ class Solver:
     penalty_tangential: float | None = None
     tolerance: float = 1e-8
     threads: int = 1
+    strategy: Strategy = field(default_factory=Strategy)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.strategy, Strategy):
+            raise InputError("strategy", self.strategy, "a Strategy")
         if self.element is not None:
             choice("element", self.element, ELEMENTS)
         choice("dynamics", self.dynamics, DYNAMICS)

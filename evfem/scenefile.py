@@ -32,6 +32,7 @@ from evfem.scenekeys import (
     ProfileTable,
     SceneTable,
     SolverTable,
+    StrategyTable,
     Table,
     at,
     parse,
@@ -39,6 +40,7 @@ from evfem.scenekeys import (
     unknown,
 )
 from evfem.signals import FollowForce, VoltageProfile
+from evfem.strategy import Strategy
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
 
 VERSION = 1
@@ -105,10 +107,16 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
         air_layer=electrostatics.air_layer if electrostatics else True,
         direction=electrostatics.direction if electrostatics else DIRECTIONS[0],
         coupling=electrostatics.coupling if electrostatics else COUPLINGS[0],
-        solver=_build(Solver, parse(SolverTable, top.solver, "solver"), "solver"),
+        solver=_solver(parse(SolverTable, top.solver, "solver")),
         output=_build(Output, parse(OutputTable, top.output, "output"), "output"),
         name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")),
     )
+
+
+def _solver(table: SolverTable) -> Solver:
+    key = "solver.strategy"
+    strategy = _build(Strategy, parse(StrategyTable, table.strategy, key), key)
+    return _build(Solver, table.model_copy(update={"strategy": strategy}), "solver")
 
 
 def _build(cls: type, table: Table, prefix: str) -> Any:
@@ -260,7 +268,10 @@ def dump(scene: Scene) -> str:
     }
     if scene.law is not None:
         tables["electrostatics"] = _electrostatics_table(scene)
-    tables["solver"] = _changed(scene.solver)
+    solver = _changed(scene.solver)
+    if "strategy" in solver:
+        solver["strategy"] = _changed(scene.solver.strategy)
+    tables["solver"] = solver
     tables["output"] = _changed(scene.output)
     tables["motion"] = [{"kind": motion.kind, **_changed(motion)} for motion in scene.motion]
     return tomli_w.dumps({name: table for name, table in tables.items() if table != {}})

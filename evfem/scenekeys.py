@@ -122,6 +122,18 @@ class SolverTable(Table):
     penalty_tangential: float | None = _optional("a penalty in N/mm3, larger than 0")
     tolerance: float = _optional("a relative residual from 1e-13 to 1e-3", 1e-8)
     threads: int = _optional("a whole number, at least 1", 1)
+    strategy: dict[str, Any] = _optional("a table [solver.strategy]", {})
+
+
+class StrategyTable(Table):
+    """[solver.strategy]."""
+
+    iterations: int = _optional("a whole number, at least 1", 40)
+    patience: float = _optional("a number of iterations, not negative", 8.0)
+    smallest_part: float = _optional("a share of a step, above 0, at most 1", 1.0 / 1024.0)
+    easy: int = _optional("a whole number, at least 1", 8)
+    growth: float = _optional("a factor from 1 to 10", 1.25)
+    reach: float = _optional("a factor from 0 to 10", 1.5)
 
 
 class OutputTable(Table):

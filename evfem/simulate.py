@@ -193,7 +193,7 @@ class Run:
         try:
             self.state, parts = self.stepper.follow(self.state, request.path, self.ledger.accept)
         except StepFailed as error:
-            advice = f"{error.reason}; {ADVICE}"
+            advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
             raise NotConverged(request.step, error.residuals, advice, self.result()) from error
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)

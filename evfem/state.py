@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from evfem.mesh import Floats, Ints
+from evfem.strategy import Strategy
 
 #: voltages are squared and counted in kV^2 where they are an unknown
 KILOVOLT = 1000.0
@@ -14,11 +15,13 @@ SMALLEST_FORCE = 1e-6
 
 
 class StepFailed(ArithmeticError):
-    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong."""
+    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong, `findings` how
+    the last iterate looked.
+    """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
         super().__init__(reason)
-        self.reason, self.residuals = reason, residuals
+        self.reason, self.residuals, self.findings = reason, residuals, ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +68,15 @@ class Target:
     voltage: float
     duration: float = 0.0
     tangential_force: float | None = None
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When a step counts as solved, how hard it is tried, and by how many threads."""
+
+    tolerance: float
+    strategy: Strategy = field(default_factory=Strategy)
+    threads: int = 1
 
 
 @dataclass

@@ -14,10 +14,6 @@ import numpy as np
 from evfem.newton import Equilibrium
 from evfem.state import State, StepFailed, Target
 
-SMALLEST_PART = 1.0 / 1024.0
-EASY = 8
-GROWTH = 1.25
-
 #: from the share of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
 
@@ -37,7 +33,7 @@ class Stepper:
 
         Raises `StepFailed` when the smallest part fails; what was accepted before stays accepted.
         """
-        done, parts = 0.0, 0
+        done, parts, strategy = 0.0, 0, self.equilibrium.strategy
         while done < 1.0:
             share = 1.0 if self.part >= 1.0 - done - 1e-12 else done + self.part
             before = self.equilibrium.record.iterations
@@ -46,14 +42,14 @@ class Stepper:
             except StepFailed:
                 self.cuts += 1
                 self.part = 0.5 * (share - done)
-                if self.part < SMALLEST_PART:
+                if self.part < strategy.smallest_part:
                     self.part = 1.0
                     raise
                 continue
             accept(state, new)
             state, done, parts = new, share, parts + 1
-            if self.equilibrium.record.iterations - before <= EASY:
-                self.part = min(1.0, GROWTH * self.part)
+            if self.equilibrium.record.iterations - before <= strategy.easy:
+                self.part = min(1.0, strategy.growth * self.part)
         return state, parts
 
     def solve(self, state: State, target: Target) -> State:

@@ -27,7 +27,7 @@ FLOORS = {
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
         "mesh quality meshcheck meshparts vturead mshread meshfile outline lattice section fingerpad "
         "lanes kernels viscous assembly forms pad contactedge attraction contact condensed linear dynamics "
-        "body state mixing pins interface linearisation newton",
+        "body strategy state mixing pins interface linearisation findings newton",
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},

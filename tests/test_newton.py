@@ -1,12 +1,12 @@
 """Equilibrium steps: balance, tangent, cut and failed steps, force control, exact statements on profiles."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from builders import INSULATOR, balance, benchmark_finger, block, finger
 
-from evfem import newton, stepping
 from evfem.contact import BACKWARD, FORWARD, OPEN, STICK
 from evfem.electrostatics import Kaczmarek
 from evfem.errors import NotConverged
@@ -14,6 +14,7 @@ from evfem.model import make_model
 from evfem.newton import StepFailed, Target
 from evfem.scene import Hover, Press, Scene, Slide, Solver
 from evfem.simulate import simulate
+from evfem.strategy import Strategy
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -147,11 +148,11 @@ def test_an_impossible_press_stops_with_the_good_rows():
     assert "try" in str(caught.value)
 
 
-def test_a_step_far_too_large_is_cut_and_reaches_its_exact_target(monkeypatch):
+def test_a_step_far_too_large_is_cut_and_reaches_its_exact_target():
     fine = run(Flat(friction=0.0), Press(indentation=0.4, steps=8))
     # so few iterations do not suffice for the whole way
-    monkeypatch.setattr(newton, "MAX_ITERATIONS", 6)
-    coarse = run(Flat(friction=0.0), Press(indentation=0.4, steps=1))
+    few = Solver(strategy=Strategy(iterations=6))
+    coarse = run(Flat(friction=0.0), Press(indentation=0.4, steps=1), solver=few)
     assert coarse.provenance["solver"]["cuts"] > 0
     assert coarse.substeps[0] > 1
     assert coarse.indentation[0] == 0.4
@@ -159,15 +160,28 @@ def test_a_step_far_too_large_is_cut_and_reaches_its_exact_target(monkeypatch):
     assert coarse.applied_force[0] == pytest.approx(fine.applied_force[-1], rel=1e-7)
 
 
-def test_parts_stop_halving_at_the_smallest_one(monkeypatch):
-    monkeypatch.setattr(newton, "MAX_ITERATIONS", 1)
+def test_parts_stop_halving_at_the_smallest_one():
     with pytest.raises(NotConverged) as caught:
-        run(Flat(), Press(indentation=0.4, steps=1))
+        run(Flat(), Press(indentation=0.4, steps=1), solver=Solver(strategy=Strategy(iterations=1)))
     assert caught.value.step == 1
     assert len(caught.value.result.step) == 0
     # 1, 1/2, ... 1/1024 of the step
     assert caught.value.result.provenance["solver"]["cuts"] == 11
-    assert stepping.SMALLEST_PART == 2.0**-10
+    assert Strategy().smallest_part == 2.0**-10
+
+
+def test_a_failed_step_says_where_and_in_what_state():
+    with pytest.raises(NotConverged) as caught:
+        run(Flat(), Press(indentation=0.4, steps=1), solver=Solver(strategy=Strategy(iterations=1)))
+    text = str(caught.value)
+    force, x, y = map(float, re.search(r"out of balance: (\S+) N/mm at \((\S+), (\S+)\)", text).groups())
+    low, high = ROUND.source.points.min(axis=0) - 1.0, ROUND.source.points.max(axis=0) + 1.0
+    assert force > 0.0
+    assert (low < [x, y]).all()
+    assert ([x, y] < high).all()
+    counts = [int(n) for n in re.search(r"(\d+) nodes open, (\d+) stick, (\d+) slip", text).groups()]
+    assert sum(counts) == make_model(Scene(ROUND, Flat(), motion=[Press(indentation=0.1)])).pad.nodes.size
+    assert 0.0 < float(re.search(r"smallest J of a cell: (\S+);", text).group(1)) < 1.5
 
 
 @pytest.mark.parametrize("options", [{}, {"law": Kaczmarek(), "voltage": 3000.0}], ids=["plain", "attracted"])

@@ -12,6 +12,7 @@ from evfem.materials import LinearElastic, NeoHookean, Ogden, Yeoh
 from evfem.scene import Boundary, Hover, Output, Press, Scene, Slide, Solver, VoltageRamp, default_scene, form
 from evfem.scenefile import dump, load, loads
 from evfem.signals import VoltageProfile
+from evfem.strategy import Strategy
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
 
 DISPLAY = """
@@ -432,3 +433,14 @@ def test_a_table_that_is_too_large_is_refused_before_it_is_read(folder):
         file.truncate(65 * 2**20)
     with pytest.raises(InputError, match="at most 64 MB"):
         loads(DISPLAY.replace("voltage = 1000.0", "voltage_file = 'voltage.csv'"), folder)
+
+
+def test_the_strategy_goes_to_a_file_and_back():
+    text = 'version = 1\n[surface]\nkind = "flat"\n[[motion]]\nkind = "press"\nforce = 0.05\n'
+    scene = loads(text.replace("[[motion]]", "[solver.strategy]\npatience = 3.0\neasy = 5\n[[motion]]", 1))
+    assert scene.solver.strategy == Strategy(patience=3.0, easy=5)
+    assert loads(dump(scene)).solver == scene.solver
+    with pytest.raises(
+        InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"
+    ):
+        loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))
