@@ -25,6 +25,7 @@ from evfem.meshcheck import check
 from evfem.outline import Ellipse, Ridges
 from evfem.protocols import Material
 from evfem.section import FULL, ZONE, Divisions, Section
+from evfem.views import called, changed, short, table
 
 #: Young's modulus (MPa) and Poisson's ratio of each region: Table 2 of the paper.
 TABLE_2: Mapping[str, tuple[float, float]] = {
@@ -159,6 +160,26 @@ class FingerPad:
         choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
         put(self, materials=_all_materials(self.materials))
         _check_section(self, self._section)
+
+    def __repr__(self) -> str:
+        """What differs from Table 2."""
+        return called("FingerPad", self._changed())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: sizes, and what differs from Table 2."""
+        ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
+        rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
+        rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
+        rows.append(("resolution", self.resolution))
+        told = {"width", "height", "ridges", "ridge_height", "ridge_width", "stratum_corneum_thickness"}
+        own = {name: v for name, v in self._changed().items() if name not in told | {"resolution"}}
+        return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
+
+    def _changed(self) -> dict[str, Any]:
+        laws = {name: law for name, law in self.materials.items() if law != _all_materials({}).get(name)}
+        return {k: v for k, v in changed(self).items() if k != "materials"} | (
+            {"materials": laws} if laws else {}
+        )
 
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order 2.

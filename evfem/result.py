@@ -26,12 +26,16 @@ from evfem.errors import InputError
 from evfem.mesh import KINDS, Floats, Ints, Mesh
 from evfem.scene import Scene
 from evfem.storage import load_arrays, save_arrays
+from evfem.views import called, curves, table
 
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-2"
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
+#: what is shown of the last step, with units
+SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
+SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
 
 
@@ -144,6 +148,34 @@ class Result:
             "provenance": self.provenance,
         }
 
+    def __repr__(self) -> str:
+        """How far the run came, where it ended and with what forces."""
+        ends = ["; ".join(f"{key} {text}" for key, text in rows) for rows in (self._last[:3], self._last[3:])]
+        return "\n  ".join([f"Result of {self._title}", *(line for line in ends if line)])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the end, and normal (blue) and tangential force (orange) over the steps."""
+        forces = {
+            "normal force": ("#0072B2", self.normal_force.tolist()),
+            "tangential force": ("#E69F00", self.tangential_force.tolist()),
+        }
+        return table(f"Result of {self._title}", self._last, curves(forces) if len(self.step) > 1 else "")
+
+    @property
+    def _title(self) -> str:
+        scene, steps = self.provenance.get("scene", {}), len(self.step)
+        wanted = scene.get("total_steps", steps)
+        text = f"{scene.get('name', 'scene')!r}: {steps} of {wanted} steps, {len(self.frames)} with fields"
+        return f"{text}, {len(self.mesh.points)} nodes"
+
+    @property
+    def _last(self) -> list[tuple[str, str]]:
+        if not len(self.step):
+            return []
+        return [
+            (name.replace("_", " "), f"{getattr(self, name)[-1]:.4g} {unit}") for name, unit in SHOWN.items()
+        ]
+
     def save(self, path: str | Path) -> None:
         """Write everything to one .npz file, in one step. Raises StorageError when the disk refuses."""
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
@@ -250,7 +282,7 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
     try:
         parameters = dump(scene)
     except InputError:
-        parameters = repr(scene)
+        parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
     return {
         "versions": dict(versions()),
         "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},

@@ -19,6 +19,7 @@ from evfem.ownsurface import completed
 from evfem.protocols import CompleteSurface, ForceLaw, Surface, WeakForm
 from evfem.signals import FollowForce, VoltageProfile
 from evfem.strategy import Strategy
+from evfem.views import called, changed, short, table
 
 __all__ = [
     "CONTACTS",
@@ -229,6 +230,28 @@ class Scene:
         _check_motion(self)
         _check_dynamics(self)
 
+    def __repr__(self) -> str:
+        """Finger, surface and attraction; what happens; and what is not as usual."""
+        pull = "no attraction" if self.law is None else f"{short(self.law)} at {_volts(self.voltage)}"
+        lines = [f"Scene {self.name!r}: {short(self.finger)} on {short(self.surface)}, {pull}"]
+        lines.append("  " + ", ".join(called(type(m).__name__, changed(m)) for m in self.motion[:6]))
+        lines[-1] += f", ... ({len(self.motion)} motions)" if len(self.motion) > 6 else ""
+        own = [f"{name}={short(value)}" for name, value in self._unusual().items()]
+        return "\n".join([*lines, *(["  " + ", ".join(own)] if own else [])])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same as a small table."""
+        rows = [("finger", short(self.finger)), ("surface", short(self.surface))]
+        if self.law is not None:
+            rows.append(("attraction", f"{short(self.law)} at {_volts(self.voltage)}"))
+        rows += [(f"motion {i}", called(type(m).__name__, changed(m))) for i, m in enumerate(self.motion[:6])]
+        rows += [(name, short(value)) for name, value in self._unusual().items()]
+        return table(f"Scene {self.name}, {self.total_steps} steps", rows)
+
+    def _unusual(self) -> dict[str, Any]:
+        told = ("finger", "surface", "law", "voltage", "motion", "name")
+        return {key: value for key, value in changed(self).items() if key not in told}
+
     @property
     def ground(self) -> CompleteSurface:
         """The surface with all that contact asks of it, derived where it is the user's own."""
@@ -250,6 +273,10 @@ class Scene:
     def digest(self) -> str:
         """SHA-256 over everything in the scene but its name, equal in every process."""
         return digest(self)
+
+
+def _volts(voltage: object) -> str:
+    return f"{voltage:g} V" if isinstance(voltage, float) else type(voltage).__name__
 
 
 def _check_parts(scene: Scene) -> None:

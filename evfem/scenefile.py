@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,7 @@ from evfem.scenekeys import (
 from evfem.signals import FollowForce, VoltageProfile
 from evfem.strategy import Strategy
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.views import changed
 
 VERSION = 1
 #: largest files in bytes, and most steps of all motions together
@@ -279,12 +280,7 @@ def dump(scene: Scene) -> str:
 
 def _changed(value: Any) -> dict[str, Any]:
     """The fields of a dataclass that differ from their defaults."""
-    return {spec.name: v for spec in fields(value) if _differs(v := getattr(value, spec.name), spec)}
-
-
-def _differs(value: Any, spec: Field[Any]) -> bool:
-    default = spec.default if spec.default_factory is MISSING else spec.default_factory()
-    return value is not None and (default is MISSING or bool(value != default))
+    return {name: v for name, v in changed(value).items() if v is not None}
 
 
 def _finger_table(finger: Any) -> dict[str, Any]:

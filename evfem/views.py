@@ -1,0 +1,82 @@
+"""How objects show themselves: their fields that are not as usual, small tables and curves for notebooks."""
+
+from __future__ import annotations
+
+import html
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, Field, fields
+from typing import Any
+
+#: size of a curve in pixels
+WIDTH, HEIGHT = 240, 48
+LONGEST = 160
+
+
+def changed(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass that differ from their defaults.
+
+    >>> from dataclasses import dataclass
+    >>> @dataclass
+    ... class Slide:
+    ...     distance: float
+    ...     steps: int = 100
+    ...     hold: str = "indentation"
+    >>> changed(Slide(distance=5.0, steps=10))
+    {'distance': 5.0, 'steps': 10}
+    """
+    shown = [spec for spec in fields(value) if spec.init and spec.repr]
+    return {spec.name: v for spec in shown if _differs(v := getattr(value, spec.name), spec)}
+
+
+def _differs(value: Any, spec: Field[Any]) -> bool:
+    default = spec.default if spec.default_factory is MISSING else spec.default_factory()
+    return default is MISSING or bool(value != default)
+
+
+def called(name: str, arguments: Mapping[str, Any]) -> str:
+    """The call that makes an object.
+
+    >>> called("Slide", {"distance": 5.0, "hold": "force"})
+    "Slide(distance=5.0, hold='force')"
+    """
+    return f"{name}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
+
+
+def short(value: Any) -> str:
+    """The representation of a value on one line, cut to a readable length."""
+    text = " ".join(repr(value).split())
+    return text if len(text) <= LONGEST else text[: LONGEST - 3] + "..."
+
+
+def table(title: str, rows: Sequence[tuple[str, str]], below: str = "") -> str:
+    """A small table in HTML; texts are escaped, `below` is HTML already.
+
+    >>> table("a < b", [("force", "1 N")])
+    '<table><caption>a &lt; b</caption><tr><th>force</th><td>1 N</td></tr></table>'
+    """
+    lines = [f"<tr><th>{html.escape(key)}</th><td>{html.escape(text)}</td></tr>" for key, text in rows]
+    foot = f'<tr><td colspan="2">{below}</td></tr>' if below else ""
+    return f"<table><caption>{html.escape(title)}</caption>{''.join(lines)}{foot}</table>"
+
+
+def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
+    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG."""
+    finite = [v for _, values in lines.values() for v in values if math.isfinite(v)]
+    low, high = min([0.0, *finite]), max([0.0, *finite])
+    scale = (HEIGHT - 4) / (high - low) if high > low else 0.0
+    drawn = [
+        f'<polyline fill="none" stroke="{html.escape(colour)}" stroke-width="1.5" points="{points}">'
+        f"<title>{html.escape(name)}</title></polyline>"
+        for name, (colour, values) in lines.items()
+        if (points := _points(values, high, scale))
+    ]
+    return f'<svg width="{WIDTH}" height="{HEIGHT}" role="img">{"".join(drawn)}</svg>'
+
+
+def _points(values: Sequence[float], high: float, scale: float) -> str:
+    """At most about one point for each pixel."""
+    step = max(len(values) // WIDTH, 1)
+    picked = [(i, values[i]) for i in range(0, len(values), step) if math.isfinite(values[i])]
+    wide = (WIDTH - 4) / max(len(values) - 1, 1)
+    return " ".join(f"{2 + i * wide:.1f},{2 + (high - v) * scale:.1f}" for i, v in picked)
