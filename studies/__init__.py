@@ -21,6 +21,8 @@ NAMES = (
     "fig11",
     "fig12",
     "fig13",
+    "participants",
+    "uncertainty",
     "stability",
     "peers",
 )
