@@ -10,6 +10,7 @@ import importlib
 import os
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -121,7 +122,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         for number in before:
             signal.signal(number, signal.default_int_handler)
-        return _status(given)
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", UserWarning)
+            warnings.showwarning = _warn
+            return _status(given)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -146,6 +150,11 @@ def _status(given: argparse.Namespace) -> int:
         return _say("not enough memory for this input; try a coarser one", BAD_INPUT)
     except KeyboardInterrupt:
         return _say("interrupted", INTERRUPTED)
+
+
+def _warn(message: Warning | str, *_: object, **__: object) -> None:
+    """One line for a person, without the place in the code."""
+    print(f"evfem: warning: {message}", file=sys.stderr)
 
 
 def _silence() -> None:

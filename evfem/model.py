@@ -4,6 +4,7 @@ solver.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,6 +55,8 @@ def make_model(scene: Scene) -> Model:
     mesh, element = scene_mesh(scene)
     check_laws(mesh, scene.finger.materials)
     needed = plan_on(scene, mesh, element)
+    if needed.warning is not None:
+        warnings.warn(needed.warning, stacklevel=2)
     space = make_space(mesh, element)
     pad = outline.make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])

@@ -15,6 +15,7 @@ from evfem.errors import InputError
 from evfem.materials import split
 from evfem.mesh import Mesh
 from evfem.motion import Hover, VoltageRamp
+from evfem.resolution import unresolved
 from evfem.scene import Scene
 from evfem.signals import FollowForce, VoltageProfile
 
@@ -44,6 +45,7 @@ class Plan:
     steps: int
     terms: tuple[Term, ...]
     solver: tuple[str, ...]
+    warning: str | None = None
 
     def has(self, name: str) -> bool:
         """Whether the term called `name` is in."""
@@ -62,6 +64,8 @@ class Plan:
             f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
         ]
         lines += ["", "Solver"] + [f"  {line}" for line in self.solver]
+        if self.warning is not None:
+            lines += ["", f"Warning: {self.warning}"]
         return "\n".join(lines)
 
 
@@ -111,6 +115,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
+        warning=unresolved(scene, mesh),
     )
 
 

@@ -31,7 +31,7 @@ FLOORS = {
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
-        "motion scene scenekeys scenefile result samples sweepfile plan stepping model ledger resuming simulate rendering",
+        "motion scene scenekeys scenefile result samples sweepfile resolution plan stepping model ledger resuming simulate rendering",
     ),
     "edges": (
         {"numpy", "meshio", "matplotlib", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
