@@ -133,7 +133,12 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
         same = [r for r in third.rows if str(r["surface.friction"]) == row["surface.friction"]]
         same = [r for r in same if str(r["motion.0.indentation"]) == row["motion.0.indentation"]]
         assert [str(r["normal_force.last"]) for r in same] == [row["normal_force.last"]]
-    # the mesh is part of a scene: with another one everything is new
+    # with other outputs every point is another
+    plan.write_text(SWEEP.replace('"indentation.min"', '"indentation.max"'))
+    fourth = ev.sweep(plan, out, workers=1, resume=True)
+    assert fourth.provenance["reused"] == 0
+    np.testing.assert_allclose(fourth["indentation.max"][:4], [0.1, 0.2] * 2, rtol=1e-12)
+    # and so with another mesh
     meshfile.write(block(height=1.9), tmp_path / "block.vtu")
     assert ev.sweep(plan, out, workers=1, resume=True).provenance["reused"] == 0
 
