@@ -42,9 +42,9 @@ ASSUMPTIONS = {
     "the same spring for sticking friction; GetFEM's own brick, an augmented Lagrangian, takes as many "
     "iterations in A on larger matrices, and full Newton steps with it did not converge in B",
     "solver": "evfem and FElupe PARDISO; FEniCSx MUMPS by PETSc (in A on L2 CHOLMOD is as fast, "
-    "PETSc's own Cholesky slower but faster on L1; in B on L1 UMFPACK and SuperLU are slower); GetFEM its own "
-    "interface to MUMPS, which analyses every matrix anew; symmetric where the tangent is (A); MUMPS takes the "
-    "system's BLAS, which should be an optimised one (libopenblas0-pthread)",
+    "PETSc's own Cholesky slower but faster on L1; in B on L1 UMFPACK and SuperLU are slower); GetFEM its "
+    "own interface to MUMPS, which analyses every matrix anew; symmetric where the tangent is (A); MUMPS "
+    "uses the system's BLAS, which should be an optimised one (libopenblas0-pthread)",
     "elements": "q1: 2 x 2 points; q2, q2p1: cells of 2 x 2 linear ones through the same nodes, 3 x 3 points",
     "pull": "C: FEniCSx and GetFEM integrate with the nodes as points, so q1 is the same sum as evfem's; on "
     "quadratic edges evfem and FElupe project the chord, they the edge at its nodes",
