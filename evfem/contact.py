@@ -36,6 +36,8 @@ import numpy as np
 from evfem.mesh import Floats, Ints
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
+#: solves of an active set, of which a third may change many nodes at once
+LIMIT = 60
 #: feedback that an attraction is reduced to where its own fall cannot be held
 STABLE = 0.9
 
@@ -102,23 +104,24 @@ class ContactSolution:
     reduced: bool = False
 
 
-def solve_contact(problem: ContactProblem, status: Ints, limit: int = 60) -> ContactSolution:
+def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from all nodes
-    sticking or all open; raises `ContactNotSolved` when none of them ends within `limit` solves and one per
+    sticking or all open; raises `ContactNotSolved` when none of them ends within `LIMIT` solves and one per
     node.
     """
+    most = LIMIT + problem.size
     for start in (status, np.full(problem.size, STICK)):
         try:
-            return _active_set(problem, start, limit)
+            return _active_set(problem, start, most)
         except ContactNotSolved:
             continue
-    return _active_set(problem, np.full(problem.size, OPEN), limit)
+    return _active_set(problem, np.full(problem.size, OPEN), most)
 
 
-def _active_set(problem: ContactProblem, status: Ints, limit: int) -> ContactSolution:
+def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
     seen: set[bytes] = set()
-    for solves in range(1, limit + problem.size + 1):
+    for solves in range(1, most + 1):
         force, relief, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ (force + relief)
         if problem.border is not None:
@@ -127,8 +130,8 @@ def _active_set(problem: ContactProblem, status: Ints, limit: int) -> ContactSol
         changes = np.flatnonzero(wanted != status)
         if not changes.size:
             return ContactSolution(force, relief, status, extra, state, solves)
-        if status.tobytes() in seen or solves > limit // 3:
-            changes = changes[[np.argmax(violation[changes])]] if solves < limit else changes[:1]
+        if status.tobytes() in seen or solves > LIMIT // 3:
+            changes = changes[[np.argmax(violation[changes])]] if solves < LIMIT else changes[:1]
         seen.add(status.tobytes())
         status = status.copy()
         status[changes] = wanted[changes]
@@ -149,7 +152,7 @@ def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints, snap: bool =
         return solve_contact(pulled, status)
     for start in (status, _snapped(problem, pull, status)) if snap else (status,):
         try:
-            found = solve_contact(pulled, start)
+            found = _active_set(pulled, start, LIMIT)
         except ContactNotSolved:
             continue
         if _feedback(problem, pull, found.status)[0] < 1.0:
