@@ -103,10 +103,14 @@ class _Run:
     """A sweep on its way: its points, the key of each, and the answers so far."""
 
     def __init__(self, plan: Sweep, folder: SweepFolder | None, progress: bool) -> None:
+        from tqdm.auto import tqdm
+
         self.plan, self.folder, self.began = plan, folder, clock.perf_counter()
         self.points = plan.points()
         self.answers: dict[str, Answer] = {}
-        self.keys = [self._key(point.text, point.index) for point in self.points]
+        quiet = not (progress and sys.stderr.isatty())
+        reading = tqdm(self.points, "reading", unit="point", leave=False, delay=2.0, disable=quiet)
+        self.keys = [self._key(point.text) for point in reading]
         refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
             first = self.answers[self.keys[0]].message
@@ -123,7 +127,7 @@ class _Run:
         self.written = clock.perf_counter()
         self.bar = _Progress(len(set(self.keys)), self.answers, progress)
 
-    def _key(self, text: str, index: int) -> str:
+    def _key(self, text: str) -> str:
         """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""
         try:
             scene = loads(text, self.plan.folder).digest()
