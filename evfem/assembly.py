@@ -8,14 +8,14 @@ uses the volume change,
 
 Laws of small strain take the trace of the strain for ln J. The elements differ only in the volume measure:
 
-=========  ==================================================  =============================
-element    theta at a quadrature point                         locking at nu -> 1/2
-=========  ==================================================  =============================
-q1 q2 p2   ln J of that point                                  yes (q1), mild (q2, p2)
-q1_fbar    ln J at the centroid, which is F-bar with           no
+=========  ====================================================  =============================
+element    theta at a quadrature point                           locking at nu -> 1/2
+=========  ====================================================  =============================
+q1 q2 p2   ln J of that point                                    yes (q1), mild (q2, p2)
+q1_fbar    ln J at the centroid, which is F-bar with             no
            Fbar = (J0/J)^(1/2) F (10.1016/0045-7825(95)01001-9)
-q2p1       L2 projection of ln J onto {1, X, Y} of the cell    no
-=========  ==================================================  =============================
+q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
+=========  ====================================================  =============================
 
 `theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no
 unknown is added, the tangent is symmetric and the forces have a potential. With rows B = (grad u, theta) per

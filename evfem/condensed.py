@@ -134,7 +134,8 @@ class Step:
         """Contact among the candidates, their motion, and the extra unknowns."""
         free = self._free_motion()
         normal_gap = self.candidates.frame.normal_gap
-        gap = normal_gap + self._along_normal(free[:, 0])
+        # under the present contact forces: without them the whole pad would sink
+        gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1::2]
         near = np.flatnonzero((status != OPEN) | (gap < 0.0) | (self.candidates.fall * own > WEAK))
@@ -160,12 +161,15 @@ class Step:
 
     def _free_motion(self) -> Floats:
         """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 + p)."""
-        S = self.body.schur
-        present = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
-        right = self.residual[:-2] - present - S[:-2, -2:] @ self.bone
+        right = self.residual[:-2] - self._present - self.body.schur[:-2, -2:] @ self.bone
         return self.body.compliance @ np.column_stack(
             [right, *(unknown.push[:-2] for unknown in self.unknowns)]
         )
+
+    @cached_property
+    def _present(self) -> Floats:
+        """Present contact forces on the candidates (2 c,), in the laboratory frame."""
+        return np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
         """Candidates' motion (2 c,) by forces (2 k,) on the near ones."""

@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from evfem import meshfile
 from evfem.errors import InputError
 from evfem.mesh import Mesh
 from evfem.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
@@ -36,7 +37,10 @@ def paraview(result: Result, path: str | Path) -> Path:
 
 
 def write_frame(mesh: Mesh, frame: Frame, path: str | Path) -> None:
-    """Write one step as a .vtu file: points, displacement and all fields of CONTRACT's names."""
+    """Write one step as a .vtu file: points, displacement and all fields of CONTRACT's names.
+
+    Field data `region:NAME` hold the numbers of the regions, as in the files of `meshfile.write`.
+    """
     import meshio
     from meshio.vtu import write as write_vtu
 
@@ -47,6 +51,7 @@ def write_frame(mesh: Mesh, frame: Frame, path: str | Path) -> None:
     grid = meshio.Mesh(_three(mesh.points), [(mesh.kind, mesh.cells)], point_data, cell_data)
     with replacing(path) as temporary:
         write_vtu(str(temporary), grid, compression=None)
+        meshfile.add_region_names(temporary, mesh)
 
 
 class ParaViewSeries:

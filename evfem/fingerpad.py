@@ -93,7 +93,7 @@ class FingerPad:
     """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail above.
 
     **Outline.** Full axes `width` and `height`; on the lower side fingerprint ridges: their crests lie on
-    the ellipse, grooves are cut in. With t = |x - crest| / (`ridge_width`/2), x being the abscissa of the
+    the ellipse, grooves are cut in. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the
     point of the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, measured along the ellipse's
     normal. Crests stand at x = (k + `ridge_phase`) `ridge_width`. With `ridge_crest` > 0 the ridges are
     flat-topped instead: crest and groove are flat over the fractions `ridge_crest` and `ridge_groove` of

@@ -58,7 +58,7 @@ class EllipsoidalPad:
             object.__setattr__(self, name, value)
 
     def gap(self, x: Values, y: Values, lowest: Values) -> Values:
-        """Air gap d^a(x, y) in mm, equation (24), for |x| <= a, |y| <= c; `lowest` is d^a0 in the middle."""
+        """Air gap d^a(x, y) in mm, equation (24); abs(x) <= a, abs(y) <= c; `lowest`: d^a0 in the middle."""
         b = self.height / 2.0
         rise_x = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(x) / self.width) ** 2)
         rise_y = 1.0 - np.sqrt(1.0 - (2.0 * np.asarray(y) / self.length) ** 2)
@@ -102,8 +102,8 @@ def pad_force(
 ) -> Values:
     """Force in N on an ellipsoidal pad at lowest air gap `gap` in mm: (8a) or (8b) with (24), 1e-10 relative.
 
-    `over` chooses the area of integration: the rectangle |x| <= a, |y| <= c (the paper's numbers) or the
-    ellipse in it. All arguments broadcast; the result has their common shape. With x = a sin(t), y = c
+    `over` chooses the area of integration: the rectangle abs(x) <= a, abs(y) <= c (the paper's numbers) or
+    the ellipse in it. All arguments broadcast; the result has their common shape. With x = a sin(t), y = c
     sin(v) the gap is ``gap + b (2 - cos t - cos v)``, so the integrand is smooth and one product Gauss
     rule serves every evaluation. Raises InputError for a negative gap or where nothing insulates.
 

@@ -15,8 +15,11 @@ i must be positive definite: the bone may be free to move.
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 from functools import cache
+from importlib import metadata
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,6 +27,8 @@ import scipy.sparse as sparse
 
 from evfem.mesh import Floats, Ints
 
+#: environment variable that tells pypardiso where the library is
+PLACE = "PYPARDISO_MKL_RT"
 #: place of PARDISO's count of perturbed pivots among its parameters
 PERTURBED = 13
 
@@ -79,10 +84,22 @@ class Condensation(Protocol):
 
 @cache
 def pardiso_library() -> Any:
-    """pypardiso's handle of the library; finding the shared object takes long, so it is looked for once."""
+    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for it."""
+    if PLACE not in os.environ and (place := mkl_library()) is not None:
+        os.environ[PLACE] = place
     from pypardiso.pardiso_wrapper import PyPardisoSolver
 
     return PyPardisoSolver(mtype=2)
+
+
+def mkl_library() -> str | None:
+    """Where the package `mkl` has put its runtime library, or None."""
+    try:
+        files = metadata.files("mkl") or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = (str(file.locate()) for file in files if "mkl_rt" in file.name and ".lib" not in file.name)
+    return next((place for place in found if Path(place).exists()), None)
 
 
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
@@ -245,7 +262,7 @@ class SuperLU:
 def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
     """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
     try:
-        import pypardiso  # noqa: F401
+        pardiso_library()
     except ImportError:
         return SuperLU(pattern, kept, threads)
     return Pardiso(pattern, kept, threads)

@@ -217,6 +217,11 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
         {"region": [mesh.region.astype(np.int32)]},
     )
     out.write(path, file_format="vtu", compression=None)
+    add_region_names(path, mesh)
+
+
+def add_region_names(path: Path, mesh: Mesh) -> None:
+    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number."""
     form = '<DataArray type="Int32" Name="{}{}" NumberOfTuples="1" format="ascii">{}</DataArray>'
     arrays = "".join(form.format(PREFIX, name, number) for name, number in mesh.region_names.items())
     tag = b"<UnstructuredGrid>"

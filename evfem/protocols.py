@@ -4,13 +4,15 @@ Nothing is inherited and nothing registered; the object goes where the package's
 optional may be there or not. Arrays have any trailing shape; a method that takes complex numbers gets exact
 derivatives (`evfem.tensor.complex_step`), another one differences.
 
-| part | goes to | needs |
-|---|---|---|
-| electrostatic law | `Scene(law=...)` | `ForceLaw` |
-| material | `FingerPad(materials={region: ...})` | `StressLaw` or `EnergyLaw` |
-| surface | `Scene(surface=...)` | `Surface` |
-| weak form | `Scene.with_term(evfem.form(...), on=...)` | `WeakForm` |
-| observer | `simulate(observers=[...])` | any of `Starting`, `Stepping`, `Finishing` |
+=====================  ========================================  =======================================
+part                   goes to                                   needs
+=====================  ========================================  =======================================
+electrostatic law      ``Scene(law=...)``                        `ForceLaw`
+material               ``FingerPad(materials={region: ...})``    `StressLaw` or `EnergyLaw`
+surface                ``Scene(surface=...)``                    `Surface`
+weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
+observer               ``simulate(observers=[...])``             any of `Starting`, `Stepping`, `Finishing`
+=====================  ========================================  =======================================
 """
 
 from __future__ import annotations

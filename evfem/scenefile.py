@@ -316,6 +316,8 @@ def _law_table(region: str, law: Any) -> dict[str, Any]:
 
 
 def _surface_table(surface: Any) -> dict[str, Any]:
+    if type(surface) not in (Flat, Display, Sinusoid, Profile):
+        raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
     friction = (
         surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
     )
@@ -324,10 +326,8 @@ def _surface_table(surface: Any) -> dict[str, Any]:
         return {"kind": "flat", **table}
     if type(surface) is Sinusoid:
         return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
-    if type(surface) is Profile:
-        rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
-        return {"kind": "profile", **table, "points": [list(row) for row in rows]}
-    raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
+    rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
+    return {"kind": "profile", **table, "points": [list(row) for row in rows]}
 
 
 def _electrostatics_table(scene: Scene) -> dict[str, Any]:

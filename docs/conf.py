@@ -1,0 +1,29 @@
+"""How the site is built: `sphinx-build -W docs build/docs`, then open `build/docs/index.html`."""
+
+import evfem
+
+project = "evfem"
+version = release = evfem.__version__
+language = "en"
+
+extensions = [
+    "myst_parser",  # pages in Markdown
+    "sphinx.ext.autodoc",  # reference from docstrings
+    "sphinx.ext.viewcode",
+    "sphinx-mathjax-offline",  # equations without a network
+]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 3
+
+default_role = "py:obj"  # `name` in a docstring links where it can
+autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+python_use_unqualified_type_names = True
+maximum_signature_line_length = 90
+add_module_names = False
+
+html_theme = "furo"
+html_title = f"evfem {release}"
+html_show_copyright = False
+html_copy_source = False
