@@ -24,6 +24,7 @@ NAMES = (
     "participants",
     "uncertainty",
     "stability",
+    "work_precision",
     "peers",
 )
 

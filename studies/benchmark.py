@@ -32,7 +32,16 @@ def benchmark_mesh(level: int, order: int = 1, *, same_nodes: bool = False) -> M
     """
     if level not in LEVELS:
         raise InputError("level", level, "0, 1, 2 or 3")
-    around, tissue, skin = LEVELS[level]
+    return divided_mesh(LEVELS[level], order, same_nodes=same_nodes)
+
+
+def divided_mesh(divisions: tuple[int, int, int], order: int = 1, *, same_nodes: bool = False) -> Mesh:
+    """The same with so many linear cells around, across the tissue and across the skin.
+
+    >>> len(divided_mesh((30, 5, 1)).points)
+    217
+    """
+    around, tissue, skin = divisions
     across = tissue + skin
     theta = np.pi * (1.0 + np.arange(around + 1) / around)
     circle = np.column_stack([np.cos(theta), np.sin(theta)])

@@ -1,0 +1,106 @@
+"""The runs of the study `work_precision`: which, and how each is measured.
+
+Every run counts from the mesh to the last step, without imports, in CPU seconds of one process that has run
+everything once on the coarsest mesh; cheap runs are repeated and the least counts.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from .precision_apart import answer
+from .precision_scenes import ELEMENTS, PADS, Case, build, forces
+
+#: N/mm3: soft, and about as stiff as penalty codes take it
+PENALTIES = (100.0, 10_000.0)
+#: steps of the slide in B, whose own limit is extrapolated from the last two
+STEPS = (10, 30, 60, 120)
+#: runs shorter than this are repeated (CPU s)
+SHORT, ROUNDS = 1.2, 3
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case and what it took: CPU seconds, outer iterations, factorisations, nodes, and what it is judged
+    by.
+    """
+
+    case: Case
+    cpu_s: float
+    iterations: int
+    factorisations: int
+    nodes: int
+    forces: dict[str, float]
+
+
+def warm_up() -> None:
+    """Import and compile what the cases need, for every element."""
+    from evfem.simulate import simulate
+
+    for case in [Case("hover", 0, element) for element in ELEMENTS] + [Case("A", 0)]:
+        simulate(build(case))
+
+
+def measure(case: Case) -> Run:
+    """Run a case until its time is known."""
+    from evfem.simulate import simulate
+
+    least = float("inf")
+    for _ in range(ROUNDS):
+        gc.collect()
+        begin = time.process_time()
+        result = simulate(build(case))
+        least = min(least, time.process_time() - begin)
+        if least > SHORT:
+            break
+    record, nodes = result.provenance["solver"], len(result.mesh.points)
+    return Run(case, least, record["iterations"], record["factorisations"], nodes, forces(case, result))
+
+
+def measure_plain(given: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The same for another process: cases and runs as dictionaries."""
+    warm_up()
+    return [asdict(measure(Case(**one))) for one in given]
+
+
+def without_fast(cases: list[Case]) -> list[Run]:
+    """The cases in a process in which the packages of evfem[fast] cannot be imported."""
+    if not cases:
+        return []
+    found = answer("runs", [asdict(one) for one in cases], fast=False)
+    return [Run(**(one | {"case": Case(**one["case"])})) for one in found]
+
+
+def full() -> list[Case]:
+    """All cases, the coarsest meshes first, so that everything is compiled when times count."""
+    cases = [Case(problem, level, e) for level in (0, 1) for problem in _FINGERS for e in ELEMENTS]
+    cases += [Case("A", 2, element) for element in ELEMENTS]
+    cases += [Case(problem, 2) for problem in ("B", "C", "hover", "ramp")]
+    cases += [Case(problem, level, rigid=True) for problem in ("hover",) for level in (0, 1, 2)]
+    cases += [Case(problem, 1, penalty=penalty) for problem in "ABC" for penalty in PENALTIES]
+    couplings = ("staggered", "staggered_once")
+    cases += [Case(problem, 1, coupling=how) for problem in ("C", "ramp") for how in couplings]
+    cases += [Case("B", 0, steps=steps) for steps in STEPS if steps != 30]
+    cases += [Case(pad, preset, e) for preset in ("coarse", "medium") for pad in PADS for e in ELEMENTS]
+    cases += [Case(pad, "paper", e) for pad in PADS for e in ("q1_fbar", "q2p1")]
+    cases += [Case(pad, "fine") for pad in PADS]
+    return cases + [replace(one, fast=False) for one in cases if _also_plain(one)]
+
+
+def _also_plain(case: Case) -> bool:
+    usual = case == Case(case.problem, case.level)
+    return usual and (case.level in (0, "coarse") or (case.problem in ("A", "C") and case.level == 1))
+
+
+def quick() -> list[Case]:
+    """What tests need: every kind of case, on the coarsest mesh."""
+    cases = [Case(problem, 0, element) for problem in ("A", "hover") for element in ELEMENTS]
+    cases += [Case("A", 1), Case("hover", 1), Case("C", 0), Case("C", 0, coupling="staggered")]
+    cases += [Case("A", 0, penalty=penalty) for penalty in PENALTIES]
+    return [*cases, Case("hover", 0, rigid=True), Case("A", 0, fast=False)]
+
+
+_FINGERS = ("A", "B", "C", "hover", "ramp")
