@@ -11,7 +11,7 @@ from paraview import simple
 STRESS, PRESSURE = ("CELLS", "von_mises"), ("POINTS", "contact_pressure")
 #: colour maps and places of the two legends (in shares of the view)
 MAPS = {STRESS: "Viridis (matplotlib)", PRESSURE: "Inferno (matplotlib)"}
-PLACES = {STRESS: [0.88, 0.12], PRESSURE: [0.88, 0.55]}
+PLACES = {STRESS: [0.03, 0.3], PRESSURE: [0.87, 0.3]}
 TITLES = {STRESS: "von Mises stress (MPa)", PRESSURE: "contact pressure (MPa)"}
 
 
@@ -24,8 +24,10 @@ def coloured(source, view, field):
     colours.ApplyPreset(MAPS[field], True)
     legend = simple.GetScalarBar(colours, view)
     legend.Title, legend.ComponentTitle = TITLES[field], ""
-    legend.WindowLocation, legend.Position, legend.ScalarBarLength = "Any Location", PLACES[field], 0.33
+    legend.LabelFormat = legend.RangeLabelFormat = "%.3f"
+    legend.WindowLocation, legend.Position, legend.ScalarBarLength = "Any Location", PLACES[field], 0.4
     shown.SetScalarBarVisibility(view, True)
+    shown.Ambient, shown.Diffuse, shown.Specular = 1.0, 0.0, 0.0  # colours as in the legend, no light
     return shown
 
 
@@ -33,6 +35,7 @@ def show(series):
     """The picture of a series (fields.pvd) at its present time."""
     view = simple.GetActiveViewOrCreate("RenderView")
     view.InteractionMode, view.OrientationAxesVisibility = "2D", 0
+    simple.LoadPalette("WhiteBackground")
     simple.Hide(series, view)
     deformed = simple.WarpByVector(registrationName="deformed", Input=series)
     deformed.Vectors = ["POINTS", "displacement"]
@@ -41,7 +44,9 @@ def show(series):
     outline = simple.FeatureEdges(registrationName="outline", Input=surface)
     outline.FeatureEdges, outline.ManifoldEdges, outline.NonManifoldEdges = 0, 0, 0
     coloured(outline, view, PRESSURE).LineWidth = 5.0
+    simple.Render(view)  # the first picture would move the camera
     view.ResetCamera(True)
+    view.CameraParallelScale *= 0.75
     simple.Render(view)
     return view
 
@@ -53,9 +58,11 @@ def main():
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     scene.GoToLast()
+    if files:
+        simple.GetActiveViewOrCreate("RenderView").ViewSize = [1400, 900]
     view = show(series)
     if len(files) > 1:
-        simple.SaveScreenshot(files[1], view, ImageResolution=[1400, 900])
+        simple.SaveScreenshot(files[1], view)
 
 
 main()
