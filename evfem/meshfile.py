@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem import mshread, vturead
+from evfem import meshioread, mshread, vturead
 from evfem.errors import InputError, StorageError
 from evfem.mesh import KINDS, Ints, Mesh
 from evfem.meshcheck import check
@@ -33,7 +33,7 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh of a `.vtu` or `.msh` file of at most 256 MB, in mm.
+    """The checked mesh, in mm, of a `.vtu` or `.msh` file of at most 128 MB, or of another that meshio reads.
 
     `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of
     gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are turned
@@ -62,15 +62,13 @@ def _parts(path: Path) -> Parts:
     if not path.is_file():
         raise InputError("finger.mesh", str(path), "a mesh file that exists")
     reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise InputError("finger.mesh", str(path), f"a mesh file that ends with {' or '.join(READERS)}")
     try:
         if path.stat().st_size > LARGEST:
             raise Unreadable(f"more than {LARGEST // 2**20} MB")
-        return reader(path.read_bytes())
+        return meshioread.read(path) if reader is None else reader(path.read_bytes())
     except (Unreadable, MemoryError) as error:
         reason = " ".join(str(error).split())[:200] or "not enough memory"
-        allowed = "a readable mesh file, .vtu or .msh with physical groups"
+        allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
         raise InputError("finger.mesh", f"{path} ({reason})", allowed) from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error

@@ -25,7 +25,7 @@ FLOORS = {
     ),
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
-        "mesh quality meshcheck meshparts vturead mshread meshfile outline lattice section fingerpad "
+        "mesh quality meshcheck meshparts vturead mshread meshioread meshfile outline lattice section fingerpad "
         "lanes kernels viscous assembly forms pad contactedge attraction contact condensed linear dynamics "
         "body strategy state mixing pins interface linearisation findings newton",
     ),
