@@ -9,7 +9,7 @@ at the end of the run, in the same process.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from functools import wraps
 from importlib.util import find_spec
@@ -98,7 +98,7 @@ class Parts(Clock):
             yield
 
 
-def measure_shares(questions: list[int]) -> list[dict[str, float]]:
+def measure_shares(questions: Sequence[int]) -> list[dict[str, float]]:
     """Shares and costs on the levels asked for, as numbers with dotted names."""
     warm_up()
     return [measured(level) for level in questions]
