@@ -264,6 +264,7 @@ def _draw_voltage(ax: Axes, outcome: Outcome, key: str) -> None:
     for kind, found in outcome.rendered.items():
         if kind != "thick":
             ax.plot(outcome.position, found.voltage, color=COLOUR[kind], linewidth=1.1)
+    ax.margins(y=0.12)
     printed = PAPER[f"{key.split('.')[-1]}.voltage_max_V"]
     ax.axhline(printed, color=COLOURS["neutral"], linewidth=0.8, linestyle=":")
     ax.annotate(
