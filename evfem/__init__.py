@@ -23,6 +23,7 @@ _NAMES = {
     "mesh": ("Mesh",),
     "motion": ("Hover", "Press", "Slide", "VoltageRamp"),
     "plan": ("plan",),
+    "reduced": ("FastModel", "reduce"),
     "result": ("Checkpoint", "Frame", "Result"),
     "samples": ("Normal", "Samples", "Uniform"),
     "scene": ("Boundary", "Output", "Region", "Scene", "Solver", "default_scene", "form", "grad"),

@@ -88,6 +88,10 @@ class ContactProblem:
         """Number of candidate nodes k."""
         return self.friction.size
 
+    def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
+        """Contact forces (2 k,), relief of the pull (2 k,) and extra unknowns (p,) for given statuses."""
+        return _solve_statuses(self, status)
+
 
 @dataclass(frozen=True)
 class ContactSolution:
@@ -122,7 +126,7 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
     seen: set[bytes] = set()
     for solves in range(1, most + 1):
-        force, relief, extra = _solve_statuses(problem, status)
+        force, relief, extra = problem.solved(status)
         state = problem.start + problem.compliance @ (force + relief)
         if problem.border is not None:
             state = state + problem.border.effect @ extra
