@@ -93,6 +93,8 @@ def _problem(ax: Axes, title: str, curves: Sequence[Series], uncertain: float) -
         label="reference uncertain",
     )  # fmt: skip
     ax.set(xscale="log", yscale="log")
+    drawn = [max(value, SMALLEST) for curve in curves for value in curve.y]
+    ax.set_ylim(bottom=0.4 * min([uncertain, *drawn]))
     _titled(ax, title, "CPU seconds")
     _plain_ticks(ax)
 
@@ -144,8 +146,10 @@ def _plain_ticks(ax: Axes) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
     for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_locator(LogLocator(numticks=7))
-        axis.set_major_formatter("{x:g}")
+        low, high = axis.get_view_interval()
+        few = high < 100.0 * low
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=7))
+        axis.set_major_formatter("{x:,g}" if high > 1e3 else "{x:g}")
         axis.set_minor_formatter(NullFormatter())
     ax.tick_params(labelsize="small")
     ax.grid(which="major", color="#E5E5E5", linewidth=0.6)
