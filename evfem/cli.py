@@ -8,16 +8,19 @@ from __future__ import annotations
 import argparse
 import importlib
 import os
+import re
 import signal
 import sys
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
+from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, NoReturn
 
 import evfem
+from evfem import notices
 from evfem.errors import InputError, NotConverged, StorageError
 
 if TYPE_CHECKING:
@@ -26,31 +29,50 @@ if TYPE_CHECKING:
     from evfem.scene import Scene
 
 DONE, BAD_INPUT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
+STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
+#: what a shell completes an argument with, as shtab wants it: `shtab --shell bash evfem.cli.parser`
+FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
+FOLDERS = {"bash": "_shtab_compgen_dirs", "zsh": "_files -/", "tcsh": "d"}
 
 
 class _Parser(argparse.ArgumentParser):
     """A parser that reports a mistake in one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        self.exit(BAD_INPUT, f"{self.prog}: {message} (see {self.prog} --help)\n")
+        text = f"{self.prog}: {message}{_meant(message)} (see {self.prog} --help)"
+        self.exit(BAD_INPUT, notices.wrapped(text, sys.stderr) + "\n")
+
+
+def _meant(message: str) -> str:
+    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run', ...)"."""
+    found = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+    close = get_close_matches(found[1], re.findall(r"\w+", found[2]), 1) if found else []
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def _complete(argument: argparse.Action, how: dict[str, str]) -> None:
+    argument.complete = how  # type: ignore[attr-defined]
 
 
 def parser() -> argparse.ArgumentParser:
     """All commands and options."""
     top = _Parser(
-        prog="evfem", description="A finger pad on an electrovibration display, by finite elements."
+        prog="evfem",
+        description="A finger pad on an electrovibration display, by finite elements.",
+        epilog=f"`evfem run` alone computes a built-in scene; `evfem COMMAND --help` says more. {STATUS}",
     )
     top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
     scene = _Parser(add_help=False)
-    scene.add_argument(
+    file = scene.add_argument(
         "scene", nargs="?", type=Path, metavar="SCENE.toml", help="default: the built-in scene"
     )
+    _complete(file, FILES)
 
     run = commands.add_parser(
         "run", parents=[scene], help="run a scene and write history, fields, summary and picture"
     )
-    run.add_argument("--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out")
+    _results(run)
     run.add_argument("--resume", action="store_true", help="go on with the interrupted run in the folder")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
@@ -62,8 +84,9 @@ def parser() -> argparse.ArgumentParser:
     plan.set_defaults(function=_plan)
 
     study = commands.add_parser("study", help="run studies and write their numbers, series and pictures")
-    study.add_argument("names", nargs="+", metavar="NAME", help="name of a study, or all")
-    study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
+    study.add_argument("names", nargs="+", metavar="NAME", help=_study_names())
+    out = study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
+    _complete(out, FOLDERS)
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
     study.set_defaults(function=_study)
 
@@ -72,7 +95,10 @@ def parser() -> argparse.ArgumentParser:
     sweep.set_defaults(function=_sweep)
 
     mesh = commands.add_parser("mesh", parents=[scene], help="write the finger's mesh as .vtu or .msh")
-    mesh.add_argument("--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh")
+    target = mesh.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh"
+    )
+    _complete(target, FILES)
     mesh.set_defaults(function=_mesh)
 
     voltage = commands.add_parser("signal", help="write a voltage signal as .wav, .png, .hjif or .csv")
@@ -81,9 +107,27 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def _results(command: argparse.ArgumentParser) -> None:
+    out = command.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out"
+    )
+    _complete(out, FOLDERS)
+
+
+def _study_names() -> str:
+    """Help on the names of studies; a checkout that is not installed has none."""
+    try:
+        return f"{', '.join(_studies().NAMES)}, or all (all but peers)"
+    except InputError:
+        return "name of a study, or all"
+
+
 def _sweep_options(sweep: argparse.ArgumentParser) -> None:
-    sweep.add_argument("sweep", type=Path, metavar="SWEEP.toml", help="what is varied, and in which scene")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out")
+    file = sweep.add_argument(
+        "sweep", type=Path, metavar="SWEEP.toml", help="what is varied, and in which scene"
+    )
+    _complete(file, FILES)
+    _results(sweep)
     sweep.add_argument(
         "--resume", action="store_true", help="do not compute finished points of the folder again"
     )
@@ -94,10 +138,12 @@ def _sweep_options(sweep: argparse.ArgumentParser) -> None:
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
-    voltage.add_argument("file", type=Path, metavar="VOLTAGE", help="signal to read, .csv or .wav")
-    voltage.add_argument(
+    file = voltage.add_argument("file", type=Path, metavar="VOLTAGE", help="signal to read, .csv or .wav")
+    out = voltage.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="file to write; its ending says as what"
     )
+    for path in (file, out):
+        _complete(path, FILES)
     voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
     voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
     voltage.add_argument(
@@ -125,7 +171,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
             warnings.showwarning = _warn
-            return _status(given)
+            with notices.shown():
+                return _status(given)
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
@@ -154,7 +201,7 @@ def _status(given: argparse.Namespace) -> int:
 
 def _warn(message: Warning | str, *_: object, **__: object) -> None:
     """One line for a person, without the place in the code."""
-    print(f"evfem: warning: {message}", file=sys.stderr)
+    notices.tell(f"warning: {message}")
 
 
 def _silence() -> None:
@@ -164,7 +211,7 @@ def _silence() -> None:
 
 
 def _say(message: object, status: int) -> int:
-    print(f"evfem: {message}", file=sys.stderr)
+    notices.tell(str(message))
     return status
 
 
@@ -230,8 +277,17 @@ class _Milestones:
 def _plan(given: argparse.Namespace) -> int:
     from evfem.plan import plan
 
-    print(plan(_scene(given.scene)), flush=True)
+    scene = _scene(given.scene)
+    with notices.status("building the mesh"):
+        needed = str(plan(scene))
+    print("\n".join(_fitted(line) for line in needed.split("\n")), flush=True)
     return DONE
+
+
+def _fitted(line: str) -> str:
+    """A line of a plan in a terminal's width; what goes over stands below the reason, not the name."""
+    named = re.match(r"  [+-] .{14}|\s*", line)
+    return notices.wrapped(line, sys.stdout, " " * (named.end() if named else 0))
 
 
 def _study(given: argparse.Namespace) -> int:
@@ -244,7 +300,8 @@ def _study(given: argparse.Namespace) -> int:
             raise InputError("study", name, f"{', '.join(studies.NAMES)}, all")
     for name in dict.fromkeys(names):
         print(f"study {name}", file=sys.stderr, flush=True)
-        studies.run(name, quick=given.quick, out=given.out)
+        with notices.status(name):
+            studies.run(name, quick=given.quick, out=given.out)
         print(given.out / f"{name}.json", flush=True)
     return DONE
 
@@ -272,7 +329,7 @@ def _sweep(given: argparse.Namespace) -> int:
         return _say(f"interrupted; finished points are in {path}, go on with --resume", INTERRUPTED)
     wrong = [row for row in result.rows if row["status"] != "done"]
     for row in wrong[:3]:
-        print(f"evfem: point {row['point']}: {row['message']}", file=sys.stderr)
+        notices.tell(f"point {row['point']}: {row['message']}")
     points = result.provenance["points"]
     print(f"{points['requested']} points: {told(points)}; table in {path / TABLE}", flush=True)
     return NOT_CONVERGED if wrong else DONE
@@ -283,8 +340,9 @@ def _mesh(given: argparse.Namespace) -> int:
     from evfem.meshfile import write
     from evfem.plan import scene_mesh
 
-    mesh, _ = scene_mesh(scene)
-    write(mesh, given.out)
+    with notices.status("building the mesh"):
+        mesh, _ = scene_mesh(scene)
+        write(mesh, given.out)
     regions = ", ".join(mesh.region_names)
     print(
         f"{len(mesh.points)} nodes, {len(mesh.cells)} cells ({mesh.kind}); {regions}; in {given.out}",

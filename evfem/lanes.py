@@ -11,12 +11,33 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core import event
 
 from evfem.mesh import Floats, Ints
+from evfem.notices import LOG
 
 LANES = 16
 #: beyond this square of e / (2 + e), |ln J| about 1/3, the series of ln J is too short
 FAR = 0.028
+
+
+class _Compiling(event.Listener):
+    """Says that loops of this package are being compiled: the first run of an installation waits for it."""
+
+    said = False
+
+    def on_start(self, event: Any) -> None:
+        ours = event.data["dispatcher"].py_func.__module__.startswith("evfem.")
+        if ours and not self.said:
+            self.said = True
+            LOG.info("compiling the element loops, once after an installation: up to a minute")
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+COMPILING = _Compiling()
+event.register("numba:compile", COMPILING)
 
 compiled = njit(cache=True, error_model="numpy", fastmath={"contract"})
 inlined = njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from evfem import notices
 from evfem.errors import NotConverged, StopRun
 from evfem.ledger import SUMS, Ledger, frame_of
 from evfem.model import Model, make_model
 from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.notices import LOG
 from evfem.protocols import Observer
 from evfem.result import Frame, Result, Saved, provenance
 from evfem.resuming import carried_arrays, carry_on, state_arrays, state_of, usable
@@ -55,21 +57,25 @@ def simulate(
     `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
     """
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
-    with threadpool_limits(limits=scene.solver.threads):
+    with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
 
 def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resume: Saved | None) -> Result:
-    run = Run(scene, resume)
     total = scene.total_steps
-    _tell(observers, "started", run.model.mesh, scene, total)
-    bar = _progress_bar(progress, total, len(run.rows))
+    # shown at once, for making the model takes seconds; no trace of it where the scene is refused
+    bar = notices.bar(total, "step", len(resume.rows) if resume else 0, progress)
+    bar.leave = False
     reasons: list[str] = []
     try:
+        run = Run(scene, resume)
+        _tell(observers, "started", run.model.mesh, scene, total)
+        bar.leave = True
         for request in run.requests():
             frame = run.advance(request)
             reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
             bar.update(1)
+            LOG.debug("step %d of %d", len(run.rows), total)
             if reasons:
                 run.keep_last_frame()
                 break
@@ -279,9 +285,3 @@ def _tell(observers: Sequence[Observer], event: str, *arguments: Any) -> list[st
                 raise
             reasons.append(str(stop) or type(observer).__name__)
     return reasons
-
-
-def _progress_bar(progress: bool, total: int, done: int) -> Any:
-    from tqdm.auto import tqdm
-
-    return tqdm(total=total, initial=done, unit="step", disable=not progress)

@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 
 import evfem
+from evfem import notices
 from evfem.digest import digest
 from evfem.errors import InputError, NotConverged
+from evfem.notices import LOG
 from evfem.pools import Open, Pool, open_pool, processes
 from evfem.result import versions
 from evfem.scenefile import loads
@@ -291,13 +293,11 @@ class _Progress:
     """A bar in a terminal; elsewhere a line for every tenth of the points."""
 
     def __init__(self, total: int, answers: Mapping[str, Answer], shown: bool) -> None:
-        from tqdm.auto import tqdm
-
         self.total, self.shown = total, shown
         terminal = sys.stderr.isatty()
         self.lines = shown and not terminal
         done = len(answers)
-        self.bar = tqdm(total=total, initial=done, unit="point", disable=not (shown and terminal))
+        self.bar = notices.bar(total, "point", done, shown and terminal)
 
     def step(self, answers: Mapping[str, Answer]) -> None:
         """One more is finished."""
@@ -305,6 +305,7 @@ class _Progress:
         wrong = sum(answer.status != "done" for answer in answers.values())
         self.bar.set_postfix_str(f"{wrong} without result" if wrong else "", refresh=False)
         self.bar.update(1)
+        LOG.debug("point %d of %d", done, self.total)
         if self.lines and done * 10 // self.total > (done - 1) * 10 // self.total:
             print(f"point {done} of {self.total}", file=sys.stderr, flush=True)
 

@@ -8,6 +8,8 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import TypeVar
 
+from evfem.notices import LOG
+
 Argument = TypeVar("Argument")
 Answer = TypeVar("Answer")
 
@@ -24,6 +26,10 @@ def side_by_side(
         return [function(argument) for argument in arguments]
     try:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            return list(pool.map(function, arguments))
+            answers = []
+            for answer in pool.map(function, arguments):
+                answers.append(answer)
+                LOG.debug("case %d of %d", len(answers), len(arguments))
+            return answers
     except BrokenProcessPool:
         return [function(argument) for argument in arguments]

@@ -17,7 +17,10 @@ TESTS = Path(__file__).parent
 
 #: floor -> what it may import from outside the standard library, and its modules from the top down
 FLOORS = {
-    "words and algebra": ({"numpy"}, "errors protocols views tensor checks values digest storage tables"),
+    "words and algebra": (
+        {"numpy", "tqdm"},
+        "errors protocols notices views tensor checks values digest storage tables",
+    ),
     "laws": (
         {"numpy", "scipy"},
         "moduli splitlaw ogden materials electrostatics forces encoding surfaces ownsurface friction signals "

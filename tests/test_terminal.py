@@ -1,0 +1,243 @@
+"""The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it arrives."""
+
+import io
+import logging
+import os
+import pty
+import re
+import struct
+import sys
+import termios
+from fcntl import ioctl
+from importlib.util import find_spec
+from subprocess import Popen
+
+import pytest
+from fakes import square_mesh
+
+from evfem import cli, meshfile, notices
+
+SCENE = """
+version = 1
+[finger]
+mesh = "square.vtu"
+[finger.materials.soft]
+law = "neo_hookean"
+E = 0.05
+nu = 0.4
+[finger.materials.hard]
+law = "neo_hookean"
+E = 0.1
+nu = 0.3
+[surface]
+kind = "flat"
+friction = 0.2
+[[motion]]
+kind = "press"
+indentation = 0.2
+steps = 4
+"""
+SWEEP = """
+version = 1
+[scene.finger]
+resolution = "coarse"
+[scene.surface]
+kind = "flat"
+[[scene.motion]]
+kind = "hover"
+gap = 0.5
+[grid]
+motion.0.gap = [0.25, 0.5]
+"""
+
+
+@pytest.fixture
+def place(tmp_path):
+    meshfile.write(square_mesh("quad9"), tmp_path / "square.vtu")
+    (tmp_path / "square.toml").write_text(SCENE)
+    (tmp_path / "two.toml").write_text(SWEEP)
+    return tmp_path
+
+
+def terminal(folder, *words, columns=80, code="from evfem.cli import main; import sys; sys.exit(main())"):
+    """(exit status, all that a terminal so wide received) of the command."""
+    ours, theirs = pty.openpty()
+    ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    path = os.pathsep.join(p for p in sys.path if p)
+    environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "NO_COLOR": "1", "TERM": "xterm"}
+    environment.pop("COLUMNS", None)
+    arguments = [sys.executable, "-c", code, *map(str, words)]
+    with Popen(arguments, cwd=folder, env=environment, stdin=theirs, stdout=theirs, stderr=theirs) as process:
+        os.close(theirs)
+        received = b""
+        try:
+            while chunk := os.read(ours, 65536):
+                received += chunk
+        except OSError:  # the other end has closed
+            pass
+        os.close(ours)
+    return process.returncode, received.decode()
+
+
+def lines(text):
+    """What stood on each line, overwritten states included."""
+    return [line.rstrip() for line in re.split(r"[\r\n]+|\x1b\[A", text) if line.strip()]
+
+
+@pytest.mark.parametrize("columns", [80, 0])
+def test_a_run_draws_a_bar_and_a_table_in_the_width_there_is(place, columns):
+    """A terminal that says it has no columns, as one started by a program, gets 80."""
+    status, text = terminal(place, "run", "square.toml", "--no-plots", "--no-fields", columns=columns)
+    assert status == 0
+    assert max(map(len, lines(text))) <= 80
+    bars = [line for line in lines(text) if "step/s" in line or "s/step" in line]
+    assert "| 0/4 [" in bars[0]
+    assert "100%|" in bars[-1]
+    assert "█" in bars[-1]
+    assert lines(text)[-1].startswith("4 of 4 steps in")
+
+
+def test_a_sweep_draws_a_bar_in_a_terminal_without_columns(place):
+    status, text = terminal(place, "sweep", "two.toml", "--workers", "1", columns=0)
+    assert status == 0
+    assert any("2/2 [" in line and "100%|" in line for line in lines(text))
+    assert max(map(len, lines(text))) <= 80
+
+
+def test_nothing_is_coloured(place):
+    for words in (["--help"], ["run", "square.toml", "--no-plots"], ["rnu"]):
+        assert not re.search(r"\x1b\[[0-9;]*m", terminal(place, *words)[1])
+
+
+def test_a_refused_scene_leaves_one_wrapped_sentence_and_no_bar(place):
+    (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 0.2\ny = 1.0"))
+    status, text = terminal(place, "run", "square.toml")
+    assert status == 2
+    last = text.rsplit("\x1b[K", 1)[-1].rsplit("\r" + " " * 60, 1)[-1]
+    assert "evfem: surface.y" in last
+    shown = [line for line in lines(text) if "step" not in line]
+    assert max(map(len, shown)) < 80
+    assert len(shown) > 1
+    assert all(line.startswith("  ") for line in shown[1:])
+
+
+@pytest.mark.parametrize("command", ["", "run", "plan", "study", "sweep", "mesh", "signal"])
+def test_help_fits(monkeypatch, capsys, command):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert cli.main([*command.split(), "--help"]) == 0
+    text = capsys.readouterr().out
+    assert max(map(len, text.splitlines())) <= 80
+    if not command:
+        assert "evfem run" in text
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'signal') (see")],
+)
+def test_a_misspelt_command_is_guessed(capsys, given, words):
+    assert cli.main([given]) == 2
+    err = capsys.readouterr().err
+    assert words in err
+    assert err.count("\n") == 1
+
+
+def test_a_plan_fits_and_is_whole_where_it_is_not_a_terminal(place):
+    status, text = terminal(place, "plan", "square.toml")
+    assert status == 0
+    assert max(map(len, lines(text))) < 80
+    assert " ".join(lines(text)).count("Solver") == 1
+
+
+def test_a_long_line_is_broken_between_words_in_a_terminal_alone(monkeypatch):
+    text = "mesh.vtu: " + "given a-very-long-name; " * 10
+    monkeypatch.setenv("COLUMNS", "80")
+    stream = io.StringIO()
+    assert notices.wrapped(text, stream) == text
+    stream.isatty = lambda: True
+    broken = notices.wrapped(text, stream).split("\n")
+    assert max(map(len, broken)) < 80
+    assert all(line.startswith("  ") for line in broken[1:])
+    assert " ".join(line.strip() for line in broken) == text.strip()
+
+
+STATUS = """
+import sys, threading
+from evfem import notices
+drawn, write = threading.Event(), sys.stderr.write
+sys.stderr.write = lambda text: ("case" in text and drawn.set(), write(text))[1]
+notices.PATIENCE, notices.EVERY = float(sys.argv[1]), 0.05
+with notices.status("fig05"):
+    notices.LOG.debug("case %d of %d", 1, 3)
+    if notices.PATIENCE < 1.0:
+        drawn.wait(60.0)
+print("over")
+"""
+
+
+def test_a_status_shows_what_is_going_on_and_goes(place):
+    text = terminal(place, "0.05", code=STATUS)[1]
+    assert re.search(r"fig05 \[00:0\d\],? ?case 1 of 3", text)
+    assert lines(text)[-1] == "over"
+    assert lines(terminal(place, "600", code=STATUS)[1]) == ["over"]  # not for what is over at once
+
+
+def test_a_status_outside_a_terminal_is_silent(capsys):
+    with notices.status("fig05"):
+        notices.LOG.debug("case 1 of 3")
+    assert capsys.readouterr().err == ""
+
+
+def test_notices_are_shown_once_and_the_logger_is_left_as_it_was(capsys):
+    before = notices.LOG.level, list(notices.LOG.handlers)
+    with notices.shown(), notices.shown():
+        notices.LOG.info("one %s", "line")
+        notices.LOG.debug("a detail")
+    notices.LOG.info("unheard")
+    with notices.shown(False):
+        notices.LOG.info("unheard too")
+    assert capsys.readouterr().err == "evfem: one line\n"
+    assert (notices.LOG.level, notices.LOG.handlers) == before
+
+
+def test_compiling_is_told_once():
+    """A loop of the package says that it is compiled, one of others does not, without numba nobody."""
+    if find_spec("numba") is None:
+        return
+    from evfem import lanes
+
+    def ours(x):
+        return x + 1
+
+    def theirs(x):
+        return x - 1
+
+    ours.__module__, theirs.__module__ = "evfem.kernels", "elsewhere"
+    heard = []
+    handler = logging.Handler()
+    handler.emit = heard.append
+    from numba import njit
+
+    said, lanes.COMPILING.said = lanes.COMPILING.said, False
+    try:
+        with notices.listening(handler, logging.INFO):
+            njit(theirs)(1)
+            assert heard == []
+            njit(ours)(1)
+            njit(ours)(1.0)
+    finally:
+        lanes.COMPILING.said = said
+    assert [record.getMessage() for record in heard] == [
+        "compiling the element loops, once after an installation: up to a minute"
+    ]
+
+
+def test_shells_can_complete():
+    """What shtab reads: every path has its kind of completion, and the commands are there."""
+    commands = cli.parser()._subparsers._group_actions[0].choices
+    for name, command in commands.items():
+        for action in command._actions:
+            if "FILE" in str(action.metavar) or str(action.metavar).endswith(".toml"):
+                assert action.complete == cli.FILES, (name, action.metavar)
+            if action.metavar == "DIR":
+                assert action.complete == cli.FOLDERS, (name, action.metavar)
