@@ -248,7 +248,8 @@ def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_l
     assert {name: column[:7] for name, column in now.items()} == before
     assert run(place, "--resume")[0] == 0
     assert run(place, "--out", "whole", "--no-fields")[0] == 0
-    assert killing.difference(place / "stopped", place / "whole") == (0.0, True)
+    # the last digits may differ: PARDISO's depend on where its memory lies
+    assert killing.difference(place / "stopped", place / "whole")[0] < 1e-12
 
 
 def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
