@@ -86,7 +86,7 @@ def test_page_is_in_a_table_of_contents(page):
     for index in (DOCS / page).parent / "index.md", DOCS / "index.md":
         folder = index.parent
         trees = re.findall(r"```{toctree}\n(.*?)```", index.read_text(encoding="utf-8"), re.S)
-        names = [line for tree in trees for line in tree.splitlines()]
+        names = [re.sub(r".*<(.*)>", r"\1", line) for tree in trees for line in tree.splitlines()]
         if page.removesuffix(".md") in {(folder / name).relative_to(DOCS).as_posix() for name in names}:
             return
     raise AssertionError(f"{page} is in no table of contents")
