@@ -81,6 +81,11 @@ def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
     return tqdm(total=total, initial=done, unit=unit, disable=not wanted, ncols=_columns())
 
 
+def drawable() -> bool:
+    """Whether standard error is a place for a bar: a terminal or a notebook."""
+    return sys.stderr.isatty() or "ipykernel" in sys.modules
+
+
 def _columns() -> int | None:
     """None leaves the width to tqdm, which draws nothing in a terminal that says it is 0 columns wide."""
     try:

@@ -294,10 +294,10 @@ class _Progress:
 
     def __init__(self, total: int, answers: Mapping[str, Answer], shown: bool) -> None:
         self.total, self.shown = total, shown
-        terminal = sys.stderr.isatty()
-        self.lines = shown and not terminal
+        drawable = notices.drawable()
+        self.lines = shown and not drawable
         done = len(answers)
-        self.bar = notices.bar(total, "point", done, shown and terminal)
+        self.bar = notices.bar(total, "point", done, shown and drawable)
 
     def step(self, answers: Mapping[str, Answer]) -> None:
         """One more is finished."""

@@ -93,15 +93,16 @@ for (name, law), per_depth in zip(laws.items(), forces, strict=True):
 # ## Beside what was measured
 
 # %%
+labels = {"kaczmarek": "Kaczmarek", "strong_troxel": "Strong-Troxel"}
 colours = {"kaczmarek": "#0072B2", "strong_troxel": "#E69F00"}
 place = np.arange(len(people["participant"]))
 figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
 ax.plot(place, people["HVLD"], "D", color="#B04A85", label="measured")
 for (name, values), shift in zip(closed.items(), (-0.15, 0.15), strict=True):
     ax.plot(place + shift, values, "_", color=colours[name], markersize=12, markeredgewidth=2,
-            label=f"{name}, closed form")  # fmt: skip
+            label=f"{labels[name]}, closed form")  # fmt: skip
     ax.plot(place[chosen] + shift, computed[name], "o", color=colours[name], markersize=5,
-            label=f"{name}, finite elements")  # fmt: skip
+            label=f"{labels[name]}, finite elements")  # fmt: skip
 ax.set_xticks(place, people["participant"])
 ax.set(xlabel="participant", ylabel="electrostatic force (mN)", ylim=(0, None))
 figure.legend(loc="outside lower center", ncols=3, fontsize="small")

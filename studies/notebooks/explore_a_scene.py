@@ -55,19 +55,22 @@ def show(load=0.05, voltage=1000.0, friction=0.3, distance=1.0):
     plotting.deformed(result, "von_mises", ax=right)
     plt.show()
     plt.close(figure)
-    return result
+    runs.append(result)
 
+
+runs = []
+show()
 
 # %% [markdown]
 # ## Move the sliders
 #
-# With `ipywidgets` there are sliders; without it, change the numbers in the call.
+# With `ipywidgets` there are sliders; without it, change the numbers in the call `show()` above, as in
+# `show(voltage=2000.0)`.
 
 # %%
 try:
     from ipywidgets import FloatSlider, interactive
 except ModuleNotFoundError:
-    result = show(load=0.05, voltage=1000.0)
     controls = None
 else:
     controls = interactive(
@@ -77,16 +80,15 @@ else:
         friction=FloatSlider(0.3, min=0.05, max=1.0, step=0.05, continuous_update=False),
         distance=FloatSlider(1.0, min=0.2, max=3.0, step=0.2, continuous_update=False),
     )
-    controls.update()
-    result = controls.result
 controls
 
 # %% [markdown]
 # ## Read the numbers
 #
-# The result of the sliders' last run, as text and in numbers:
+# The last run, by the sliders or by the call. Run these two cells again after moving a slider.
 
 # %%
+result = runs[-1]
 result
 
 # %% [markdown]
