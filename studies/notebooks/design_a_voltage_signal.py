@@ -45,7 +45,7 @@ real.result
 
 # %%
 felt = apparent_friction(real.result)
-print(f"all of the contact slips from x = {real.full_slip:.2f} mm on; friction there {felt.friction[-1]:.4f}")
+print(f"full slip from x = {real.full_slip:.2f} mm on; friction at the end {felt.friction[-1]:.4f}")
 
 # %% [markdown]
 # ## 2. A voltage by closed form
@@ -82,7 +82,7 @@ for name, found in comparisons.items():
 # %%
 slides = np.array(real.result.motion) == "slide"
 x = real.result.position[slides]
-figure, (top, bottom) = plt.subplots(2, 1, sharex=True, figsize=(7, 5), layout="constrained")
+figure, (top, middle, bottom) = plt.subplots(3, 1, sharex=True, figsize=(7, 6.5), layout="constrained")
 top.plot(x, real.result.applied_tangential_force[slides], color="#555555", linewidth=4, label="real surface")
 for (name, run), colour, line in zip(
     {"closed form": by_closed_form, "exact": by_model}.items(),
@@ -91,8 +91,10 @@ for (name, run), colour, line in zip(
     strict=True,
 ):
     top.plot(x, run.result.applied_tangential_force[slides], line, color=colour, label=name)
-    bottom.plot(x, run.result.voltage[slides], line, color=colour, label=name)
+    middle.plot(x, 1e6 * comparisons[name].error, line, color=colour)
+    bottom.plot(x, run.result.voltage[slides], line, color=colour)
 top.set_ylabel("friction force (N/mm)")
+middle.set_ylabel("its error (µN/mm)")
 bottom.set(xlabel="position (mm)", ylabel="effective voltage (V)")
 top.legend()
 plt.show()
