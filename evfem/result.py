@@ -173,7 +173,8 @@ class Result:
         if not len(self.step):
             return []
         return [
-            (name.replace("_", " "), f"{getattr(self, name)[-1] + 0.0:.4g} {unit}") for name, unit in SHOWN.items()
+            (name.replace("_", " "), f"{getattr(self, name)[-1] + 0.0:.4g} {unit}")
+            for name, unit in SHOWN.items()
         ]
 
     def save(self, path: str | Path) -> None:
