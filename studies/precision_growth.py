@@ -65,15 +65,18 @@ class Clock:
 def measure_sizes(questions: Sequence[Sequence[int]]) -> list[dict[str, float]]:
     """Costs of the sizes; the memory is that of the largest so far."""
     warm_up()
-    return [asdict(_measured((around, tissue, skin))) for around, tissue, skin in questions]
+    return [
+        asdict(_measured((around, tissue, skin), ROUNDS if around <= SMALL else 1))
+        for around, tissue, skin in questions
+    ]
 
 
-def _measured(divisions: tuple[int, int, int]) -> Size:
-    """One size; small ones are repeated and the least of every step counts."""
+def _measured(divisions: tuple[int, int, int], rounds: int) -> Size:
+    """One size, run so many times; the least of every step counts."""
     from evfem.simulate import simulate
 
     imported, costs = resident_MB(), []
-    for _ in range(ROUNDS if divisions[0] <= SMALL else 1):
+    for _ in range(rounds):
         clock, begin = Clock(), time.process_time()
         result = simulate(scene(divisions), observers=[clock])
         costs.append(np.diff([begin, *clock.at]))
@@ -101,7 +104,7 @@ def scene(divisions: tuple[int, int, int]) -> Scene:
 def measured(quick: bool) -> list[Size]:
     """All sizes, each in its own process; the quick ones in this one, whose memory says little."""
     if quick:
-        return [Size(**one) for one in measure_sizes(QUICK)]
+        return [_measured(one, 1) for one in QUICK]
     return [Size(**answer("growth", [one])[0]) for one in SIZES]
 
 
@@ -115,7 +118,7 @@ def numbers(sizes: list[Size]) -> dict[str, float]:
         cost = np.array([getattr(one, name) for one in sizes])
         found[f"growth.exponent.{name}"] = exponent(nodes, cost)
         found[f"growth.exponent_of_the_finest_two.{name}"] = exponent(nodes[-2:], cost[-2:])
-    memory = np.array([one.peak_MB - one.imported_MB for one in sizes])
+    memory = np.array([max(one.peak_MB - one.imported_MB, 1.0) for one in sizes])
     found["growth.exponent.memory"] = exponent(nodes, memory)
     if nodes[0] <= 1e5 <= nodes[-1]:
         peak = np.interp(np.log(1e5), np.log(nodes), np.log([one.peak_MB for one in sizes]))

@@ -27,7 +27,6 @@ from .precision_models import Model, models
 from .precision_numbers import numbers, recommended, references, series
 from .precision_plan import Saving
 from .precision_runs import ROUNDS, Run, full, measure, quick, warm_up, without_fast
-from .precision_shares import measure_shares
 
 ASSUMPTIONS = {
     "problems": "A, B, C: half a finger between two ellipses, pressed 1.5 mm, slid 3 mm, pressed at 1000 V; "
@@ -75,7 +74,7 @@ def measured(only_quick: bool) -> Measured:
     warm_up()
     runs = [measure(case, 1 if only_quick else ROUNDS) for case in cases if case.fast]
     runs += without_fast([case for case in cases if not case.fast])
-    parts: dict[str, float] = measure_shares([0])[0] if only_quick else answer("shares", [2])[0]
+    parts: dict[str, float] = shares.measured(0) if only_quick else answer("shares", [2])[0]
     return Measured(
         runs,
         models(),
