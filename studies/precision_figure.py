@@ -131,7 +131,7 @@ def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
     ax.set(xlim=(0.0, 100.0), ylim=(-0.5, len(names) + 0.6))
     ax.invert_yaxis()
     ax.set_ylim(len(names) - 0.5, -1.5)
-    _titled(ax, f"where a step's time goes, {numbers['shares.nodes']:,.0f} nodes", "share of CPU time (%)")
+    _titled(ax, f"a step's time, {numbers['shares.nodes']:,.0f} nodes", "share of CPU time (%)")
     ax.legend(ncols=3, fontsize="x-small", frameon=False, loc="upper center")
     ax.tick_params(labelsize="small")
 
