@@ -28,15 +28,15 @@ FLOORS = {
     ),
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
-        "mesh quality meshcheck meshparts vturead mshread meshioread meshfile outline lattice section fingerpad "
-        "lanes kernels viscous assembly forms pad contactedge attraction contact condensed linear dynamics "
+        "mesh quality meshcheck meshparts vturead mshread meshioread meshfile outline lattice section "
+        "fingerpad lanes kernels viscous assembly forms pad contactedge attraction contact condensed linear dynamics "
         "body strategy state mixing pins interface linearisation findings newton "
         "condensedpad keptcontact padstep",
     ),
     "scenes": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl"},
-        "motion scene scenekeys scenefile result samples sweepfile resolution plan stepping model ledger resuming simulate rendering "
-        "training reduced",
+        "motion scene scenekeys scenefile result samples sweepfile resolution plan stepping "
+        "model ledger resuming simulate rendering training reduced",
     ),
     "edges": (
         {"numpy", "meshio", "matplotlib", "tqdm", "threadpoolctl", "distributed", "pyarrow"},

@@ -440,7 +440,5 @@ def test_the_strategy_goes_to_a_file_and_back():
     scene = loads(text.replace("[[motion]]", "[solver.strategy]\npatience = 3.0\neasy = 5\n[[motion]]", 1))
     assert scene.solver.strategy == Strategy(patience=3.0, easy=5)
     assert loads(dump(scene)).solver == scene.solver
-    with pytest.raises(
-        InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"
-    ):
+    with pytest.raises(InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"):
         loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))
