@@ -29,8 +29,8 @@ FLOORS = {
     "discretisation": (
         {"numpy", "scipy", "skfem", "meshio", "numba", "pypardiso"},
         "mesh quality meshcheck meshparts vturead mshread meshioread meshfile outline lattice section "
-        "fingerpad lanes kernels viscous assembly forms pad contactedge attraction contact condensed linear dynamics "
-        "body strategy state mixing pins interface linearisation findings newton "
+        "fingerpad lanes kernels viscous assembly forms pad contactedge attraction contact condensed "
+        "linear dynamics body strategy state mixing pins interface linearisation findings newton "
         "condensedpad keptcontact padstep",
     ),
     "scenes": (
