@@ -45,8 +45,8 @@ WORK: Mapping[str, tuple[tuple[str, str, tuple[str, ...]], ...]] = {
     ),
     "output": (("ledger", "Ledger", ("accept", "row")), ("simulate", "", ("frame_of",))),
 }
-#: ways through the run: which steps; everything slips from s = 2.6 mm on, and the last step keeps its fields
-PHASES = {"press": slice(0, 20), "stick_slip": slice(20, 44), "full_slip": slice(46, 49)}
+#: ways through the run: which steps; everything slips from s = 2.7 mm on, and the last step keeps its fields
+PHASES = {"press": slice(0, 20), "stick_slip": slice(20, 44), "full_slip": slice(47, 49)}
 
 
 class Parts(Clock):
