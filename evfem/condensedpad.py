@@ -30,6 +30,8 @@ from evfem.mesh import Floats, Ints
 SPACING = 8
 #: nodes kept beyond those that have touched, on either side, as a share of these
 MARGIN = 0.1
+#: how far the compliance is extrapolated, in intervals between stored equilibria
+BEYOND = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,12 +184,15 @@ def sums(force: Floats) -> Floats:
 
 
 def _hats(nodes: Floats, x: float) -> Floats:
-    """Weights of linear interpolation at x between growing nodes, constant beyond the ends."""
-    weight = np.zeros(nodes.size)
-    right = int(np.searchsorted(nodes, x))
-    if right == 0 or right == nodes.size:
-        weight[min(right, nodes.size - 1)] = 1.0
+    """Weights of linear interpolation at x between growing nodes; beyond the ends linear for `BEYOND` of the
+    last interval, then constant.
+    """
+    weight = np.ones(nodes.size)
+    if nodes.size == 1:
         return weight
+    weight[:] = 0.0
+    right = int(np.clip(np.searchsorted(nodes, x), 1, nodes.size - 1))
     share = (x - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
+    share = float(np.clip(share, -BEYOND, 1.0 + BEYOND))
     weight[right - 1], weight[right] = 1.0 - share, share
     return weight

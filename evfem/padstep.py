@@ -33,7 +33,7 @@ from evfem.contact import (
 )
 from evfem.interface import Interface
 from evfem.keptcontact import Factors, KeptProblem
-from evfem.mesh import Floats
+from evfem.mesh import Floats, Ints
 from evfem.state import SMALLEST_FORCE, Limits, Record, State, StepFailed, Target
 
 MAX_ITERATIONS = 20
@@ -43,6 +43,8 @@ FINEST = 1e-6
 FAR = 1.5
 #: the attraction's fall is kept while the squared voltage has changed by less than this share
 NEAR = 0.1
+#: so many times more nodes are in play than touch, and so many more
+SPARE, FEWEST = 1.2, 8
 #: an attraction whose feedback on its own node is weaker than this share is left to the next iteration
 WEAK = 1e-4
 #: under a prescribed force the bone moves at most this share of the pad's height in one iteration
@@ -73,6 +75,7 @@ class PadEquilibrium:
         self._weight = np.full(len(body.force), np.inf)
         self._factors = Factors()
         self._fall: tuple[float, Floats] = (np.nan, np.zeros(0))
+        self._play: Ints = np.zeros(0, dtype=np.int64)
         self._near: Floats = np.zeros((0, 0))
         self._mean: Floats = np.zeros((0, 0))
 
@@ -191,8 +194,8 @@ class PadEquilibrium:
 
     def _advance(self, old: State, state: State, pull: Floats, target: Target, frozen: bool) -> State:
         """Solve contact for the linear change of the positions, then move as the pad does."""
-        near = self.body.kept.near
         near_compliance, mean = self._compliance(state)
+        near = self.body.kept.near[self._play]
         fall, closing = np.zeros((2, self.pad.nodes.size))
         if self.attraction is not None and not frozen:
             position = self.interface.resting(state)
@@ -263,13 +266,20 @@ class PadEquilibrium:
         return fall
 
     def _compliance(self, state: State) -> tuple[Floats, Floats]:
-        """Compliance among the near nodes (2 k, 2 k), and from all kept nodes to them (2 k, 2 K)."""
+        """Compliance among the k nodes in play, near nodes that touch or may do so soon (2 k, 2 k), and from
+        all kept nodes to them (2 k, 2 K).
+        """
         weight = self.body.weights(self.contact_forces(state) + state.attraction)
-        if not np.abs(weight - self._weight).sum() < FAR:
-            k, size = self.body.kept.near.size, self.body.kept.size
-            mean = self.body.mean_compliance(weight).reshape(2, size, 2, size)[:, :k]
-            self._near = np.ascontiguousarray(mean[:, :, :, :k]).reshape(2 * k, 2 * k)
-            self._mean = np.ascontiguousarray(mean).reshape(2 * k, 2 * size)
-            self._weight = weight
-            self._fall = np.nan, np.zeros(0)
+        near = self.body.kept.near
+        gap = outline.frame(self.surface, self.positions(state.u)).gap[near]
+        needed = (state.status[near] != OPEN) | (gap < 0.0)
+        if np.abs(weight - self._weight).sum() < FAR and needed[self._play].sum() == needed.sum():
+            return self._near, self._mean
+        enough = min(int(SPARE * needed.sum()) + FEWEST, near.size) - 1
+        self._play = np.flatnonzero(needed | (gap <= np.partition(gap, enough)[enough]))
+        k, size = self._play.size, self.body.kept.size
+        mean = self.body.mean_compliance(weight).reshape(2, size, 2, size)[:, self._play]
+        self._near = np.ascontiguousarray(mean[:, :, :, self._play]).reshape(2 * k, 2 * k)
+        self._mean = mean.reshape(2 * k, 2 * size)
+        self._weight, self._fall = weight, (np.nan, np.zeros(0))
         return self._near, self._mean
