@@ -154,7 +154,8 @@ def _right(problem: ContactProblem, kinds: Ints) -> tuple[Floats, Floats]:
     if problem.pull is not None:
         grown[:k] = np.where(kinds[:k] == FULL, -problem.pull.closing, 0.0)
         right[:k] += np.where(kinds[:k] == PULLED, problem.pull.level, 0.0)
-        right[full] -= (problem.compliance @ grown)[full]
+        some = np.flatnonzero(grown)
+        right[full] -= (problem.compliance[:, some] @ grown[some])[full]
     if problem.border is not None:
         right = np.concatenate([right, problem.border.value - problem.border.row @ grown])
     return right, grown

@@ -38,7 +38,7 @@ from evfem.state import SMALLEST_FORCE, Limits, Record, State, StepFailed, Targe
 
 MAX_ITERATIONS = 20
 #: no step is solved to a smaller tolerance: what is remembered of the pad is off by more
-FINEST = 1e-6
+FINEST = 1e-5
 #: the mean compliance is kept while the weights have changed by less than this
 FAR = 1.5
 #: the attraction's fall is kept while the squared voltage has changed by less than this share

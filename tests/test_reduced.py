@@ -76,7 +76,7 @@ def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained)
             continue
         small = replace(old, u=old.u[nodes])
         got = solver.step(small, Target(new.bone, None, new.voltage))
-        assert np.abs(got.reaction - new.reaction).max() < 1e-5 * np.abs(new.reaction).max()
+        assert np.abs(got.reaction - new.reaction).max() < 3e-5 * np.abs(new.reaction).max()
         assert np.abs(got.contact_force - new.contact_force).max() < 1e-3 * new.contact_force.max()
         found += 1
     assert found >= 2
