@@ -294,7 +294,7 @@ def test_a_block_whose_end_nodes_belong_to_the_bone_keeps_them_there():
         motion=[ev.Press(indentation=0.1, steps=4), ev.Slide(0.4, steps=8)],
     )
     fast = ev.reduce(scene)
-    assert fast.memory.pad.moved[:, ends].any() == np.False_
+    assert np.abs(fast.memory.pad.moved[:, ends]).max() < 1e-12  # the bone's step is added up in parts
     result, full = fast.simulate(scene, checks=1), ev.simulate(scene)
     assert off(result, full, "tangential_force") < 2e-3
     assert np.allclose(sums(fast.memory.pad.force[0]), 0.0)
