@@ -39,7 +39,7 @@ from evfem.plan import largest_voltage, scene_mesh
 from evfem.result import Result, provenance
 from evfem.scene import Scene
 from evfem.signals import FollowForce
-from evfem.simulate import ADVICE, Request, Run, simulate
+from evfem.simulate import Request, Run, simulate
 from evfem.state import SMALLEST_FORCE, Limits, State, StepFailed, Target
 from evfem.stepping import Stepper
 from evfem.storage import load_arrays, save_arrays
@@ -55,6 +55,7 @@ PAD, KEPT = (
 )
 #: forces that are compared
 COMPARED = ("normal_force", "tangential_force", "electrostatic_force")
+ADVICE = "a fast model made from a scene with more load or friction may go further"
 
 
 def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE) -> FastModel:
@@ -113,6 +114,12 @@ class FastModel:
     _parts: tuple[Mesh, outline.Pad] | None = field(default=None, init=False, repr=False)
     _body: Body | None = field(default=None, init=False, repr=False)
 
+    def __repr__(self) -> str:
+        sums = np.abs(self.memory.pad.sums)
+        N, T = sums.max(axis=0)
+        name, count = self.provenance["scene"]["name"], len(sums)
+        return f"FastModel of {name!r}: {count} equilibria, to {N:.4g} N/mm of load and {T:.4g} N/mm of shear"
+
     def simulate(self, scene: Scene, *, tolerance: float = 0.01, checks: int = 3) -> Result:
         """Run `scene` fast, do `checks` of its steps again with the full model, and if these forces differ by
         more than `tolerance` (relative to the largest of the run) run all of it in full, with a warning.
@@ -162,7 +169,8 @@ class FastModel:
             identity, made = json.loads(str(arrays["identity"])), json.loads(str(arrays["provenance"]))
             memory = Memory(pad, arrays["whole"])
             check_shapes(memory)
-            if not (isinstance(identity, dict) and isinstance(made["mesh"]["digest"], str)):
+            known = isinstance(made["mesh"]["digest"], str) and isinstance(made["scene"]["name"], str)
+            if not (known and isinstance(identity, dict)):
                 raise ValueError("no identity")
         except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
             allowed = "a file written by FastModel.save"

@@ -2,6 +2,7 @@
 what it cannot do.
 """
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -118,6 +119,17 @@ def test_far_nodes_hand_their_forces_to_knots_and_keep_sum_and_work(trained):
     gathered = kept.gather(force)
     assert np.allclose(gathered.reshape(2, -1).sum(axis=1)[::-1], force.sum(axis=0))
     assert np.isclose(gathered @ moved, np.sum(force * kept.spread(moved)))
+
+
+def test_it_says_in_one_line_what_it_was_made_for(trained):
+    run, _, fast = trained
+    N, T = run.rows[4]["applied_force"], max(row["tangential_force"] for row in run.rows)
+    shown = repr(fast)
+    assert shown.startswith(f"FastModel of 'scene': {len(fast.memory.pad.force)} equilibria, to ")
+    load, shear = (float(text) for text in re.findall(r"([\d.]+) N/mm", shown))
+    assert load >= N
+    assert shear == pytest.approx(T, rel=1e-3)
+    assert len(shown) < 120
 
 
 # -- against the full model
@@ -253,6 +265,10 @@ def test_damaged_and_foreign_files_are_refused(trained, tmp_path):
         save_arrays(path, arrays | {name: value})
         with pytest.raises(ev.InputError, match="damaged"):
             FastModel.load(path)
+    made = str(arrays["provenance"]).replace('"name": "scene"', '"name": 7')
+    save_arrays(path, arrays | {"provenance": np.array(made)})
+    with pytest.raises(ev.InputError, match="damaged"):
+        FastModel.load(path)
 
 
 # -- the kept contact problem
