@@ -1,4 +1,4 @@
-"""Anderson's mixing: linear contractions of few dimensions end exactly, and what else a state carries follows."""
+"""Anderson's mixing: linear contractions end after few steps, and what else a state carries follows."""
 
 from dataclasses import replace
 
