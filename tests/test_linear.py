@@ -2,13 +2,15 @@
 
 import importlib.util
 from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
 
 import numpy as np
 import pytest
 from grids import rectangle
 
 from evfem.body import Body
-from evfem.linear import Pardiso, Pattern, Singular, SuperLU, make_condensation
+from evfem.linear import Pardiso, Pattern, Singular, SuperLU, make_condensation, mkl_library
 from evfem.materials import NeoHookean
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
@@ -211,3 +213,34 @@ def test_fastest_back_end_is_chosen():
     problem = random_problem()
     pattern = Pattern(problem.unknowns, problem.size)
     assert type(make_condensation(pattern, KEPT)) is BACK_ENDS[0]
+
+
+def test_the_library_is_the_first_runtime_that_is_there(monkeypatch, tmp_path):
+    """Of the files that a package lists: no import library, nothing that is not on the disk."""
+    listed = ["mkl/mkl_rt.h.txt", "lib/libmkl_core.so.2", "lib/mkl_rt.lib", "lib/mkl_rt.2.lib"]
+    listed += ["lib/libmkl_rt.so.9", "lib/libmkl_rt.so.2", "lib/libmkl_rt.so"]
+    for name in listed[1:4] + listed[5:]:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    files = [metadata.PackagePath(name) for name in listed]
+    for file in files:
+        file.dist = metadata.PathDistribution(tmp_path / "mkl-1.0.dist-info")
+    monkeypatch.setattr(metadata, "files", lambda package: {"mkl": files}[package])
+    assert mkl_library() == str(tmp_path / "lib/libmkl_rt.so.2")
+    monkeypatch.setattr(metadata, "files", lambda package: None)  # installed without a list of files
+    assert mkl_library() is None
+
+
+def test_no_library_without_its_package(monkeypatch):
+    def missing(package):
+        raise metadata.PackageNotFoundError(package)
+
+    monkeypatch.setattr(metadata, "files", missing)
+    assert mkl_library() is None
+
+
+def test_the_library_of_this_installation_is_found_where_its_package_is():
+    installed = any(True for _ in metadata.distributions(name="mkl"))
+    place = mkl_library()
+    assert (place is not None) == installed
+    assert place is None or Path(place).is_file()
