@@ -1,4 +1,4 @@
-"""A small made-up result for tests of files and pictures: a square of four cells that is pressed and slid."""
+"""A square of four cells that is pressed and slid: its mesh, a scene file, and a small made-up result."""
 
 import numpy as np
 
@@ -6,6 +6,23 @@ from evfem.mesh import Mesh
 from evfem.result import COLUMNS, Frame, Result
 
 KINDS = ("quad", "quad9", "triangle", "triangle6")
+#: a scene file but for its motion, beside `square_mesh` in square.vtu
+SQUARE_SCENE = """
+version = 1
+[finger]
+mesh = "square.vtu"
+[finger.materials.soft]
+law = "neo_hookean"
+E = 0.05
+nu = 0.4
+[finger.materials.hard]
+law = "neo_hookean"
+E = 0.1
+nu = 0.3
+[surface]
+kind = "flat"
+friction = 0.2
+"""
 
 
 def square_mesh(kind="quad"):

@@ -12,27 +12,13 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from fakes import square_mesh
+from fakes import SQUARE_SCENE, square_mesh
 
 import evfem
 from evfem import cli, meshfile
 from evfem.result import COLUMNS
 
-SCENE = """
-version = 1
-[finger]
-mesh = "square.vtu"
-[finger.materials.soft]
-law = "neo_hookean"
-E = 0.05
-nu = 0.4
-[finger.materials.hard]
-law = "neo_hookean"
-E = 0.1
-nu = 0.3
-[surface]
-kind = "flat"
-friction = 0.2
+SCENE = f"""{SQUARE_SCENE}
 [output]
 every = 2
 [[motion]]

@@ -13,25 +13,11 @@ from importlib.util import find_spec
 from subprocess import Popen
 
 import pytest
-from fakes import square_mesh
+from fakes import SQUARE_SCENE, square_mesh
 
 from evfem import cli, meshfile, notices
 
-SCENE = """
-version = 1
-[finger]
-mesh = "square.vtu"
-[finger.materials.soft]
-law = "neo_hookean"
-E = 0.05
-nu = 0.4
-[finger.materials.hard]
-law = "neo_hookean"
-E = 0.1
-nu = 0.3
-[surface]
-kind = "flat"
-friction = 0.2
+SCENE = f"""{SQUARE_SCENE}
 [[motion]]
 kind = "press"
 indentation = 0.2
