@@ -1,5 +1,6 @@
-"""What the peers share that run in an interpreter without evfem: the problem's file, contact at a node, the
-measured run. Only numpy and the standard library; imported as a plain module by the scripts beside it.
+"""What the peers share that run in an interpreter without evfem: the problem's file, contact at a node,
+Newton's iterations, the measured run. Only numpy and the standard library; imported as a plain module by the
+scripts beside it.
 """
 
 from __future__ import annotations
@@ -106,6 +107,32 @@ class PenaltyContact:
     def forces(self) -> tuple[float, float]:
         """Normal and tangential force in N/mm."""
         return float(self.pressed.sum()), float(self.dragged.sum())
+
+
+def newton(
+    residual: Callable[[], float], correct: Callable[[bool], None], contact: PenaltyContact, tolerance: float
+) -> int:
+    """Correct, the first time with True, until the residual is small and no node turns round; then the state
+    of friction is kept. The number of iterations; raises RuntimeError after `MOST_ITERATIONS`.
+    """
+    for iteration in range(1, MOST_ITERATIONS + 1):
+        correct(iteration == 1)
+        error = residual()
+        if error <= tolerance and not contact.turning.any():
+            contact.keep()
+            return iteration
+    raise RuntimeError(f"no equilibrium after {MOST_ITERATIONS} iterations, residual {error:.1e}")
+
+
+def followed(peer: Any) -> dict[str, Any]:
+    """Forces after every step of the problem's path (N/mm), and the iterations they took, each with a
+    factorisation.
+    """
+    history, iterations = [], 0
+    for place in peer.problem.path:
+        iterations += peer.move(*place)
+        history.append(peer.forces)
+    return {"history": history, "iterations": iterations, "factorisations": iterations}
 
 
 def resident_MB() -> float:

@@ -16,7 +16,7 @@ import ufl
 from dolfinx import fem
 from dolfinx.fem import petsc
 from mpi4py import MPI
-from peers_apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact, Problem, cpu_seconds, main
+from peers_apart import PENALTY, SMALLEST_FORCE, PenaltyContact, Problem, cpu_seconds, followed, main, newton
 from petsc4py import PETSc
 
 COMPILER = {"cffi_extra_compile_args": ["-O3", "-march=native", "-g0"]}
@@ -137,13 +137,7 @@ class Peer:
         """Move the bone and find the equilibrium; the number of iterations."""
         self.moved.value[:] = position, -indentation
         self.assemble_residual()
-        for iteration in range(1, MOST_ITERATIONS + 1):
-            self.correct(first=iteration == 1)
-            error = self.assemble_residual()
-            if error <= self.problem.tolerance and not self.contact.turning.any():
-                self.contact.keep()
-                return iteration
-        raise RuntimeError(f"no equilibrium after {MOST_ITERATIONS} iterations, residual {error:.1e}")
+        return newton(self.assemble_residual, self.correct, self.contact, self.problem.tolerance)
 
     @property
     def forces(self) -> list[float]:
@@ -181,12 +175,7 @@ def pad_facets(mesh: Any, problem: Problem) -> Any:
 def solve(problem: Problem) -> dict[str, Any]:
     """Forces after every step (N/mm), the iterations they took, CPU seconds spent on getting the forms."""
     peer = Peer(problem)
-    history, iterations = [], 0
-    for place in problem.path:
-        iterations += peer.move(*place)
-        history.append(peer.forces)
-    counts = {"iterations": iterations, "factorisations": iterations}
-    return {"history": history, "form_cpu_s": peer.form_cpu_s} | counts
+    return followed(peer) | {"form_cpu_s": peer.form_cpu_s}
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from typing import Any
 
 import getfem as gf
 import numpy as np
-from peers_apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact, Problem, main
+from peers_apart import PENALTY, SMALLEST_FORCE, PenaltyContact, Problem, followed, main, newton
 
 BONE, PAD, FIRST_MATERIAL = 1, 2, 10
 #: GetFEM's order of an element's nodes: row by row
@@ -122,19 +122,15 @@ class Peer:
         bone = max(abs(normal - pull), abs(tangential), SMALLEST_FORCE)
         return float(np.abs(residual).max() / bone)
 
+    def correct(self, first: bool) -> None:
+        """A full step of Newton's method; GetFEM moves the bone with whichever comes first."""
+        self.model.solve("max_iter", 1, "max_res", 1e-300, "lsearch", "simplest", "alpha max ratio", 1e300)
+
     def move(self, position: float, indentation: float) -> int:
-        """Move the bone and find the equilibrium by full Newton steps; the number of iterations."""
+        """Move the bone and find the equilibrium; the number of iterations."""
         self.model.set_variable("moved", [position, -indentation])
         self.update_friction()
-        for iteration in range(1, MOST_ITERATIONS + 1):
-            self.model.solve(
-                "max_iter", 1, "max_res", 1e-300, "lsearch", "simplest", "alpha max ratio", 1e300
-            )
-            error = self.residual()
-            if error <= self.problem.tolerance and not self.contact.turning.any():
-                self.contact.keep()
-                return iteration
-        raise RuntimeError(f"no equilibrium after {MOST_ITERATIONS} iterations, residual {error:.1e}")
+        return newton(self.residual, self.correct, self.contact, self.problem.tolerance)
 
     @property
     def forces(self) -> list[float]:
@@ -147,12 +143,7 @@ class Peer:
 
 def solve(problem: Problem) -> dict[str, Any]:
     """Forces after every step (N/mm), and the iterations they took."""
-    peer = Peer(problem)
-    history, iterations = [], 0
-    for place in problem.path:
-        iterations += peer.move(*place)
-        history.append(peer.forces)
-    return {"history": history, "iterations": iterations, "factorisations": iterations}
+    return followed(Peer(problem))
 
 
 if __name__ == "__main__":

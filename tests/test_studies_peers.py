@@ -166,6 +166,22 @@ def test_penalty_contact_by_hand():
     assert not contact.turning.any()
 
 
+def test_iterations_go_on_until_the_residual_is_small_and_no_node_turns():
+    contact, moved = apart.PenaltyContact(np.zeros(1), 0.0, 0.3), []
+    contact.relaxed = np.array([2.0])
+    residuals, turning = iter([1e-2, 1e-9, 1e-9]), iter([[False], [True], [False]])
+
+    def residual():
+        contact.turning = np.array(next(turning))
+        return next(residuals)
+
+    assert apart.newton(residual, moved.append, contact, 1e-8) == 3
+    assert moved == [True, False, False]  # the first one moves the bone
+    assert contact.reference == 2.0  # kept
+    with pytest.raises(RuntimeError, match=r"no equilibrium after 40 iterations, residual 1.0e\+00"):
+        apart.newton(lambda: 1.0, moved.append, contact, 1e-8)
+
+
 def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
     def run_once(package, element, scene, level, compiled):
         if element == "q2":
