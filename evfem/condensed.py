@@ -48,7 +48,7 @@ class Candidates:
     closing: Floats
     rise: Floats
 
-    @property
+    @cached_property
     def axes(self) -> Floats:
         """Rows n and t of every node, (c, 2, 2)."""
         cos, sin = 1.0 / self.frame.stretch, self.frame.slope / self.frame.stretch
@@ -277,5 +277,7 @@ def _inverse(matrix: Floats, symmetric: bool) -> Floats:
 def _local(axes: Floats, columns: Floats) -> Floats:
     """Columns (2 k, m) of interleaved laboratory components as (all normal, all tangential) components."""
     x, y = columns[0::2], columns[1::2]
+    if not axes[:, 0, 0].any():
+        return np.concatenate([y, x])
     normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
     return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])
