@@ -1,5 +1,7 @@
 """Warnings of a surface that the pad's nodes cannot feel."""
 
+import re
+
 import numpy as np
 import pytest
 from builders import block, finger
@@ -23,7 +25,7 @@ def test_grooves_between_the_nodes_are_warned_of():
     found = plan(scene(GROOVES))
     assert "sharper than the node spacing of the pad (0.25 mm)" in found.warning
     assert "up to 0.05 of its 0.05 mm" in found.warning
-    assert str(found).endswith(f"Warning: {found.warning}")
+    assert " ".join(str(found).split()).endswith(f"Warning: {found.warning}")
     with pytest.warns(UserWarning, match="sharper than the node spacing"):
         simulate(scene(GROOVES))
 
@@ -38,6 +40,25 @@ def test_finer_nodes_feel_what_coarse_ones_cannot():
     # between two nodes half a wave length apart lies all of it, an eighth apart next to nothing
     assert plan(scene(wave, cells=6)).warning is not None
     assert plan(scene(wave, cells=48)).warning is None
+
+
+def test_the_noise_of_a_scan_is_warned_of_though_its_height_is_small():
+    x = np.arange(-5.0, 5.001, 0.01)
+    noise = np.random.default_rng(2).normal(size=x.size)
+    wave = 0.008 * np.sin(2.0 * np.pi * x / 2.5)
+    # what lies between two nodes is 5 % of the height, but most of the slope
+    assert "is finer than that, as noise is" in plan(scene(Profile(x, wave + 2e-4 * noise), cells=64)).warning
+    assert plan(scene(Profile(x, wave), cells=64)).warning is None
+
+
+def test_how_much_of_the_slope_is_too_fine():
+    long, short = 2.0 * np.pi / 4.0, 2.0 * np.pi * 3.0  # whole waves along the pad
+    fine = Sinusoid(terms=[[0.05, long, 0.0], [3e-3, short, 0.0]], friction=0.0)
+    found = plan(scene(fine, cells=6)).warning
+    assert "(0.33 mm)" in found
+    # a wave as long as the spacing has no slope from node to node; the squares of the slopes add up
+    share = 3e-3 * short / np.hypot(3e-3 * short, 0.05 * long)
+    assert float(re.search(r"(\d+)%", found)[1]) == pytest.approx(100.0 * share, abs=1.0)
 
 
 def test_the_command_says_it_in_one_line(tmp_path, capsys, monkeypatch):
