@@ -63,48 +63,48 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
-    scene = _Parser(add_help=False)
-    file = scene.add_argument(
+    for name, does, options, function in (
+        ("run", "run a scene and write history, fields, summary and picture", _run_options, _run),
+        ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument, _plan),
+        ("study", "run studies and write their numbers, series and pictures", _study_options, _study),
+        ("sweep", "run many scenes side by side and write one table of all", _sweep_options, _sweep),
+        ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options, _mesh),
+        ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options, _signal),
+    ):
+        command = commands.add_parser(name, help=does)
+        options(command)
+        command.set_defaults(function=function)
+    return top
+
+
+def _scene_argument(command: argparse.ArgumentParser) -> None:
+    file = command.add_argument(
         "scene", nargs="?", type=Path, metavar="SCENE.toml", help="default: the built-in scene"
     )
     _complete(file, FILES)
 
-    run = commands.add_parser(
-        "run", parents=[scene], help="run a scene and write history, fields, summary and picture"
-    )
+
+def _run_options(run: argparse.ArgumentParser) -> None:
+    _scene_argument(run)
     _results(run)
     run.add_argument("--resume", action="store_true", help="go on with the interrupted run in the folder")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
-    run.set_defaults(function=_run)
 
-    plan = commands.add_parser(
-        "plan", parents=[scene], help="print terms, unknowns and solver of a scene; compute nothing"
-    )
-    plan.set_defaults(function=_plan)
 
-    study = commands.add_parser("study", help="run studies and write their numbers, series and pictures")
+def _study_options(study: argparse.ArgumentParser) -> None:
     study.add_argument("names", nargs="+", metavar="NAME", help=_study_names())
     out = study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
     _complete(out, FOLDERS)
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
-    study.set_defaults(function=_study)
 
-    sweep = commands.add_parser("sweep", help="run many scenes side by side and write one table of all")
-    _sweep_options(sweep)
-    sweep.set_defaults(function=_sweep)
 
-    mesh = commands.add_parser("mesh", parents=[scene], help="write the finger's mesh as .vtu or .msh")
+def _mesh_options(mesh: argparse.ArgumentParser) -> None:
+    _scene_argument(mesh)
     target = mesh.add_argument(
         "--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh"
     )
     _complete(target, FILES)
-    mesh.set_defaults(function=_mesh)
-
-    voltage = commands.add_parser("signal", help="write a voltage signal as .wav, .png, .hjif or .csv")
-    _signal_options(voltage)
-    voltage.set_defaults(function=_signal)
-    return top
 
 
 def _results(command: argparse.ArgumentParser) -> None:
@@ -199,7 +199,14 @@ def _status(given: argparse.Namespace) -> int:
         return _say("interrupted", INTERRUPTED)
 
 
-def _warn(message: Warning | str, *_: object, **__: object) -> None:
+def _warn(
+    message: Warning | str,
+    category: object,
+    filename: str,
+    lineno: int,
+    file: object = None,
+    line: object = None,
+) -> None:
     """One line for a person, without the place in the code."""
     notices.tell(f"warning: {message}")
 
@@ -269,9 +276,7 @@ class _Milestones:
         self.total = total_steps
 
     def step(self, row: dict[str, object], frame: object, checkpoint: object) -> None:
-        step = int(str(row["step"]))
-        if step * 10 // self.total > (step - 1) * 10 // self.total:
-            print(f"step {step} of {self.total}", file=sys.stderr, flush=True)
+        notices.milestone("step", int(str(row["step"])), self.total)
 
 
 def _plan(given: argparse.Namespace) -> int:
@@ -280,14 +285,8 @@ def _plan(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
     with notices.status("building the mesh"):
         needed = str(plan(scene))
-    print("\n".join(_fitted(line) for line in needed.split("\n")), flush=True)
+    print(needed, flush=True)
     return DONE
-
-
-def _fitted(line: str) -> str:
-    """A line of a plan in a terminal's width; what goes over stands below the reason, not the name."""
-    named = re.match(r"  [+-] .{14}|\s*", line)
-    return notices.wrapped(line, sys.stdout, " " * (named.end() if named else 0))
 
 
 def _study(given: argparse.Namespace) -> int:

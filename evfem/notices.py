@@ -21,7 +21,7 @@ LOG = logging.getLogger("evfem")
 PATIENCE, EVERY = 1.0, 0.5
 
 
-def wrapped(text: str, stream: TextIO, indent: str = "  ") -> str:
+def wrapped(text: str, stream: TextIO) -> str:
     """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
 
     >>> import io
@@ -32,7 +32,7 @@ def wrapped(text: str, stream: TextIO, indent: str = "  ") -> str:
         return text
     columns = max(shutil.get_terminal_size().columns, 40)
     return textwrap.fill(
-        text, columns - 1, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+        text, columns - 1, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
 
 
@@ -79,6 +79,12 @@ def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
     from tqdm.auto import tqdm
 
     return tqdm(total=total, initial=done, unit=unit, disable=not wanted, ncols=_columns())
+
+
+def milestone(unit: str, done: int, total: int) -> None:
+    """A line for every tenth of the work, where a bar has no place."""
+    if done * 10 // total > (done - 1) * 10 // total:
+        print(f"{unit} {done} of {total}", file=sys.stderr, flush=True)
 
 
 def drawable() -> bool:

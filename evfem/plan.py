@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
@@ -21,6 +22,8 @@ from evfem.signals import FollowForce, VoltageProfile
 
 #: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
 RIGID_BELOW = 1e-4
+#: columns of a printed plan, at most
+WIDTH = 79
 
 
 @dataclass(frozen=True)
@@ -57,16 +60,25 @@ class Plan:
             "",
             "Terms",
         ]
-        lines += [f"  {'+' if t.needed else '-'} {t.name:<13} {t.reason}" for t in self.terms]
+        for term in self.terms:
+            lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<13} ", term.reason)
         lines += [
             "",
             "Unknowns",
             f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
         ]
-        lines += ["", "Solver"] + [f"  {line}" for line in self.solver]
+        lines += ["", "Solver"]
+        for line in self.solver:
+            lines += _wrapped("  ", line)
         if self.warning is not None:
-            lines += ["", f"Warning: {self.warning}"]
+            lines += ["", *_wrapped("Warning: ", self.warning)]
         return "\n".join(lines)
+
+
+def _wrapped(begin: str, text: str) -> list[str]:
+    """A text behind its beginning, as lines that fit a terminal."""
+    indent = " " * max(len(begin), 4)
+    return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
 
 
 def plan(scene: Scene) -> Plan:
@@ -230,7 +242,8 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]
     if unsymmetric:
         lines.append(
-            f"{' and '.join(unsymmetric)} act on the candidates only, so the tissue's matrix stays symmetric"
+            f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
+            "so the tissue's matrix stays symmetric"
         )
     return (
         *lines,

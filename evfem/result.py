@@ -150,8 +150,9 @@ class Result:
 
     def __repr__(self) -> str:
         """How far the run came, where it ended and with what forces."""
-        ends = ["; ".join(f"{key} {text}" for key, text in rows) for rows in (self._last[:3], self._last[3:])]
-        return "\n  ".join([f"Result of {self._title}", *(line for line in ends if line)])
+        last = self._last
+        lines = ["; ".join(f"{key} {text}" for key, text in row) for row in (last[:3], last[3:5], last[5:])]
+        return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
         """For notebooks: the end, and normal (blue) and tangential force (orange) over the steps."""

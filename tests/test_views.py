@@ -69,8 +69,8 @@ def test_a_result_shows_how_far_it_came_and_its_end():
     assert repr(result).splitlines() == [
         "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes",
         "  position 0.2 mm; indentation 1.286 mm; voltage 1.429 V",
-        "  normal force 1.857 N/mm; tangential force 2 N/mm; electrostatic force 2.143 N/mm; "
-        "contact width 2.429 mm",
+        "  normal force 1.857 N/mm; tangential force 2 N/mm",
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
     ]
     caption, found, curves = rows(result._repr_html_())
     assert caption == "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes"
