@@ -39,6 +39,7 @@ from evfem.scenekeys import (
     shown,
     unknown,
 )
+from evfem.signalfile import read_signal
 from evfem.signals import FollowForce, VoltageProfile
 from evfem.strategy import Strategy
 from evfem.surfaces import Display, Flat, Profile, Sinusoid
@@ -199,8 +200,9 @@ def _law_and_voltage(table: Any, motion: list[Motion], folder: Path) -> tuple[An
     if table.voltage_file is not None:
         path = folder / table.voltage_file
         _check_size("electrostatics.voltage_file", path, LARGEST_TABLE)
-        with at("electrostatics.voltage_file", voltage_file="electrostatics.voltage_file"):
-            return law, VoltageProfile.from_csv(path)
+        key = "electrostatics.voltage_file"
+        with at(key, voltage_file=key, path=key):
+            return law, read_signal(path)
     if table.voltage_profile is not None:
         with at("electrostatics.voltage_profile"):
             return law, VoltageProfile(*_columns("electrostatics.voltage_profile", table.voltage_profile))

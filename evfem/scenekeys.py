@@ -102,7 +102,7 @@ class ElectrostaticsTable(Table):
 
     law: Literal["strong_troxel", "kaczmarek"] = _required("strong_troxel | kaczmarek")
     voltage: float | None = _optional("a voltage in V")
-    voltage_file: str | None = _optional("the path of a csv file with the header position,voltage")
+    voltage_file: str | None = _optional("the path of a csv file (header: position,voltage) or of a .wav")
     voltage_profile: list[list[float]] | None = _optional("rows [[position, voltage], ...] in mm and V")
     insulator_thickness: float = _required("a thickness in mm, not negative")
     insulator_eps_r: float = _required("a relative permittivity, at least 1")

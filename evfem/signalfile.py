@@ -19,10 +19,10 @@ import numpy as np
 
 from evfem import hjif
 from evfem.checks import count, put, real
-from evfem.errors import InputError
+from evfem.errors import InputError, readable
 from evfem.signals import VoltageProfile, carrier_amplitude
 from evfem.storage import replacing, write_text
-from evfem.tables import Floats
+from evfem.tables import MOST_ROWS, Floats
 
 WAV_FORM, MAP_FORM = "evfem-voltage-1", "evfem-friction-map-1"
 WAV_KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
@@ -103,6 +103,8 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     >>> float(abs(back(back.position) - slope(back.position)).max()) < 0.5 * 2000.0 / 32767
     True
     """
+    if not isinstance(profile, VoltageProfile):
+        raise InputError("profile", profile, "a VoltageProfile")
     ending = Path(path).suffix.lower()
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
@@ -124,18 +126,19 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
 
 
 def read_signal(path: str | Path) -> VoltageProfile:
-    """The voltage over the position in a `.csv`, or in a `.wav` that `write_signal` wrote, for `Scene`.
+    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for `Scene`.
 
     A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the samples, linear
-    in between, so that a jump takes speed / rate mm. Raises InputError for another ending, a missing, cut
-    off or foreign file, and a WAV with a carrier, whose samples are not the effective voltage.
+    in between, so that a jump takes speed / rate mm. A file with another ending is taken for csv. Raises
+    InputError for `.png` and `.hjif`, a missing, cut off or foreign file, more than 1,000,000 rows, and a
+    WAV with a carrier, whose samples are not the effective voltage.
     """
     ending = Path(path).suffix.lower()
-    if ending == ".csv":
-        return VoltageProfile.from_csv(path)
     if ending == ".wav":
         return _from_wav(Path(path))
-    raise InputError("path", str(path), "a file called .csv or .wav: others do not keep the whole signal")
+    if ending in (".png", ".hjif"):
+        raise InputError("path", str(path), "a csv file or .wav: others do not keep the whole signal")
+    return VoltageProfile.from_csv(path)
 
 
 def _check_fit(profile: VoltageProfile, playback: Playback) -> None:
@@ -234,14 +237,20 @@ def _from_wav(path: Path) -> VoltageProfile:
     if scale["carrier_Hz"] is not None:
         given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
         raise InputError("path", given, "a WAV without a carrier: its samples are the voltage itself")
-    full_scale = _positive(f"{path}: full_scale_V", scale["full_scale_V"], "a voltage in V")
-    speed = _positive(f"{path}: speed_mm_per_s", scale["speed_mm_per_s"], "a speed in mm/s")
-    start = real(f"{path}: start_mm", scale["start_mm"], "a position in mm")
+    if samples.size > MOST_ROWS:  # before they take four times the memory
+        raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
+    try:
+        full_scale = _positive("full_scale_V", scale["full_scale_V"], "a voltage in V")
+        speed = _positive("speed_mm_per_s", scale["speed_mm_per_s"], "a speed in mm/s")
+        start = real("start_mm", scale["start_mm"], "a position in mm")
+    except InputError as error:
+        given = f"{path}, whose {error.key} is {readable(error.given)}"
+        raise InputError("path", given, error.allowed) from None
     position = _positions(samples.size, start, speed / rate)
     return VoltageProfile(position, samples / LARGEST_SAMPLE * full_scale)
 
 
-def _decoded(data: bytes) -> tuple[int, dict[str, Any], Floats]:
+def _decoded(data: bytes) -> tuple[int, dict[str, Any], Any]:
     """Rate, what the comment says, and samples; an error of Python's own for anything unexpected."""
     ((name, body),) = _parts(data)
     if name != b"RIFF" or body[:4] != b"WAVE":
@@ -253,7 +262,7 @@ def _decoded(data: bytes) -> tuple[int, dict[str, Any], Floats]:
     scale = json.loads(dict(_parts(parts[b"LIST"][4:]))[b"ICMT"].rstrip(b"\0"))
     if scale["format"] != WAV_FORM or not set(scale) >= WAV_KEYS:
         raise ValueError("another comment")
-    samples = np.frombuffer(parts[b"data"], dtype="<i2").astype(float)
+    samples = np.frombuffer(parts[b"data"], dtype="<i2")
     if samples.size == 0:
         raise ValueError("no samples")
     return rate, scale, samples

@@ -32,6 +32,8 @@ from evfem import cli, meshfile, scenefile
 from evfem.errors import InputError
 from evfem.mesh import Mesh
 from evfem.result import load
+from evfem.signalfile import Playback, write_signal
+from evfem.signals import VoltageProfile
 from evfem.simulate import simulate
 from evfem.storage import save_arrays
 
@@ -136,6 +138,14 @@ def _voltage(folder: Path, rng: Random) -> list[str]:
     return _run(folder, FLAT, VOLTAGE.format(voltage='voltage_file = "signal.csv"'))
 
 
+def _voltage_wav(folder: Path, rng: Random) -> list[str]:
+    meshfile.write(square(), folder / "square.vtu")
+    profile = VoltageProfile([0.0, 0.5, 1.0], [0.0, 100.0, 50.0])
+    write_signal(folder / "signal.wav", profile, Playback(full_scale=100.0, speed=20.0, rate=400))
+    (folder / "signal.wav").write_bytes(mutated((folder / "signal.wav").read_bytes(), rng))
+    return _run(folder, FLAT, VOLTAGE.format(voltage='voltage_file = "signal.wav"'))
+
+
 def _plain_vtu(mesh: Mesh) -> str:
     """The mesh as a .vtu file in which every number can be read."""
 
@@ -216,6 +226,7 @@ FORMATS: Mapping[str, Callable[[Path, Random], list[str]]] = {
     "scene": _scene,
     "profile": _profile,
     "voltage": _voltage,
+    "voltage_wav": _voltage_wav,
     "mesh_vtu": _mesh("vtu"),
     "mesh_msh": _mesh("msh"),
     "result": _result,

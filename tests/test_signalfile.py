@@ -14,12 +14,13 @@ from hypothesis import strategies as st
 from PIL import Image
 from scipy.io import wavfile
 
-from evfem import cli
+from evfem import cli, signalfile
 from evfem.electrostatics import Kaczmarek
 from evfem.errors import InputError, StorageError
 from evfem.fingerpad import FingerPad
 from evfem.motion import Press
 from evfem.scene import Scene
+from evfem.scenefile import dump, loads
 from evfem.signalfile import Playback, read_signal, write_signal
 from evfem.signals import VoltageProfile
 from evfem.surfaces import Display
@@ -301,6 +302,28 @@ def test_a_hostile_wav_is_refused_with_a_sentence(tmp_path, name):
     assert len(str(refused.value)) < 400
 
 
+def test_a_wav_of_more_samples_than_a_signal_has_rows_is_refused_before_it_is_converted(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(signalfile, "MOST_ROWS", 1)
+    (tmp_path / "x.wav").write_bytes(changed())
+    with pytest.raises(InputError, match="with 2 samples; allowed: at most 1 of them"):
+        read_signal(tmp_path / "x.wav")
+
+
+def test_numbers_in_the_comment_are_named(tmp_path):
+    (tmp_path / "x.wav").write_bytes(changed(speed_mm_per_s=-2.0))
+    with pytest.raises(
+        InputError, match=r"^path: given .*x\.wav, whose speed_mm_per_s is -2\.0; allowed: a speed"
+    ):
+        read_signal(tmp_path / "x.wav")
+
+
+def test_only_signals_are_written(tmp_path):
+    with pytest.raises(InputError, match="a VoltageProfile"):
+        write_signal(tmp_path / "x.csv", [0.0, 1.0])
+
+
 def test_the_wav_made_by_hand_is_fine_without_its_flaw(tmp_path):
     path = tmp_path / "x.wav"
     path.write_bytes(changed())
@@ -347,3 +370,43 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
     assert cli.main(["signal", str(source), "--out", str(tmp_path / "a.wav"), "--full-scale", "nan"]) == 2
     assert capsys.readouterr().err == "evfem: full_scale: given nan; allowed: a voltage in V above zero\n"
     assert not (tmp_path / "a.wav").exists()
+
+
+# -- as a scene's voltage
+
+WITH_WAV = """version = 1
+[surface]
+kind = "flat"
+[electrostatics]
+law = "kaczmarek"
+voltage_file = "voltage.wav"
+insulator_thickness = 0.09
+insulator_eps_r = 3.35
+[[motion]]
+kind = "press"
+force = 0.05
+"""
+
+
+def test_a_voltage_file_may_be_a_wav(tmp_path):
+    signal = VoltageProfile([1.0, 2.0, 3.0], [0.0, 1000.0, 500.0])
+    write_signal(tmp_path / "voltage.wav", signal, Playback(full_scale=1000.0, speed=20.0, rate=2000))
+    scene = loads(WITH_WAV, tmp_path)
+    x = np.linspace(0.0, 4.0, 41)
+    assert np.abs(scene.voltage(x) - signal(x)).max() <= 0.51 * 1000.0 / 32767
+    again = loads(dump(scene), tmp_path)
+    assert again.digest() == scene.digest()
+
+
+@pytest.mark.parametrize(
+    ("carrier", "cut", "says"),
+    [(500.0, 0, "with a carrier of 500.0 Hz"), (None, 3, "voltage.wav, cut off"), (None, 10**6, "cut off")],
+)
+def test_a_wav_that_is_no_voltage_is_refused_under_its_key(tmp_path, carrier, cut, says):
+    playback = Playback(full_scale=2000.0, speed=20.0, rate=2000, carrier=carrier)
+    write_signal(tmp_path / "voltage.wav", VoltageProfile([0.0, 1.0], [0.0, 1000.0]), playback)
+    data = (tmp_path / "voltage.wav").read_bytes()
+    (tmp_path / "voltage.wav").write_bytes(data[: max(len(data) - cut, 0)])
+    with pytest.raises(InputError, match=says) as refused:
+        loads(WITH_WAV, tmp_path)
+    assert refused.value.key == "electrostatics.voltage_file"
