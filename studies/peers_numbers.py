@@ -24,6 +24,7 @@ MEASURED = (
     "cpu_s",
     "slowest_cpu_s",
     "wall_s",
+    "process_cpu_s",
     "iterations",
     "factorisations",
     "imported_MB",
@@ -85,7 +86,7 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
             same = (run.scene, run.level, run.element) == (own.scene, own.level, ELEMENTS[own.element])
             if run.package == "evfem" or not same:
                 continue
-            for name in ("cpu_s", "peak_MB", "iterations"):
+            for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):
                 ratio = run.measured[name] / own.measured[name]
                 found[f"{place}.{run.package}_over_evfem.{own.element}.{name}"] = ratio
             fastest.append(run.measured["cpu_s"])
