@@ -106,7 +106,7 @@ class _Places:
 
 
 def _nodes_2(values: Floats) -> tuple[Ints, Floats]:
-    if not values.size or values.size != 1 + 4 * values[0]:
+    if not values.size or values[0] != (values.size - 1) / 4:  # no product, which may be infinite
         raise Unreadable("another number of nodes than announced")
     table = values[1:].reshape(-1, 4)
     return integers(table[:, 0]), table[:, 1:]

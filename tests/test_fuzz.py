@@ -218,6 +218,7 @@ BOMBS = {
     "elements.vtu": (vtu(cells="<a/>" * 300_000), "more than 100000"),
     "attributes.vtu": (vtu(attributes=" ".join(f'a{k}=""' for k in range(300_000))), "more than 100000"),
     "nodes.msh": (MSH.format(10**12, VERTEX), "number of nodes"),
+    "most.msh": (MSH.format("1e308", VERTEX), "number of nodes"),
     "elements.msh": (MSH.format(1, f"{10**12}\n1 15 2 1 1 1"), "number of elements"),
     "tags.msh": (MSH.format(1, "1\n1 15 1000000000000 1 1 1"), "number of elements"),
     "tag.msh": (MSH.format(1, "1\n1 15 2 1 1 4611686018427387904"), "out of range"),
