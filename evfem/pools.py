@@ -1,7 +1,7 @@
 """Where the points of a sweep are computed: in this process, in processes beside it, or on a Dask cluster.
 
-All three are executors of the standard library (`concurrent.futures`). Processes are started afresh, each
-with the BLAS on one thread, and end at once when the process that started them is gone, however it went.
+All three take calls as the executors of `concurrent.futures` do. Processes are started afresh, each with the
+BLAS on one thread, and end at once when the process that started them is gone, however it went.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, Protocol
 
 from threadpoolctl import threadpool_limits
 
@@ -23,11 +23,18 @@ from evfem.checks import count
 from evfem.errors import InputError
 
 
+class Worker(Protocol):
+    """What calls a function of one argument, now or later."""
+
+    def submit(self, function: Callable[[Any], Any], job: Any, /) -> Future[Any]:
+        """The answer to come."""
+
+
 @dataclass(frozen=True)
 class Pool:
-    """An executor, and how many calls it should have in hand so that nobody waits."""
+    """Who does the work, and how many calls should be in hand so that nobody waits."""
 
-    executor: Executor
+    executor: Worker
     window: int
 
 
@@ -66,12 +73,12 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-class _Here(Executor):
+class _Here:
     """Calls at once, in this process."""
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, function: Callable[[Any], Any], job: Any, /) -> Future[Any]:
         future: Future[Any] = Future()
-        future.set_result(fn(*args, **kwargs))
+        future.set_result(function(job))
         return future
 
 
