@@ -125,7 +125,7 @@ class _Run:
         self.reused = len(self.answers) - len(refused)
         if progress and refused:
             count = sum(key in refused for key in self.keys)
-            print(f"{count} of {len(self.keys)} points are no valid scene", file=sys.stderr, flush=True)
+            notices.tell(f"{count} of {len(self.keys)} points are no valid scene")
         self.written = clock.perf_counter()
         self.bar = _Progress(len(set(self.keys)), self.answers, progress)
 
@@ -216,7 +216,7 @@ def evaluate(job: Job) -> Answer:
         status, message = "not_converged", str(error)
     except InputError as error:
         status, message = "refused", str(error)
-    except Exception as error:  # a mistake in a point must not cost the others
+    except Exception as error:  # whatever a user's own part raises must not cost the other points
         status, message = "failed", f"{type(error).__name__}: {error}"
     return Answer(status, clock.perf_counter() - began, message, outputs)
 
@@ -277,7 +277,7 @@ def _answer(future: Future[Answer]) -> Answer:
         raise
     except CancelledError as error:
         raise InputError("scheduler", "a cluster that went away", "resume on another") from error
-    except Exception as error:  # the cluster's own: a worker died again and again
+    except Exception as error:  # the cluster's own kind, if a worker died again and again
         return Answer("failed", 0.0, f"{type(error).__name__}: {error}", {})
 
 
@@ -306,8 +306,8 @@ class _Progress:
         self.bar.set_postfix_str(f"{wrong} without result" if wrong else "", refresh=False)
         self.bar.update(1)
         LOG.debug("point %d of %d", done, self.total)
-        if self.lines and done * 10 // self.total > (done - 1) * 10 // self.total:
-            print(f"point {done} of {self.total}", file=sys.stderr, flush=True)
+        if self.lines:
+            notices.milestone("point", done, self.total)
 
     def close(self) -> None:
         """No more to come."""

@@ -329,7 +329,7 @@ def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch,
     shown = capsys.readouterr()
     assert shown.out == "6 points: 4 done, 2 refused; table in many-out/sweep.csv\n"
     lines = shown.err.splitlines()
-    assert lines[0] == "2 of 6 points are no valid scene"
+    assert lines[0] == "evfem: 2 of 6 points are no valid scene"
     assert lines[1:-2] == ["point 3 of 6", "point 4 of 6", "point 5 of 6", "point 6 of 6"]
     assert lines[-1].startswith("evfem: point 5: surface.friction: given -1.0")
     plan.write_text(SWEEP.replace(", -1.0]", "]"))
