@@ -65,7 +65,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if isinstance(error, StorageError):
             raise
         raise StorageError(f"cannot write {target}: {error.strerror or error}") from error
-    except BaseException:
+    except BaseException:  # Ctrl-C too leaves nothing behind
         _remove(temporary)
         raise
 

@@ -283,7 +283,7 @@ def _called(folder: Path, words: list[str]) -> tuple[int, str, str]:
             status = _load(words[1]) if words[0] == "load" else cli.main(words)
         except _TooLong:
             return -2, out.getvalue(), f"more than {LONGEST:g} CPU s"
-        except BaseException as wrong:
+        except (Exception, SystemExit) as wrong:  # what is hunted here
             return -1, out.getvalue(), f"{type(wrong).__name__}: {wrong}"
     if (folder / "owned").exists():
         return -3, out.getvalue(), "code in the file was executed"

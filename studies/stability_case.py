@@ -185,7 +185,7 @@ def judge(case: Case) -> Found:
         outcome, said = "not converged", str(error)
     except AssertionError as error:
         outcome, said = "wrong", str(error)
-    except Exception as error:
+    except Exception as error:  # an outcome like others: the table names it, the other cases go on
         outcome, said = "error", f"{type(error).__name__}: {error}"
     spent = time.process_time() - begin
     return Found(
