@@ -1,46 +1,17 @@
-"""Mesh files: round trips of every kind, clean terminal, and a sentence for each wrong mesh."""
+"""Mesh files: round trips of every kind, clean terminal, names and numbers that fit."""
 
-import shutil
-import subprocess
-import sys
-
-import evfem.meshes
 import meshio
 import numpy as np
 import pytest
-from evfem.meshes.make import RECIPES, triangles
-from evfem.studies.benchmark import LEVELS, benchmark_mesh
+from evfem.studies.benchmark import benchmark_mesh
+from mesh_parts import REGIONS, of_kind, raw
 
 from evfem import meshfile
 from evfem.errors import InputError, StorageError
 from evfem.fingerpad import FingerPad, MeshedFinger
 from evfem.materials import NeoHookean
-from evfem.mesh import Mesh, raised
+from evfem.mesh import Mesh
 from evfem.quality import scaled_jacobian
-
-NUMBERS = {"tissue": 0, "skin": 1}
-
-
-def of_kind(kind):
-    mesh = benchmark_mesh(0)
-    mesh = triangles(mesh) if kind.startswith("triangle") else mesh
-    return raised(mesh) if kind in ("quad9", "triangle6") else mesh
-
-
-def raw(mesh=None, **changes):
-    """The parts of a `.vtu` file as meshio takes them, some of them replaced."""
-    mesh = benchmark_mesh(0) if mesh is None else mesh
-    point_data = {
-        name: np.isin(np.arange(len(mesh.points)), nodes).astype(float)
-        for name, nodes in mesh.node_sets.items()
-    }
-    parts = {
-        "points": np.column_stack([mesh.points, np.zeros(len(mesh.points))]),
-        "cells": [(mesh.kind, mesh.cells)],
-        "point_data": point_data,
-        "cell_data": {"region": [mesh.region]},
-    }
-    return parts | changes
 
 
 def stored(folder, **changes):
@@ -168,7 +139,7 @@ def test_clockwise_meshes_are_turned_round(tmp_path):
         assert scaled_jacobian(mirrored).max() < 0.0
         path = tmp_path / "mesh.vtu"
         meshio.Mesh(**raw(mirrored)).write(path)
-        read = meshfile.read(path, NUMBERS)
+        read = meshfile.read(path, REGIONS)
         np.testing.assert_allclose(np.sort(scaled_jacobian(read)), np.sort(scaled_jacobian(mesh)), rtol=1e-12)
         # the same nodes in each cell, mid-nodes still between their corners
         np.testing.assert_array_equal(np.sort(read.cells, axis=1), np.sort(mesh.cells, axis=1))
@@ -178,136 +149,8 @@ def test_pad_is_reduced_to_the_outline(tmp_path):
     parts = raw()
     parts["point_data"]["pad"][:] = 1.0
     meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
-    mesh = meshfile.read(tmp_path / "mesh.vtu", NUMBERS)
+    mesh = meshfile.read(tmp_path / "mesh.vtu", REGIONS)
     np.testing.assert_array_equal(mesh.node_sets["pad"], np.unique(mesh.outer_edges))
-
-
-def shifted_copy(gap):
-    """Two bodies side by side."""
-    mesh = benchmark_mesh(0)
-    n = len(mesh.points)
-    points = np.vstack([mesh.points, mesh.points + np.array([gap, 0.0])])
-    sets = {name: np.append(nodes, nodes + n) for name, nodes in mesh.node_sets.items()}
-    region = np.tile(mesh.region, 2)
-    return Mesh(points, np.vstack([mesh.cells, mesh.cells + n]), "quad", region, mesh.region_names, sets)
-
-
-def curl():
-    """A strip of cells that goes round by more than a turn, so that its end lies over its beginning."""
-    angle = np.linspace(0.0, 2.2 * np.pi, 45)
-    rings = [r * np.column_stack([np.cos(angle), np.sin(angle)]) for r in (3.0, 4.0)]
-    node = np.arange(90).reshape(2, 45)
-    cells = np.stack([node[0, :-1], node[1, :-1], node[1, 1:], node[0, 1:]], axis=1)
-    points = np.vstack(rings) + np.column_stack([0.003 * np.arange(90), np.zeros(90)])
-    return Mesh(points, cells, "quad", np.zeros(44, int), {"tissue": 0}, {"pad": node[1], "bone": node[0]})
-
-
-def hanging():
-    """A cell whose upper edge meets two cells: their common node hangs on it (a side column joins them)."""
-    points = np.array(
-        [[0, 0], [4, 0], [4, 2], [0, 2], [2, 2], [0, 4], [2, 4], [4, 4], [6, 0], [6, 2], [6, 4.0]]
-    )
-    cells = np.array([[0, 1, 2, 3], [3, 4, 6, 5], [4, 2, 7, 6], [1, 8, 9, 2], [2, 9, 10, 7]])
-    sets = {"pad": np.array([0, 1]), "bone": np.array([5, 6, 7])}
-    return Mesh(points, cells, "quad", np.zeros(5, int), {"tissue": 0}, sets)
-
-
-def changed_cells(change):
-    mesh = benchmark_mesh(0)
-    cells, region = change(mesh.cells.copy(), mesh.region)
-    return {"cells": [("quad", cells)], "cell_data": {"region": [region]}}
-
-
-def moved(node, place, mesh=None):
-    mesh = benchmark_mesh(0) if mesh is None else mesh
-    points = mesh.points.copy()
-    points[node] = place
-    return raw(Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names, mesh.node_sets))
-
-
-def scaled(factor):
-    return {"points": raw()["points"] * factor}
-
-
-def without(name, value=0.0):
-    data = raw()["point_data"]
-    if value is None:
-        del data[name]
-    else:
-        data[name] = np.full(793, value)
-    return {"point_data": data}
-
-
-def inverted(cells, region):
-    cells[17] = cells[17, ::-1]
-    return cells, region
-
-
-QUAD8 = {"cells": [("quad8", of_kind("quad9").cells[:, :8])]}
-MIXED = {
-    "cells": [("quad", benchmark_mesh(0).cells[:-1]), ("triangle", benchmark_mesh(0).cells[-1:, :3])],
-    "cell_data": {"region": [benchmark_mesh(0).region[:-1], benchmark_mesh(0).region[-1:]]},
-}
-
-WRONG = {
-    "eight-node quads": (raw(of_kind("quad9")) | QUAD8, "quad8 has no middle node"),
-    "quads and triangles": (MIXED, "quad and triangle cells"),
-    "lines only": ({"cells": [("line", np.array([[0, 1]]))], "cell_data": {}}, "no two-dimensional cells"),
-    "tetrahedra": ({"cells": [("tetra", np.array([[0, 1, 2, 70]]))], "cell_data": {}}, "tetra cells"),
-    "not a number": (moved(5, [np.nan, 0.0]), "no finite coordinates at node 5"),
-    "infinite": (moved(5, [np.inf, 0.0]), "no finite coordinates at node 5"),
-    "not plane": ({"points": raw()["points"] + np.arange(793)[:, None] * [0, 0, 1.0]}, "a plane mesh"),
-    "metres": (scaled(1e-3), "between 1 and 200 mm"),
-    "micrometres": (scaled(1e3), "between 1 and 200 mm"),
-    "orphan nodes": (changed_cells(lambda c, r: (c[1:], r[1:])), "1 nodes that no cell uses (node 0)"),
-    "double nodes": (raw(shifted_copy(0.0)), "nodes in the same place (nodes"),
-    "one inverted cell": (changed_cells(inverted), "inverted or empty cells (cell 17)"),
-    "tangled cell": (moved(61 * 5 + 30, [0.0, -2.0]), "cells (cell"),
-    "tangled mid-node": (
-        moved(benchmark_mesh(0, 2).cells[80, 4], [0.0, -3.0], benchmark_mesh(0, 2)),
-        "tangled cells",
-    ),
-    "cell twice": (
-        changed_cells(lambda c, r: (np.vstack([c, c[60:61]]), np.append(r, r[60]))),
-        "do not overlap",
-    ),
-    "separate parts": (raw(shifted_copy(30.0)), "2 separate parts"),
-    "overlap of neighbours": (raw(curl()), "crosses or touches itself"),
-    "hanging node": (raw(hanging()), "crosses or touches itself"),
-    "no pad": (without("pad", None), "no boundary pad (it has bone)"),
-    "no bone": (without("bone", None), "no boundary bone (it has pad)"),
-    "empty pad": (without("pad"), "no boundary pad"),
-    "pad of NaN": (without("pad", np.nan), "NaN in point data `pad`"),
-    "pad on the bone": (
-        {"point_data": raw()["point_data"] | {"pad": raw()["point_data"]["bone"]}},
-        "a pad that lies on the bone",
-    ),
-    "pad without an edge": (
-        {"point_data": raw()["point_data"] | {"pad": np.arange(793) == 740.0}},
-        "without an edge",
-    ),
-    "no regions": ({"cell_data": {}}, "without region numbers"),
-    "fractional regions": ({"cell_data": {"region": [benchmark_mesh(0).region + 0.5]}}, "no integers"),
-}
-
-
-@pytest.mark.parametrize("case", WRONG)
-def test_wrong_mesh_gets_one_sentence(case, tmp_path, capfd):
-    changes, words = WRONG[case]
-    changes = {
-        k: ({n: v * 1.0 for n, v in d.items()} if k == "point_data" else d) for k, d in changes.items()
-    }
-    parts = raw() | changes
-    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
-    capfd.readouterr()
-    present = np.unique(np.concatenate([np.ravel(r) for r in parts["cell_data"].get("region", [0])]))
-    with pytest.raises(InputError) as caught:
-        meshfile.read(tmp_path / "mesh.vtu", {name: n for name, n in NUMBERS.items() if n in present})
-    message = str(caught.value)
-    assert words in message
-    assert "\n" not in message
-    assert caught.value.key == "finger.mesh"
-    assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.parametrize(
@@ -334,7 +177,7 @@ def test_unreadable_file_gets_a_sentence_and_a_clean_terminal(name, content, tmp
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(InputError) as caught:
-        meshfile.read(path, NUMBERS)
+        meshfile.read(path, REGIONS)
     assert name in str(caught.value)
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
@@ -404,65 +247,6 @@ def test_msh_cannot_carry_a_lonely_node(tmp_path):
 
 def test_meshed_finger_reads_a_file(tmp_path):
     laws = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.3)}
-    finger = MeshedFinger(stored(tmp_path), laws, regions=NUMBERS)
+    finger = MeshedFinger(stored(tmp_path), laws, regions=REGIONS)
     same(finger.mesh(1), benchmark_mesh(0))
     same(finger.mesh(2), benchmark_mesh(0, 2))
-
-
-@pytest.mark.parametrize("level", LEVELS)
-def test_benchmark_mesh_has_the_nodes_of_the_problem(level):
-    mesh = benchmark_mesh(level)
-    assert len(mesh.points) == {0: 793, 1: 3025, 2: 23253, 3: 46657}[level]
-    outer = mesh.points[mesh.node_sets["pad"]]
-    np.testing.assert_allclose((outer[:, 0] / 8.34) ** 2 + (outer[:, 1] / 6.395) ** 2, 1.0, rtol=1e-13)
-    assert outer[:, 1].min() == pytest.approx(-6.395, rel=1e-15)
-    bone = mesh.points[mesh.node_sets["bone"]]
-    on_contour = np.abs((bone[:, 0] / 3.0) ** 2 + (bone[:, 1] / 2.5) ** 2 - 1.0) < 1e-12
-    assert (on_contour | (bone[:, 1] == 0.0)).all()
-    around, tissue, skin = LEVELS[level]
-    assert len(bone) == around + 1 + 2 * (tissue + skin)
-    # node between bone and interface at the middle column: on the straight line at equal parts
-    below = np.sort(mesh.points[np.abs(mesh.points[:, 0]) < 1e-9, 1])[::-1]
-    np.testing.assert_allclose(below[: tissue + 1], np.linspace(-2.5, -6.015, tissue + 1), rtol=1e-13)
-    np.testing.assert_allclose(below[tissue:], np.linspace(-6.015, -6.395, skin + 1), rtol=1e-13)
-
-
-def test_quadratic_benchmark_meshes():
-    straight = benchmark_mesh(0, 2)
-    corner = straight.points[straight.cells[:, :4]]
-    np.testing.assert_allclose(
-        straight.points[straight.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1))
-    )
-    through = benchmark_mesh(1, 2, same_nodes=True)
-    np.testing.assert_array_equal(through.points, benchmark_mesh(1).points)
-    assert len(through.cells) == 2880 // 4
-    assert scaled_jacobian(through).min() > 0.5
-    with pytest.raises(InputError, match="0, 1, 2 or 3"):
-        benchmark_mesh(4)
-
-
-@pytest.mark.parametrize("name", RECIPES)
-def test_ready_made_meshes_are_what_the_recipe_makes(name, tmp_path):
-    path = evfem.meshes.path(name)
-    meshfile.write(RECIPES[name](), tmp_path / name)
-    fresh, kept = meshfile.read(tmp_path / name), meshfile.read(path)
-    np.testing.assert_allclose(kept.points, fresh.points, atol=1e-12)
-    np.testing.assert_array_equal(kept.cells, fresh.cells)
-    np.testing.assert_array_equal(kept.region, fresh.region)
-    readme = (path.parent / "README.md").read_text()
-    assert f"`{name}` | {len(kept.cells)} {kept.kind}s, {len(kept.points)} |" in readme
-
-
-def test_ready_made_meshes_are_listed_and_small():
-    assert evfem.meshes.names() == sorted(RECIPES)
-    assert sum(evfem.meshes.path(name).stat().st_size for name in RECIPES) < 3e6
-    with pytest.raises(InputError, match="benchmark-L0"):
-        evfem.meshes.path("benchmark-L9.vtu")
-
-
-def test_recipe_runs_as_a_module(tmp_path):
-    command = [sys.executable, "-m", "evfem.meshes.make", str(tmp_path)]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
-    assert (done.stdout, done.stderr) == ("", "")
-    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(RECIPES)
-    shutil.rmtree(tmp_path)

@@ -1,0 +1,74 @@
+"""The benchmark's meshes and those that come with the package: what their recipes make."""
+
+import shutil
+import subprocess
+import sys
+
+import evfem.meshes
+import numpy as np
+import pytest
+from evfem.meshes.make import RECIPES
+from evfem.studies.benchmark import LEVELS, benchmark_mesh
+
+from evfem import meshfile
+from evfem.errors import InputError
+from evfem.quality import scaled_jacobian
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_benchmark_mesh_has_the_nodes_of_the_problem(level):
+    mesh = benchmark_mesh(level)
+    assert len(mesh.points) == {0: 793, 1: 3025, 2: 23253, 3: 46657}[level]
+    outer = mesh.points[mesh.node_sets["pad"]]
+    np.testing.assert_allclose((outer[:, 0] / 8.34) ** 2 + (outer[:, 1] / 6.395) ** 2, 1.0, rtol=1e-13)
+    assert outer[:, 1].min() == pytest.approx(-6.395, rel=1e-15)
+    bone = mesh.points[mesh.node_sets["bone"]]
+    on_contour = np.abs((bone[:, 0] / 3.0) ** 2 + (bone[:, 1] / 2.5) ** 2 - 1.0) < 1e-12
+    assert (on_contour | (bone[:, 1] == 0.0)).all()
+    around, tissue, skin = LEVELS[level]
+    assert len(bone) == around + 1 + 2 * (tissue + skin)
+    # node between bone and interface at the middle column: on the straight line at equal parts
+    below = np.sort(mesh.points[np.abs(mesh.points[:, 0]) < 1e-9, 1])[::-1]
+    np.testing.assert_allclose(below[: tissue + 1], np.linspace(-2.5, -6.015, tissue + 1), rtol=1e-13)
+    np.testing.assert_allclose(below[tissue:], np.linspace(-6.015, -6.395, skin + 1), rtol=1e-13)
+
+
+def test_quadratic_benchmark_meshes():
+    straight = benchmark_mesh(0, 2)
+    corner = straight.points[straight.cells[:, :4]]
+    np.testing.assert_allclose(
+        straight.points[straight.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1))
+    )
+    through = benchmark_mesh(1, 2, same_nodes=True)
+    np.testing.assert_array_equal(through.points, benchmark_mesh(1).points)
+    assert len(through.cells) == 2880 // 4
+    assert scaled_jacobian(through).min() > 0.5
+    with pytest.raises(InputError, match="0, 1, 2 or 3"):
+        benchmark_mesh(4)
+
+
+@pytest.mark.parametrize("name", RECIPES)
+def test_ready_made_meshes_are_what_the_recipe_makes(name, tmp_path):
+    path = evfem.meshes.path(name)
+    meshfile.write(RECIPES[name](), tmp_path / name)
+    fresh, kept = meshfile.read(tmp_path / name), meshfile.read(path)
+    np.testing.assert_allclose(kept.points, fresh.points, atol=1e-12)
+    np.testing.assert_array_equal(kept.cells, fresh.cells)
+    np.testing.assert_array_equal(kept.region, fresh.region)
+    readme = (path.parent / "README.md").read_text()
+    assert f"`{name}` | {len(kept.cells)} {kept.kind}s, {len(kept.points)} |" in readme
+
+
+def test_ready_made_meshes_are_listed_and_small():
+    assert evfem.meshes.names() == sorted(RECIPES)
+    assert sum(evfem.meshes.path(name).stat().st_size for name in RECIPES) < 3e6
+    with pytest.raises(InputError, match="benchmark-L0"):
+        evfem.meshes.path("benchmark-L9.vtu")
+
+
+def test_recipe_runs_as_a_module(tmp_path):
+    command = [sys.executable, "-m", "evfem.meshes.make", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=True)
+    assert (done.stdout, done.stderr) == ("", "")
+    assert sorted(file.name for file in tmp_path.iterdir()) == sorted(RECIPES)
+    shutil.rmtree(tmp_path)
