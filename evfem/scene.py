@@ -318,7 +318,7 @@ def _check_electrostatics(scene: Scene) -> None:
             allowed = "StrongTroxel(), Kaczmarek() or a law of your own"
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
-        allowed = "an object with a method traction(gap, voltage, layers)"
+        allowed = "StrongTroxel(), Kaczmarek() or an object with a method traction(gap, voltage, layers)"
         raise InputError("electrostatics.law", scene.law, allowed)
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'

@@ -24,6 +24,7 @@ from evfem.electrostatics import Layer
 from evfem.errors import InputError
 from evfem.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.tensor import Array
+from evfem.views import changed
 
 Rows = Sequence[Sequence[float]]
 
@@ -251,6 +252,12 @@ class Profile(_Surface):
         """The profile in a file with the header `x,height` and one point (mm) in each further line."""
         x, height = read_columns(Path(path), ["x", "height"], "surface.file")
         return cls(x, height, friction, y, insulator)
+
+    def __repr__(self) -> str:
+        x, low, high = self.x, self.samples.min(), self.samples.max()
+        size = f"{x.size} points, x {x[0]:.4g} to {x[-1]:.4g} mm, height {low:.4g} to {high:.4g} mm"
+        more = [f"{key}={v!r}" for key, v in changed(self).items() if key not in ("x", "samples")]
+        return f"Profile({', '.join([size, *more])})"
 
     @cached_property
     def _cubics(self) -> Array:

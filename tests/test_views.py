@@ -64,6 +64,12 @@ def test_a_scene_shows_itself_in_at_most_three_lines():
     assert found["air_layer"] == "False"
 
 
+def test_a_profile_shows_its_size_so_that_a_wrong_unit_is_seen():
+    x = np.linspace(0.0, 8000.0, 801)
+    shown = repr(ev.Profile(x, 8.0 * np.sign(x - 1.0), friction=0.2))
+    assert shown == "Profile(801 points, x 0 to 8000 mm, height -8 to 8 mm, friction=0.2)"
+
+
 def test_a_result_shows_how_far_it_came_and_its_end():
     result = fake_result(steps=4)
     assert repr(result).splitlines() == [
