@@ -86,13 +86,13 @@ def _stresses(H: Any, mu: Any, weight: Any) -> None:
 
 
 @inlined
-def _volume_states(
-    ue: Any, mu: Any, lmbda: Any, block: Any, H: Any, inverse: Any, log_J: Any, theta: Any, pull: Any
-) -> None:
-    """Everything of a block that depends on the displacements: H (Q, 4, L), F^-T (S, 4, L), and the weighted
-    volume force gathered at the samples, pull (S, L).
+def _volume_states(ue: Any, moduli: Any, block: Any, states: Any, pull: Any) -> None:
+    """Everything of a block that depends on the displacements: the `states` H (Q, 4, L), F^-T (S, 4, L), ln J
+    (S, L) and theta (Q, L), and the weighted volume force gathered at the samples, pull (S, L).
     """
+    mu, lmbda = moduli
     gradient, weight, sample, projection = block
+    H, inverse, log_J, theta = states
     _states(ue, gradient, sample, H, inverse, log_J)
     _theta(log_J, projection, theta)
     _volume_force(theta, mu, lmbda, weight)
@@ -112,7 +112,7 @@ def forces(u: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> Floats:
     for b in range(B):
         gather(u, nodes[b], ue)
         block = (gradient[b], weight[b], sample[b], projection[b])
-        _volume_states(ue, mu[b], lmbda[b], block, H, inverse, log_J, theta, pull)
+        _volume_states(ue, (mu[b], lmbda[b]), block, (H, inverse, log_J, theta), pull)
         _stresses(H, mu[b], weight[b])
         for s in range(S):
             for j in range(4):
@@ -213,7 +213,7 @@ def tangent(u: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> F
     for b in range(B):
         gather(u, nodes[b], ue)
         block = (gradient[b], weight[b], sample[b], projection[b])
-        _volume_states(ue, mu[b], lmbda[b], block, H, inverse, log_J, theta, pull)
+        _volume_states(ue, (mu[b], lmbda[b]), block, (H, inverse, log_J, theta), pull)
         _pushed(inverse, sample[b] if sample.shape[1] else gradient[b], push)
         _theta_rows(push, projection[b], rows)
         for q in range(Q):
