@@ -37,24 +37,16 @@ from evfem.signals import VoltageProfile
 from evfem.simulate import simulate
 from evfem.storage import save_arrays
 
-from .killing import kills
+from .killing import head, kills
 from .mutations import mutated, mutated_arrays, mutated_text
+from .stability_scenes import block
 
 __all__ = ["FORMATS", "Outcome", "fuzz", "kills", "try_file"]
 
 #: CPU seconds that one file may take
 LONGEST = 60.0
-HEAD = "version = 1\n"
-SQUARE = """[finger]
-mesh = "square.{mesh}"
-[finger.materials.soft]
-law = "neo_hookean"
-E = 0.05
-nu = 0.4
-[finger.electrical]
-stratum_corneum_thickness = 0.3
-"""
-PAD = """[finger]
+PAD = """version = 1
+[finger]
 resolution = "coarse"
 width = 16.0
 height = 12.0
@@ -100,19 +92,15 @@ class Outcome:
 
 def square() -> Mesh:
     """[-1, 1] x [0, 2] in four quadrilaterals, the lower side `pad`, the upper side `bone`."""
-    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 3), np.linspace(0.0, 2.0, 3))
-    node = np.arange(9).reshape(3, 3)
-    cells = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1).reshape(-1, 4)
-    sets = {"pad": node[0].copy(), "bone": node[-1].copy()}
-    return Mesh(np.column_stack([x.ravel(), y.ravel()]), cells, "quad", np.zeros(4, int), {"soft": 0}, sets)
+    return block(2, 2, width=2.0, height=2.0)
 
 
 def _scene(folder: Path, rng: Random) -> list[str]:
-    finger = rng.choice([PAD, SQUARE.format(mesh="vtu")])
+    finger = rng.choice([PAD, head("square.vtu")])
     surface, motion = rng.choice([FLAT, SINUSOID, PROFILE]), rng.choice([MOTIONS, RAMP])
     laws = ["voltage = 100.0", 'voltage_file = "signal.csv"', "voltage_profile = [[0.0, 1.0]]"]
     law = laws[0] if motion == RAMP else rng.choice(laws)
-    text = HEAD + finger + surface + VOLTAGE.format(voltage=law) + SOLVER + motion
+    text = finger + surface + VOLTAGE.format(voltage=law) + SOLVER + motion
     meshfile.write(square(), folder / "square.vtu")
     (folder / "scan.csv").write_text(SCAN)
     (folder / "signal.csv").write_text(SIGNAL)
@@ -121,7 +109,7 @@ def _scene(folder: Path, rng: Random) -> list[str]:
 
 
 def _run(folder: Path, surface: str, law: str = "", mesh: str = "vtu") -> list[str]:
-    text = HEAD + SQUARE.format(mesh=mesh) + surface + law + SOLVER + PRESS
+    text = head(f"square.{mesh}") + surface + law + SOLVER + PRESS
     (folder / "scene.toml").write_text(text)
     return ["run", "scene.toml", "--no-plots", "--no-fields"]
 
@@ -165,7 +153,7 @@ def _plain_vtu(mesh: Mesh) -> str:
         "CellData": array("Int32", "region", mesh.region),
     }
     body = "".join(f"<{tag}>\n{text}</{tag}>\n" for tag, text in parts.items())
-    names = "<FieldData>\n" + array("Int32", "region:soft", np.zeros(1, int)) + "</FieldData>\n"
+    names = "<FieldData>\n" + array("Int32", "region:tissue", np.zeros(1, int)) + "</FieldData>\n"
     piece = f'<Piece NumberOfPoints="{n}" NumberOfCells="{cells}">\n{body}</Piece>\n'
     grid = f"<UnstructuredGrid>\n{names}{piece}</UnstructuredGrid>\n"
     return f'<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">\n{grid}</VTKFile>\n'
@@ -197,9 +185,7 @@ def _checkpoint(folder: Path, rng: Random) -> list[str]:
 
 def _result(folder: Path, rng: Random) -> list[str]:
     meshfile.write(square(), folder / "square.vtu")
-    simulate(scenefile.loads(HEAD + SQUARE.format(mesh="vtu") + FLAT + PRESS, folder)).save(
-        folder / "run.npz"
-    )
+    simulate(scenefile.loads(head("square.vtu") + FLAT + PRESS, folder)).save(folder / "run.npz")
     _damage(folder / "run.npz", rng)
     return ["load", "run.npz"]
 

@@ -22,16 +22,20 @@ from xml.etree import ElementTree
 import numpy as np
 
 from evfem import meshfile
-from evfem.mesh import Mesh
 from evfem.result import COLUMNS
 from evfem.scenefile import load
 from evfem.storage import load_arrays
 from evfem.vturead import read
 
-HEAD = """version = 1
+from .stability_scenes import block
+
+
+def head(mesh: str, more: str = "") -> str:
+    """The beginning of a scene: its finger from a mesh with the region `tissue`, and further keys of it."""
+    return f"""version = 1
 [finger]
-mesh = "block.vtu"
-{viscosity}
+mesh = "{mesh}"
+{more}
 [finger.materials.tissue]
 law = "neo_hookean"
 E = 0.05
@@ -39,6 +43,8 @@ nu = 0.45
 [finger.electrical]
 stratum_corneum_thickness = 0.3
 """
+
+
 VOLTAGE = """[electrostatics]
 law = "kaczmarek"
 voltage = 400.0
@@ -47,16 +53,16 @@ insulator_eps_r = 3.35
 """
 #: name -> scene: attraction and a held force, viscosity on a texture, inertia and a held force
 SCENES: Mapping[str, str] = {
-    "force": HEAD.format(viscosity="")
+    "force": head("block.vtu")
     + '[surface]\nkind = "flat"\nfriction = 0.3\n'
     + VOLTAGE
     + '[[motion]]\nkind = "press"\nforce = 0.02\nsteps = 4\n'
     + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 16\nhold = "force"\n',
-    "viscous": HEAD.format(viscosity="viscosity = 1e-3")
+    "viscous": head("block.vtu", "viscosity = 1e-3")
     + '[surface]\nkind = "sinusoid"\nfriction = 0.2\n[solver]\ndynamics = "viscous"\n'
     + '[[motion]]\nkind = "press"\nindentation = 0.2\nspeed = 5.0\nsteps = 4\n'
     + '[[motion]]\nkind = "slide"\ndistance = -1.0\nsteps = 16\nspeed = 20.0\n',
-    "inertial": HEAD.format(viscosity="viscosity = 1e-4")
+    "inertial": head("block.vtu", "viscosity = 1e-4")
     + '[surface]\nkind = "flat"\nfriction = 0.2\n[solver]\ndynamics = "inertial"\n'
     + '[[motion]]\nkind = "press"\nindentation = 0.2\nspeed = 5.0\nsteps = 4\n'
     + '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 16\nspeed = 20.0\nhold = "force"\n',
@@ -66,21 +72,10 @@ FORCES = tuple(name for name in COLUMNS if "force" in name)
 IN_A_ROW = 5
 
 
-def block() -> Mesh:
-    """A block of 4 mm x 2 mm in 24 x 6 quadrilaterals; its lower side, `pad`, bulges, its upper is `bone`."""
-    x, t = np.meshgrid(np.linspace(-2.0, 2.0, 25), np.linspace(0.0, 1.0, 7))
-    low = 0.3 * (0.5 * x) ** 2
-    points = np.column_stack([x.ravel(), (low + t * (2.0 - low)).ravel()])
-    node = np.arange(x.size).reshape(x.shape)
-    cells = np.stack([node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]], axis=-1).reshape(-1, 4)
-    sets = {"pad": node[0].copy(), "bone": node[-1].copy()}
-    return Mesh(points, cells, "quad", np.zeros(len(cells), int), {"tissue": 0}, sets)
-
-
 def prepare(folder: Path, name: str) -> list[str]:
     """Mesh and scene in `folder`; the command that runs it there, without options."""
     folder.mkdir(parents=True, exist_ok=True)
-    meshfile.write(block(), folder / "block.vtu")
+    meshfile.write(block(24, 6, sag=0.3), folder / "block.vtu")
     (folder / f"{name}.toml").write_text(SCENES[name])
     return [sys.executable, "-m", "evfem.cli", "run", f"{name}.toml", "--no-plots"]
 
