@@ -193,7 +193,7 @@ def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
     runs, failed = peers.compete({0: ("A", 2)}, who)
     assert failed == {"A.L0.felupe_q2": "NewtonConvergenceError: no"}
     assert [one.key for one in runs] == ["A.L0.evfem_q1", "A.L0.felupe_q1", "A.L0.evfem_q2p1"]
-    line = "| A | L0 | felupe | q2 | not done: NewtonConvergenceError: no | - | - | - | - | - |"
+    line = "| A | L0 | felupe | q2 | not done: NewtonConvergenceError: no | - | - | - | - | - | - |"
     assert shown.table(runs, failed)[-1] == line
 
 
@@ -232,6 +232,18 @@ def test_packages_take_turns_and_the_fastest_round_counts(monkeypatch):
         (2.0, 4.0),
         (7.0, 9.0),
     ]
+
+
+def test_a_slow_package_stays_away_from_fine_levels(monkeypatch):
+    order = []
+
+    def run_once(*who):
+        order.append((who[0], who[3]))
+        return dict(run(*who[:4]).measured)
+
+    monkeypatch.setattr(peers, "run_once", run_once)
+    peers.compete({1: ("A", 1), 2: ("A", 1)}, [("evfem", "q1"), ("getfem", "q1")])
+    assert order == [("evfem", 1), ("getfem", 1), ("evfem", 2)]
 
 
 def test_errors_and_ratios_by_hand():
