@@ -111,7 +111,9 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
     ax.set_ylabel("traction (MPa)")
     ax.set_title(f"step {shown.step}, position {shown.position:.4g} mm", fontsize="medium")
     ax.grid(alpha=0.3)
-    ax.legend()
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.35 * (high - low))  # the legend stands above the peaks of the ridges
+    ax.legend(loc="upper left")
     return ax
 
 
