@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from builders import INSULATOR, balance, benchmark_finger, block, finger
 
-from evfem.contact import BACKWARD, FORWARD, OPEN, STICK
-from evfem.electrostatics import Kaczmarek
+from evfem import condensed
+from evfem.contact import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
+from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
 from evfem.model import make_model
 from evfem.newton import StepFailed, Target
@@ -127,6 +128,58 @@ def test_a_failed_step_returns_nothing_and_leaves_its_start_alone():
     fresh, start = pressed(Flat())
     expected = fresh.equilibrium.step(start, Target(fresh.bone(0.0, 0.25), None, 0.0))
     np.testing.assert_allclose(after.reaction, expected.reaction, rtol=1e-7, atol=1e-10)
+
+
+def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypatch):
+    """An older tangent may ask for what no contact can give; a fresh one that does has failed."""
+    model, state = pressed(Flat())
+    equilibrium, target = model.equilibrium, Target(model.bone(0.0, 0.201), None, 0.0)
+    expected = equilibrium.step(state, target)
+    solve, refusals = condensed.solve_pulled, []
+
+    def refuse_once(*arguments):
+        if not refusals:
+            refusals.append(equilibrium.record.factorisations)
+            raise ContactNotSolved("as told")
+        return solve(*arguments)
+
+    assert equilibrium.linear.carried is not None  # an older tangent is at hand
+    monkeypatch.setattr(condensed, "solve_pulled", refuse_once)
+    before = equilibrium.record.factorisations
+    found = equilibrium.step(state, target)
+    assert refusals == [before]
+    assert equilibrium.record.factorisations > before
+    np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-7, atol=1e-12)
+    refusals.clear()
+    equilibrium.linear.forget()
+    with pytest.raises(StepFailed, match="contact: as told"):
+        equilibrium.step(state, target)
+
+
+def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
+    """A soft pad 0.02 mm above 2 um of insulator closes; where the fall of the attraction had to be reduced
+    three times, and only there, the lost nodes are closed at once."""
+    solve, seen, snaps = condensed.Step.solve, [], 0
+
+    def watched(step):
+        found = solve(step)
+        seen.append((step.snap, found.reduced))
+        return found
+
+    monkeypatch.setattr(condensed.Step, "solve", watched)
+    body, display = finger(block(16, 4, sag=0.1), E=0.05), Display(Layer(2e-3, 3.35))
+    for top in (300.0, 400.0):
+        model = make_model(Scene(body, display, StrongTroxel(), top, [Hover(0.02)]))
+        bone = model.bone(0.0, -0.02)
+        state = model.equilibrium.rest(bone, 0.0)
+        for voltage in (0.5 * top, top):
+            seen.clear()
+            state = model.equilibrium.step(state, Target(bone, None, voltage))
+            for k, (snap, _) in enumerate(seen):
+                assert snap == (k >= 3 and all(reduced for _, reduced in seen[k - 3 : k]))
+            snaps += sum(snap for snap, _ in seen)
+        assert (state.status != OPEN).any()
+    assert snaps > 0
 
 
 def test_an_impossible_press_stops_with_the_good_rows():
