@@ -71,7 +71,7 @@ def parser() -> argparse.ArgumentParser:
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options, _mesh),
         ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options, _signal),
     ):
-        command = commands.add_parser(name, help=does)
+        command = commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}.")
         options(command)
         command.set_defaults(function=function)
     return top

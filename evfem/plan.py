@@ -133,6 +133,10 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
 
 def _tissue(scene: Scene, mesh: Mesh) -> Term:
     laws = ", ".join(sorted({type(law).__name__ for law in scene.finger.materials.values()}))
+    moduli = [split(law).shear_modulus for law in scene.finger.materials.values()]
+    # a modulus in kPa or Pa is seen here
+    soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli), max(moduli)))
+    stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
     share = rigid_share(scene, mesh)
     if share is not None and share < RIGID_BELOW:
         return Term(
@@ -141,7 +145,8 @@ def _tissue(scene: Scene, mesh: Mesh) -> Term:
     return Term(
         "tissue",
         True,
-        f"{laws}, plane strain" + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
+        f"{laws}, plane strain, {stiffness}"
+        + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
     )
 
 
