@@ -36,7 +36,6 @@ from evfem.keptcontact import Factors, KeptProblem
 from evfem.mesh import Floats, Ints
 from evfem.state import SMALLEST_FORCE, Limits, Record, State, StepFailed, Target
 
-MAX_ITERATIONS = 20
 #: no step is solved to a smaller tolerance: what is remembered of the pad is off by more
 FINEST = 1e-5
 #: the mean compliance is kept while the weights have changed by less than this
@@ -122,7 +121,7 @@ class PadEquilibrium:
         state = replace(begin, u=begin.u + (bone - begin.bone), bone=bone, voltage=target.voltage)
         self.interface.pins.begin(self.positions(old.u)[:, 0])
         self.record.residuals = []
-        for _ in range(MAX_ITERATIONS):
+        for _ in range(self.strategy.iterations):
             pull = self.attraction_at(old, state, target.voltage) if frozen is None else frozen
             if self._balanced(state, pull, target) and self._obeyed(old, state):
                 reaction = -(self.contact_forces(state) + state.attraction).sum(axis=0)
@@ -135,7 +134,7 @@ class PadEquilibrium:
             self.record.iterations += 1
             if not np.isfinite(state.u).all():
                 break
-        reason = f"no equilibrium in {MAX_ITERATIONS} iterations"
+        reason = f"no equilibrium in {self.strategy.iterations} iterations"
         if self.interface.deepest(state) is not None:
             reason = "contact spreads beyond the nodes that the fast model keeps"
         raise StepFailed(reason, self.record.residuals)

@@ -17,7 +17,7 @@ from evfem.keptcontact import Factors, KeptProblem
 from evfem.padstep import PadEquilibrium
 from evfem.reduced import FastModel
 from evfem.simulate import Run
-from evfem.state import Limits, Target
+from evfem.state import Limits, StepFailed, Target
 
 INSULATOR = ev.Layer(thickness=0.09, eps_r=3.35)
 PRESS = ev.Press(force=0.05, steps=5)
@@ -81,6 +81,21 @@ def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained)
         assert np.abs(got.contact_force - new.contact_force).max() < 1e-3 * new.contact_force.max()
         found += 1
     assert found >= 2
+
+
+def test_a_step_is_tried_as_hard_as_the_strategy_says(trained):
+    run, _, fast = trained
+    model, pad = run.model, fast.memory.pad
+    nodes = model.pad.nodes
+    alone = replace(model.pad, nodes=np.arange(nodes.size))
+    asked = Target(model.bone(0.0, 0.1), None, 0.0)
+    place = pad, alone, model.mesh.points[nodes], model.surface, None
+    patient = PadEquilibrium(*place, Limits(1e-8))
+    patient.step(patient.rest(model.bone(0.0, 0.0), 0.0), asked)
+    hasty = PadEquilibrium(*place, Limits(1e-8, ev.Strategy(iterations=patient.record.iterations)))
+    with pytest.raises(StepFailed):
+        hasty.step(hasty.rest(model.bone(0.0, 0.0), 0.0), asked)
+    assert hasty.record.iterations == patient.record.iterations > 1
 
 
 def test_one_equilibrium_alone_errs_quadratically_with_the_distance_and_several_far_less(trained):
