@@ -1,4 +1,4 @@
-"""Pictures of results with matplotlib: functions that take a result and return the Axes they drew on.
+"""Pictures of results and meshes with matplotlib: functions that return the Axes they drew on.
 
 Figures are made without pyplot, so nothing stays open and no global state changes: save one with
 `forces(result).figure.savefig("forces.png")`. Colours are told apart with any colour vision (Okabe and
@@ -7,6 +7,7 @@ Ito, 2008).
 
 from __future__ import annotations
 
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+REGION_COLORS = (SKY, ORANGE, BLUE, GREEN, VERMILION, "#CC79A7", "#F0E442")
 FORCES = {
     "normal_force": ("normal (contact)", BLUE, "-"),
     "tangential_force": ("tangential (contact)", VERMILION, "-"),
@@ -88,6 +90,27 @@ def deformed(result: Result, field: str = "von_mises", frame: int = -1, ax: Axes
     ax.set_title(f"step {shown.step}, position {shown.position:.4g} mm", fontsize="medium")
     name = field.replace("_", " ").replace("mises", "Mises")
     ax.figure.colorbar(colors, ax=ax, label=f"{name} ({UNITS.get(field, 'MPa')})", shrink=0.8)
+    return ax
+
+
+def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
+    """The cells of an undeformed mesh, each region in a colour of its own: `regions(finger.mesh())`."""
+    from matplotlib.collections import PolyCollection
+
+    ax = _axes(ax)
+    outlines = mesh.points[_outline(mesh)]
+    for (name, number), color in zip(mesh.region_names.items(), cycle(REGION_COLORS), strict=False):
+        cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")
+        ax.add_collection(
+            PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
+        )
+    ax.set_aspect("equal")
+    ax.autoscale_view()
+    ax.set_xlabel("x (mm)")
+    ax.set_ylabel("y (mm)")
+    left, right = ax.get_xlim()
+    ax.set_xlim(left, right + 0.45 * (right - left))  # the legend stands beside the mesh
+    ax.legend(loc="upper right")
     return ax
 
 

@@ -2,14 +2,15 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from fakes import KINDS, fake_result
+from fakes import KINDS, fake_result, square_mesh
 from matplotlib.collections import LineCollection, PolyCollection
 
 from evfem.errors import InputError
-from evfem.plotting import FIELDS, contact_pressure, deformed, forces
+from evfem.plotting import FIELDS, contact_pressure, deformed, forces, regions
 
 
 def lines_of(ax):
@@ -92,6 +93,21 @@ def test_nodal_fields_interpolate_the_nodal_values():
     ax = deformed(result, "contact_pressure")
     triangles = ax.collections[0]
     np.testing.assert_array_equal(triangles.get_array(), result.frames[-1].contact_pressure)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_regions_have_their_cells_and_names(kind):
+    mesh = replace(square_mesh(kind), region_names={"soft_tissue": 0, "hard": 1})
+    ax = regions(mesh)
+    ax.figure.canvas.draw()
+    soft, hard = ax.collections
+    assert [c.get_label() for c in (soft, hard)] == ["soft tissue", "hard"]
+    # the lower half of the square and the upper one
+    for drawn, low in ((soft, 0.0), (hard, 1.0)):
+        corners = np.concatenate([path.vertices for path in drawn.get_paths()])
+        assert len(drawn.get_paths()) == len(mesh.cells) // 2
+        assert (corners[:, 1].min(), corners[:, 1].max()) == (low, low + 1.0)
+    assert not np.array_equal(soft.get_facecolor(), hard.get_facecolor())
 
 
 def test_contact_pressure_is_drawn_along_the_current_x_of_the_pad():
