@@ -24,6 +24,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 import evfem
+from evfem import notices
 from evfem import pad as outline
 from evfem.body import Body
 from evfem.condensedpad import CondensedPad, Kept
@@ -58,13 +59,13 @@ COMPARED = ("normal_force", "tangential_force", "electrostatic_force")
 ADVICE = "a fast model made from a scene with more load or friction may go further"
 
 
-def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE) -> FastModel:
+def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE, progress: bool = False) -> FastModel:
     """Run `scene` in full and keep the pad of it: `press` equilibria while it presses, up to `slide` more
     for each direction it slides in, spread evenly over the forces.
 
     Give it the largest load and friction that will be needed. The time is that of the run and of one dense
-    factorisation per equilibrium. Raises InputError for scenes the fast model cannot stand for (`FastModel`),
-    `NotConverged` where the run fails.
+    factorisation per equilibrium; `progress` shows a bar. Raises InputError for scenes the
+    fast model cannot stand for (`FastModel`), `NotConverged` where the run fails.
 
     >>> import evfem as ev
     >>> display = ev.Display(insulator=ev.Layer(0.09, 3.35), friction=0.5)
@@ -83,7 +84,8 @@ def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE) -> FastModel
         if not (isinstance(count, int) and 1 <= count <= 100):
             raise InputError(key, count, "a number of equilibria from 1 to 100")
     _check_training(scene)
-    with threadpool_limits(limits=scene.solver.threads):
+    bar = notices.bar(scene.total_steps, "step", wanted=progress)
+    with threadpool_limits(limits=scene.solver.threads), notices.shown(progress), bar:
         run = Run(scene, None)
         states, kinds = [run.state], ["rest"]
         for request in run.requests():
@@ -91,6 +93,7 @@ def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE) -> FastModel
             run.frames.clear()
             states.append(run.state)
             kinds.append(request.kind)
+            bar.update(1)
         memory = remember(run.model, states, kinds, press, slide)
     made = {"samples": len(memory.whole), "kept": memory.pad.kept.size}
     return FastModel(memory, _identity(scene), provenance(scene, run.model.mesh, made))

@@ -147,6 +147,14 @@ def test_it_says_in_one_line_what_it_was_made_for(trained):
     assert len(shown) < 120
 
 
+def test_making_one_shows_how_far_it_is(capsys):
+    motion = (ev.Press(force=0.01, steps=1), ev.Slide(0.1, steps=2))
+    ev.reduce(pad_scene(motion=motion))
+    assert capsys.readouterr().err == ""
+    ev.reduce(pad_scene(motion=motion), progress=True)
+    assert "3/3" in capsys.readouterr().err
+
+
 # -- against the full model
 
 
