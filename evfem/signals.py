@@ -58,6 +58,11 @@ class VoltageProfile:
         object.__setattr__(self, "position", position)
         object.__setattr__(self, "voltage", voltage)
 
+    def __repr__(self) -> str:
+        x, U = self.position, self.voltage
+        where = f"{x.size} rows, x {x[0]:.4g} to {x[-1]:.4g} mm"
+        return f"VoltageProfile({where}, {U.min():.4g} to {U.max():.4g} V)"
+
     def __call__(self, position: Values) -> Values:
         """Voltage in V at `position` in mm."""
         return plain(piecewise_linear(self.position, self.voltage, position))

@@ -64,6 +64,11 @@ def test_a_scene_shows_itself_in_at_most_three_lines():
     assert found["air_layer"] == "False"
 
 
+def test_a_voltage_shows_its_size():
+    shown = repr(ev.VoltageProfile([1.0, 2.0, 4.0], [-50.0, 200.0, 0.0]))
+    assert shown == "VoltageProfile(3 rows, x 1 to 4 mm, -50 to 200 V)"
+
+
 def test_a_profile_shows_its_size_so_that_a_wrong_unit_is_seen():
     x = np.linspace(0.0, 8000.0, 801)
     shown = repr(ev.Profile(x, 8.0 * np.sign(x - 1.0), friction=0.2))
