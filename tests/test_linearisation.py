@@ -55,6 +55,7 @@ def test_the_nearest_node_is_a_candidate_where_none_is_within_reach():
     linear, model, state = made(Display(y=-5.0), body=FINE)
     linear.choose_candidates(state, 0.1)
     assert np.argmin(gaps(model)) in linear.candidates
+    assert gaps(model)[linear.candidates].max() < gaps(model).min() + 0.01
 
 
 def test_touching_nodes_and_steep_attractions_are_candidates_at_any_gap():
@@ -79,6 +80,17 @@ def test_candidates_only_grow_and_the_factorisation_is_kept_while_they_do():
     linear.choose_candidates(state, 0.5)
     assert set(first) < set(linear.candidates)
     assert linear.factor is None
+
+
+def test_a_candidate_stays_one_when_it_has_let_go():
+    linear, model, state = made(body=finger(block(40, 2, sag=1.2)))
+    far = int(np.argmax(model.mesh.points[model.pad.nodes, 1]))
+    status = np.where(np.arange(state.status.size) == far, STICK, OPEN)
+    linear.choose_candidates(replace(state, status=status), 0.11)
+    known = len(linear.candidates)
+    linear.choose_candidates(state, 0.5)
+    assert len(linear.candidates) > known
+    assert far in linear.candidates
 
 
 # -- the condensed body ----------------------------------------------------------------------------------
@@ -136,7 +148,8 @@ HISTORIES = [
     ([1e-2, 1e-3], False),  # five more tenths
     ([1e-2, 4e-3], True),  # fourteen more
     ([1e-3, 6e-4], True),  # stalls
-    ([1e-3, 0.2], True),  # far away
+    ([1e-3, 2e-3], True),  # grows
+    ([10.0, 0.2], True),  # still far away, however quick
     ([2e-8, 9e-9], False),  # there
 ]
 
@@ -178,18 +191,27 @@ def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
     assert linear.renew(state, [1.0]) == anew
 
 
-def test_a_resumed_run_makes_the_same_factorisation_again():
-    """To the last bit, although the state it goes on from is another one."""
-    linear, model, state = made(voltage=2000.0)
+@pytest.mark.parametrize("how", ["air", "no air", "frozen"])
+def test_a_resumed_run_makes_the_same_factorisation_again(how):
+    """To the last bit, although the state it goes on from is another one; who touched then carries the
+    attraction where there is no air."""
+    options = {"voltage": 2000.0, "air_layer": how != "no air"}
+    linear, model, state = made(**options)
     state = bent(model, state)
+    linear.begin(
+        replace(state, status=np.where(np.arange(state.status.size) % 2, STICK, OPEN)), how == "frozen"
+    )
     linear.choose_candidates(state, 0.6)
     linear.factorise(state)
     at, before = linear.carried, linear.condensed
-    again, _, rest = made(voltage=2000.0)
+    again, _, rest = made(**options)
     again.candidates = linear.candidates
     again.restore(replace(rest, u=0.5 * state.u, voltage=10.0), at)
     np.testing.assert_array_equal(again.condensed.schur, before.schur)
     np.testing.assert_array_equal(again.condensed.compliance, before.compliance)
+    # which is that of the voltage, but where it is frozen
+    again.restore(rest, replace(at, voltage=1000.0))
+    assert np.array_equal(again.condensed.compliance, before.compliance) == (how == "frozen")
 
 
 # -- the attraction's part -------------------------------------------------------------------------------
