@@ -79,8 +79,8 @@ for name, found in comparisons.items():
 # %% [markdown]
 # ## 4. Look at both
 #
-# What is left of the exact signal's error lies in the first steps: while the pad sticks, no voltage changes the
-# force, and the signal keeps the value it had.
+# What is left of the exact signal's error lies in the first steps: while the pad sticks, no voltage changes
+# the force, and the signal keeps the value it had.
 
 # %%
 slides = np.array(real.result.motion) == "slide"
