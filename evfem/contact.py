@@ -161,7 +161,9 @@ def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints, snap: bool =
             continue
         if _feedback(problem, pull, found.status)[0] < 1.0:
             return found
-    share = STABLE / max(_feedback(problem, pull, np.full(problem.size, OPEN))[0], STABLE)
+    # the closed nodes hold a body whose own compliance the attraction has made negative
+    ways = (np.full(problem.size, OPEN), status)
+    share = STABLE / max(STABLE, *(_feedback(problem, pull, way)[0] for way in ways))
     held = replace(problem, pull=replace(pull, fall=share * pull.fall))
     return replace(solve_contact(held, status), reduced=True)
 

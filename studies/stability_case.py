@@ -175,6 +175,8 @@ def judge(case: Case) -> Found:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
+            # walls and noise finer than the nodes are what some cases are about
+            warnings.filterwarnings("ignore", "the surface is (sharper|rougher) than the node spacing")
             passed, said = case.function(log)
         outcome = "passed" if passed else "wrong"
         if passed and log.refused:

@@ -60,7 +60,9 @@ def rollers(u: Any, v: Any, w: Any) -> Any:
     return 1e4 * u[0] * v[0]
 
 
-GAP, WIDTH, E, NU = 0.005, 4.0, 0.05, 0.45
+#: wider than about three thicknesses, a nearly incompressible layer would wrinkle below the plate's pull-in
+#: (10.1103/PhysRevLett.86.119)
+GAP, WIDTH, E, NU = 0.005, 0.5, 0.05, 0.45
 THIN_LAYER = Layer(thickness=0.01, eps_r=3.35)
 SKIN_AND_INSULATOR = Layers.of(Layer(0.38, 1650.0), THIN_LAYER)
 
@@ -198,7 +200,9 @@ def _staggered(log: Log) -> Verdict:
 
 
 def _thin(log: Log, law: str, thickness: float) -> Verdict:
-    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width."""
+    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width. Under
+    Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
+    """
     display = Display(Layer(thickness, 3.35), friction=0.3)
     motion = Press(force=0.05, steps=5), Slide(3.0, steps=15)
     result = log.simulate(scene(pad(), display, *motion, law=LAWS[law], voltage=140.0))
@@ -207,16 +211,18 @@ def _thin(log: Log, law: str, thickness: float) -> Verdict:
     least = float(closed) * float(result.real_contact_width[4])
     share = float(result.electrostatic_force[4]) / least
     ratio = float(result.tangential_force[-1] / result.normal_force[-1])
-    good = share > 1.0 - 1e-9 and abs(ratio - 0.3) < 1e-6
+    in_cone = 0.0 < ratio < 0.3 if law == "strong_troxel" else abs(ratio - 0.3) < 1e-6
+    good = share > 1.0 - 1e-9 and in_cone
     said = f"F_e {result.electrostatic_force[4]:.4g} N/mm = {share:.3f} p(0) w, p(0) = {1e3 * closed:.3g} kPa"
     return good, f"{said}; F_t/F_n = {ratio:.7f} after 3 mm"
 
 
+_ENDS = {"strong_troxel": "sticks, F_t < 0.3 F_n", "kaczmarek": "slides in full, F_t = 0.3 F_n"}
 for _law in LAWS:
     for _thickness in (1e-3, 2e-4, 5e-5):
         THIN.case(
             f"{1e6 * _thickness:g} nm {_law}",
-            "140 V: touching skin carries p(0), friction follows the normal force",
+            f"140 V: touching skin carries p(0), the pad {_ENDS[_law]}",
             quick=_thickness == 1e-3 and _law == "kaczmarek",
         )(partial(_thin, law=_law, thickness=_thickness))
 

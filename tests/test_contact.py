@@ -297,3 +297,15 @@ def test_an_attraction_that_can_be_held_is_taken_whole_and_a_closed_node_feels_a
     pressed = solve_pulled(problem, pull, np.array([FORWARD]))
     assert pressed.status.tolist() == [FORWARD]
     assert pressed.force[0] == pytest.approx(12.0 - 0.98 / 0.1, rel=1e-12)
+
+
+def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_surface():
+    # the closed node 1 holds a body whose own compliance is negative: feedback on node 0 is 8, alone it is -1
+    compliance = np.zeros((4, 4))
+    compliance[:2, :2] = [[-1.0, 3.0], [3.0, -1.0]]
+    problem = ContactProblem(np.array([-2.53, 1.0, 0.0, 0.0]), compliance, np.zeros(2))
+    pull = Pull(np.array([1.0, 0.0]), np.array([0.5, 0.0]), np.zeros(2))
+    found = solve_pulled(problem, pull, np.array([OPEN, FORWARD]))
+    # under the present attraction it would drift by -0.03; the fall is reduced to a feedback of 0.9
+    assert found.reduced
+    assert found.state[0] == pytest.approx(0.5 - 0.03 / (1.0 - 0.9))
