@@ -63,7 +63,8 @@ class Linearisation:
         dynamics = self.body.dynamics
         if dynamics is None:
             return
-        self._outdated = not 0.67 * dynamics.step <= duration <= 1.5 * dynamics.step
+        if self._made is not None:
+            self._outdated = not 0.67 * self._made.duration <= duration <= 1.5 * self._made.duration
         dynamics.begin(old.u, old.velocity, duration)
 
     def choose_candidates(self, state: State, reach: float) -> None:

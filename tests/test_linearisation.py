@@ -191,6 +191,22 @@ def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
     assert linear.renew(state, [1.0]) == anew
 
 
+def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_longer():
+    body = replace(ROUND, viscosity=0.01)
+    motion = [Press(indentation=0.1, speed=1.0)]
+    scene = Scene(body, Display(y=-0.1), motion=motion, solver=Solver(dynamics="viscous"))
+    model = make_model(scene)
+    linear, state = model.equilibrium.linear, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear.choose_candidates(state, 0.2)
+    linear.start_clock(state, 1e-3)
+    linear.factorise(state)
+    renewed = []
+    for factor in (1.4, 1.4**2):
+        linear.start_clock(state, factor * 1e-3)
+        renewed.append(linear.renew(state, [1.0]))
+    assert renewed == [False, True]
+
+
 @pytest.mark.parametrize("how", ["air", "no air", "frozen"])
 def test_a_resumed_run_makes_the_same_factorisation_again(how):
     """To the last bit, although the state it goes on from is another one; who touched then carries the
