@@ -282,7 +282,8 @@ def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end
 def test_a_finished_run_can_be_resumed_without_harm(finished):
     folder = finished[0]
     before = history(folder / "square-out")
-    status, out, _ = evfem_command(folder, "run", "square.toml", "--resume")
+    status, out, err = evfem_command(folder, "run", "square.toml", "--resume")
+    assert err == "evfem: the run in square-out is complete, nothing is left to compute\n"
     assert status == 0
     assert history(folder / "square-out") == before
     assert len(indexed_files(folder / "square-out")) == 3
