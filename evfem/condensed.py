@@ -15,7 +15,7 @@ changes in every iteration but touches only the nodes near contact, so it is put
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -88,12 +88,22 @@ class Condensed:
 
     schur: Floats
     compliance: Floats
+    _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
     def make(cls, schur: Floats, coupling: Floats | None) -> Condensed:
         """From S (m, m) and the attraction's stiffness between nodes (m - 2, m - 2), or None."""
         inner = schur[:-2, :-2] if coupling is None else schur[:-2, :-2] - coupling
         return cls(schur, _inverse(inner, symmetric=coupling is None))
+
+    def among(self, near: Ints) -> Floats:
+        """Compliance among these candidates (2 k, 2 k), y before x; they are often those of the last call."""
+        key = near.tobytes()
+        if key not in self._last:
+            rows = y_before_x(near)
+            self._last.clear()
+            self._last[key] = self.compliance[np.ix_(rows, rows)]
+        return self._last[key]
 
     @cached_property
     def bone_rows(self) -> Floats:
@@ -172,32 +182,34 @@ class Step:
         return np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
-        """Candidates' motion (2 c,) by forces (2 k,) on the near ones."""
-        force = np.zeros((self.candidates.status.size, 2))
-        force[near] = pushed.reshape(-1, 2)
-        return self.body.compliance @ force.ravel()
+        """Candidates' motion (2 c,) by forces (2 k,), y before x, on the near ones."""
+        force = np.zeros(2 * self.candidates.status.size)
+        force[y_before_x(near)] = pushed
+        return self.body.compliance @ force
 
     def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,) that move the body,
-        turning included.
+        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y before x, that
+        move the body, turning included.
         """
-        known = self.candidates
-        rows = (2 * near[:, None] + np.array([0, 1])).ravel()
-        C, W = self.body.compliance[np.ix_(rows, rows)], free[rows]
+        known, rows = self.candidates, y_before_x(near)
         turning = Turning.of(known, near)
-        C, W = turning.soften(C, W)
+        C, W = turning.soften(self.body.among(near), free[rows])
         axes = known.axes[near]
         start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
             [known.frame.normal_gap[near], known.slip[near]]
         )
         compliance = _local(axes, _local(axes, C).T).T
-        compliance[np.diag_indices_from(compliance)] += known.softness[near].T.ravel()
+        if known.softness.any():
+            compliance = compliance + np.diag(known.softness[near].T.ravel())
         border = self._border(rows, free, (C, W), turning, axes) if self.unknowns else None
         problem = ContactProblem(start, compliance, known.friction[near], border)
         pull = Pull(known.fall[near], known.frame.normal_gap[near], known.closing[near])
         found = solve_pulled(problem, pull, status, self.snap)
-        force = np.einsum("ak,kab->kb", (found.force + found.relief).reshape(2, -1), axes).ravel()
-        return found, force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
+        pressed = (found.force + found.relief).reshape(2, -1)
+        force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
+        if turning.loaded.size:
+            force = force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
+        return found, force
 
     def _border(
         self, rows: Ints, free: Floats, near: tuple[Floats, Floats], turning: Turning, axes: Floats
@@ -222,8 +234,8 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces per x displacement of
-    the loaded nodes.
+    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y per x
+    displacement of the loaded nodes. Components of others come y before x.
     """
 
     size: int
@@ -243,22 +255,21 @@ class Turning:
         """
         if not self.loaded.size:
             return C, W
-        x = 2 * self.loaded
-        B = C[:, x] * self.rate[:, 0] + C[:, x + 1] * self.rate[:, 1]
+        x, y = self.size + self.loaded, self.loaded
+        B = C[:, x] * self.rate[:, 0] + C[:, y] * self.rate[:, 1]
         gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
         return C + gain @ C[x], W + gain @ W[x]
 
     def force(self, moved: Floats) -> Floats:
         """Change of the forces (2 k,) by displacements (2 k,)."""
-        change = np.zeros((self.size, 2))
-        change[self.loaded] = self.rate * moved[2 * self.loaded, None]
+        change = np.zeros((2, self.size))
+        change[:, self.loaded] = self.rate.T[::-1] * moved[self.size + self.loaded]
         return change.ravel()
 
     def transposed(self, rows: Floats) -> Floats:
         """Rows (p, 2 k) times T."""
-        through = np.zeros_like(rows)
-        loaded = rows.reshape(len(rows), -1, 2)[:, self.loaded]
-        through[:, 2 * self.loaded] = np.einsum("pak,ak->pa", loaded, self.rate)
+        through, x = np.zeros_like(rows), self.size + self.loaded
+        through[:, x] = rows[:, x] * self.rate[:, 0] + rows[:, self.loaded] * self.rate[:, 1]
         return through
 
 
@@ -274,10 +285,15 @@ def _inverse(matrix: Floats, symmetric: bool) -> Floats:
     return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
 
 
+def y_before_x(nodes: Ints) -> Ints:
+    """Rows (2 k,) of these nodes among interleaved x and y components."""
+    return np.concatenate([2 * nodes + 1, 2 * nodes])
+
+
 def _local(axes: Floats, columns: Floats) -> Floats:
-    """Columns (2 k, m) of interleaved laboratory components as (all normal, all tangential) components."""
-    x, y = columns[0::2], columns[1::2]
+    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat surface."""
     if not axes[:, 0, 0].any():
-        return np.concatenate([y, x])
+        return columns
+    y, x = columns.reshape(2, len(axes), -1)
     normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
     return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])

@@ -211,7 +211,7 @@ def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_lo
 def test_a_resumed_run_makes_the_same_factorisation_again(how):
     """To the last bit, although the state it goes on from is another one; who touched then carries the
     attraction where there is no air."""
-    options = {"voltage": 2000.0, "air_layer": how != "no air"}
+    options = {"voltage": 2e5, "air_layer": how != "no air"}
     linear, model, state = made(**options)
     state = bent(model, state)
     linear.begin(
@@ -226,7 +226,7 @@ def test_a_resumed_run_makes_the_same_factorisation_again(how):
     np.testing.assert_array_equal(again.condensed.schur, before.schur)
     np.testing.assert_array_equal(again.condensed.compliance, before.compliance)
     # which is that of the voltage, but where it is frozen
-    again.restore(rest, replace(at, voltage=1000.0))
+    again.restore(rest, replace(at, voltage=1e5))
     assert np.array_equal(again.condensed.compliance, before.compliance) == (how == "frozen")
 
 
