@@ -34,7 +34,6 @@ from .peers_problem import (
 LATE = ("evfem.model", "evfem.scenefile", "skfem", "tqdm.auto", "scipy.sparse.linalg")
 FAST = (
     "evfem.kernels",
-    "pypardiso",
     "numba.np.arraymath",
     "numba.np.linalg",
     "numba.np.npyimpl",
@@ -60,7 +59,11 @@ def evfem_scene(scene: str, element: str, level: int) -> Scene:
 def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
     for name in LATE + (FAST if find_spec("numba") and find_spec("pypardiso") else ()):
         import_module(name)
+    from evfem.linear import pardiso_library
     from evfem.simulate import simulate
+
+    if find_spec("pypardiso"):
+        pardiso_library()
 
     def solve(scene: str, element: str, level: int) -> dict[str, Any]:
         result = simulate(evfem_scene(scene, element, level))
