@@ -27,7 +27,7 @@ from evfem.state import Limits, Linearised, Record, State, StepFailed
 SPARE = 1.5
 #: an attraction that falls with the gap by more than this share of the tissue's shear modulus over its height
 #: makes its node a candidate
-SOFT = 0.1
+SOFT = 0.02
 #: changes of tributary lengths that stiffen no node by more than this share are left to the iterations
 FAINT = 0.01
 
