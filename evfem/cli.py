@@ -239,8 +239,6 @@ def _run(given: argparse.Namespace) -> int:
 
     path = given.out or Path(f"{scene.name}-out")
     resume = saved(path, scene) if given.resume else None
-    if resume is not None and len(resume.rows) == scene.total_steps:
-        notices.tell(f"the run in {path} is complete, nothing is left to compute")
     folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
     progress = sys.stderr.isatty()
     observers: list[Observer] = [folder] if progress else [folder, _Milestones()]
@@ -254,6 +252,8 @@ def _run(given: argparse.Namespace) -> int:
             raise
         _finish(folder, None)
         return _say(f"interrupted; {len(folder.rows)} steps are in {path}, go on with --resume", INTERRUPTED)
+    if resume is not None and len(resume.rows) == scene.total_steps:
+        notices.tell(f"the run in {path} is complete, nothing is left to compute")
     _finish(folder, result)
     return DONE
 
