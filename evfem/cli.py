@@ -20,13 +20,13 @@ from types import ModuleType
 from typing import TYPE_CHECKING, NoReturn
 
 import evfem
-from evfem import notices
+from evfem.common import notices
 from evfem.errors import InputError, NotConverged, StorageError
 
 if TYPE_CHECKING:
     from evfem.protocols import Observer
     from evfem.runfolder import RunFolder
-    from evfem.scene import Scene
+    from evfem.scene.scene import Scene
 
 DONE, BAD_INPUT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
@@ -224,10 +224,10 @@ def _say(message: object, status: int) -> int:
 
 def _scene(path: Path | None) -> Scene:
     if path is None:
-        from evfem.scene import default_scene
+        from evfem.scene.scene import default_scene
 
         return default_scene()
-    from evfem.scenefile import load
+    from evfem.scene.file import load
 
     return load(path)
 
@@ -235,7 +235,7 @@ def _scene(path: Path | None) -> Scene:
 def _run(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
     from evfem.runfolder import RunFolder, saved
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
 
     path = given.out or Path(f"{scene.name}-out")
     resume = saved(path, scene) if given.resume else None
@@ -260,7 +260,7 @@ def _run(given: argparse.Namespace) -> int:
 
 def _finish(folder: RunFolder, result: object) -> None:
     """Write what is left to write and print the table; a second Ctrl-C does not tear the files."""
-    from evfem.report import table
+    from evfem.runfolder import table
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     summary = folder.close(result)  # type: ignore[arg-type]
@@ -282,7 +282,7 @@ class _Milestones:
 
 
 def _plan(given: argparse.Namespace) -> int:
-    from evfem.plan import plan
+    from evfem.scene.plan import plan
 
     scene = _scene(given.scene)
     with notices.status("building the mesh"):
@@ -317,9 +317,9 @@ def _studies() -> ModuleType:
 
 
 def _sweep(given: argparse.Namespace) -> int:
-    from evfem.sweep import sweep, told
-    from evfem.sweepfile import load
-    from evfem.sweepfolder import TABLE
+    from evfem.sweeps.file import load
+    from evfem.sweeps.folder import TABLE
+    from evfem.sweeps.run import sweep, told
 
     plan = load(given.sweep)
     path = given.out or Path(f"{plan.name}-out")
@@ -338,8 +338,8 @@ def _sweep(given: argparse.Namespace) -> int:
 
 def _mesh(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
-    from evfem.meshfile import write
-    from evfem.plan import scene_mesh
+    from evfem.mesh.file import write
+    from evfem.scene.plan import scene_mesh
 
     with notices.status("building the mesh"):
         mesh, _ = scene_mesh(scene)
@@ -353,7 +353,7 @@ def _mesh(given: argparse.Namespace) -> int:
 
 
 def _signal(given: argparse.Namespace) -> int:
-    from evfem.signalfile import Playback, read_signal, write_signal
+    from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
     playback = None
     if given.full_scale is not None:

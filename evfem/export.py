@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from evfem import meshfile
+from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
-from evfem.mesh import Mesh
-from evfem.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
-from evfem.storage import replacing, write_text
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
+from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
 
 #: steps at which neither time nor position advances are told apart by this much (s or mm)
 INSTANT = 1e-9
@@ -55,7 +55,7 @@ def write_frame(mesh: Mesh, frame: Frame, path: str | Path) -> None:
 
 
 class ParaViewSeries:
-    """Writes a series while a run goes on: an observer of `evfem.simulate`, or fed by `add`.
+    """Writes a series while a run goes on: an observer of `evfem.simulation.run`, or fed by `add`.
 
     Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the time
     if time passes, else the position; see `instants`. `earlier` rows belong to a run that is continued:

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
-from evfem.mesh import Floats, Ints, Mesh
-from evfem.result import POINT_FIELDS, Frame, Result
+from evfem.mesh.mesh import Mesh
+from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

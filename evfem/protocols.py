@@ -81,7 +81,7 @@ class Surface(Protocol):
 
 @runtime_checkable
 class CompleteSurface(Surface, Protocol):
-    """Everything that contact asks of a surface; `evfem.ownsurface.completed` gives it to any `Surface`."""
+    """Everything that contact asks of a surface; `evfem.contact.own.completed` gives it to any `Surface`."""
 
     @property
     def y(self) -> float | None:

@@ -14,8 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from evfem.checks import real
-from evfem.electrostatics import Layers, eps_0
+from evfem.common.checks import real
+from evfem.electrostatics.laws import Layers, eps_0
 from evfem.errors import InputError
 from evfem.tensor import Array
 
@@ -289,7 +289,7 @@ def pull_in_strong_troxel(stiffness: float, gap: float, area: float, layers: Lay
     U = sqrt(8 k (g0 + s)^3 / (27 eps_0 A)). It snaps only if x <= g0. Source: S. D. Senturia, Microsystem
     Design, 2001, doi:10.1007/b117574, section 6.4, with the layers' reduced thickness s added to the gap.
 
-    >>> from evfem.electrostatics import Layer
+    >>> from evfem.electrostatics.laws import Layer
     >>> table_2 = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(pull_in_strong_troxel(stiffness=0.1, gap=0.25, area=100.0, layers=table_2).voltage, 3)
     843.789
@@ -305,7 +305,7 @@ def pull_in_kaczmarek(stiffness: float, gap: float, area: float, layers: Layers)
     With a = g0 + s, b = g0 + D the voltage U = sqrt(2 k x (a - x)(b - x) / (eps_0 A)) that holds the plate
     at travel x is largest at x = ((a + b) - sqrt(a^2 - a b + b^2)) / 3.
 
-    >>> from evfem.electrostatics import Layer
+    >>> from evfem.electrostatics.laws import Layer
     >>> table_2 = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(pull_in_kaczmarek(stiffness=0.1, gap=0.25, area=100.0, layers=table_2).voltage, 3)
     1598.737

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from evfem.studies.benchmark import benchmark_mesh
 
-from evfem import meshfile
-from evfem.fingerpad import FingerPad
-from evfem.mesh import Mesh
+from evfem.finger.fingerpad import FingerPad
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
 
 
 def triangles(mesh: Mesh) -> Mesh:

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from evfem.common.arrays import Ints
 from evfem.errors import InputError
-from evfem.mesh import Ints, Mesh, raised
+from evfem.mesh.mesh import Mesh, raised
 
 #: Semi-axes (A, B) in mm of the bone, the interface and the outer contour.
 BONE, INTERFACE, OUTER = (3.0, 2.5), (7.96, 6.015), (8.34, 6.395)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evfem import data
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.common.storage import replacing, write_text
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 from evfem.errors import StorageError
-from evfem.result import versions
-from evfem.storage import replacing, write_text
+from evfem.simulation.result import versions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

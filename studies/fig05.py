@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Kaczmarek, Layer
+from evfem.electrostatics.laws import Kaczmarek, Layer
 
 from .common import (
     CASES,
@@ -82,11 +82,11 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 @cache
 def hover_force(ridges: bool, gap: float, voltage: float, resolution: str = "medium") -> float:
     """Attraction in N/mm of Table 2's deformable finger held `gap` mm above the display, Kaczmarek's law."""
-    from evfem.fingerpad import FingerPad
-    from evfem.motion import Hover
-    from evfem.scene import Scene
-    from evfem.simulate import simulate
-    from evfem.surfaces import Display
+    from evfem.contact.surfaces import Display
+    from evfem.finger.fingerpad import FingerPad
+    from evfem.scene.motion import Hover
+    from evfem.scene.scene import Scene
+    from evfem.simulation.run import simulate
 
     table = data.load("table2")
     display = Display(insulator=Layer(table.value("d_i"), table.value("eps_i")), friction=table.value("mu"))

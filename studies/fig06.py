@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Layer, Layers
-from evfem.encoding import AreaLaw, Encoding, fit_area_to_friction
+from evfem.electrostatics.encoding import AreaLaw, Encoding, fit_area_to_friction
+from evfem.electrostatics.laws import Layer, Layers
 
 from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
 

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Layer, Layers
-from evfem.forces import plate_force
+from evfem.electrostatics.forces import plate_force
+from evfem.electrostatics.laws import Layer, Layers
 
 from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from evfem.forces import plate_force
+from evfem.electrostatics.forces import plate_force
 
 from . import hover
 from .common import LAWS, Study, table2_layers

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.forces import EllipsoidalPad, pad_force
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force
 
 from . import hover
 from .common import CASES, LAWS, Study, table2_layers

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from evfem import data
-from evfem.encoding import AreaLaw, PowerFit, fit_power
+from evfem.electrostatics.encoding import AreaLaw, PowerFit, fit_power
 
 from . import fig11_panels
 from .common import LAWS, Floats, Series, Study, table2_layers

@@ -13,15 +13,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
-from evfem.mesh import Mesh
-from evfem.model import placed
+from evfem.mesh.mesh import Mesh
 from evfem.plotting import deformed
-from evfem.rendering import Recording, apparent_friction, record, replay, voltage_for
-from evfem.result import Frame, Result
-from evfem.scene import Output, Slide
-from evfem.surfaces import Display
+from evfem.scene.motion import Slide
+from evfem.scene.scene import Output
+from evfem.simulation.model import placed
+from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
+from evfem.simulation.result import Frame, Result
 
 from .common import COLOURS, Floats, Series, Study, make_folder, new_figure
 from .rendered import (

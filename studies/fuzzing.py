@@ -2,7 +2,7 @@
 
 `fuzz(count, seed)` makes `count` files per format and counts what became of them; `try_file` is one of them.
 Scenes go through `evfem plan`; profiles, voltage files and meshes through `evfem run` of one step on a small
-square; checkpoints through `evfem run --resume`; saved results through `evfem.result.load`. A failure is
+square; checkpoints through `evfem run --resume`; saved results through `Result.load`. A failure is
 anything but exit status 0, 2 or 3, a message of more than one line, a warning, anything left behind by a
 refused file, more than `LONGEST` CPU seconds, or a file that a pickled object would have made. The other
 half, runs that are killed, is in `evfem.studies.killing`.
@@ -28,14 +28,16 @@ from types import FrameType
 
 import numpy as np
 
-from evfem import cli, meshfile, scenefile
+from evfem import cli
+from evfem.common.storage import save_arrays
+from evfem.electrostatics.signalfile import Playback, write_signal
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.mesh import Mesh
-from evfem.result import load
-from evfem.signalfile import Playback, write_signal
-from evfem.signals import VoltageProfile
-from evfem.simulate import simulate
-from evfem.storage import save_arrays
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
+from evfem.scene import file as scenefile
+from evfem.simulation.result import load
+from evfem.simulation.run import simulate
 
 from .killing import head, kills
 from .mutations import mutated, mutated_arrays, mutated_text

@@ -21,11 +21,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from evfem import meshfile
-from evfem.result import COLUMNS
-from evfem.scenefile import load
-from evfem.storage import load_arrays
-from evfem.vturead import read
+from evfem.common.storage import load_arrays
+from evfem.mesh import file as meshfile
+from evfem.mesh.vtu import read
+from evfem.scene.file import load
+from evfem.simulation.result import COLUMNS
 
 from .stability_scenes import block
 

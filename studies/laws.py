@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Layer, eps_0
-from evfem.forces import EllipsoidalPad, pad_force_per_depth
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth
+from evfem.electrostatics.laws import Layer, eps_0
 from evfem.reference import cylinder_force
 
 from .common import (

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.forces import EllipsoidalPad, pad_force
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force
 
 from .common import CASES, LAWS, Floats, participants, table2_layers
 

@@ -8,7 +8,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import TypeVar
 
-from evfem.notices import LOG
+from evfem.common.notices import LOG
 
 Argument = TypeVar("Argument")
 Answer = TypeVar("Answer")

@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.forces import pad_force, pad_force_per_depth
-from evfem.sweep import SweepResult, sweep
-from evfem.sweepfile import Sweep
+from evfem.electrostatics.forces import pad_force, pad_force_per_depth
+from evfem.sweeps.file import Sweep
+from evfem.sweeps.run import SweepResult, sweep
 
 from .common import (
     CASES,
@@ -115,7 +115,7 @@ def plan(names: list[str]) -> Sweep:
 
 
 def _finger(width: float, height: float) -> dict[str, float]:
-    from evfem.fingerpad import FingerPad
+    from evfem.finger.fingerpad import FingerPad
 
     usual = FingerPad()
     keys = {f"finger.{name}": getattr(usual, name) * width / usual.width for name in SCALED}

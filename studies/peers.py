@@ -16,7 +16,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from evfem.storage import write_text
+from evfem.common.storage import write_text
 
 from .common import Study, make_folder
 from .peers_hosts import PACKAGES, missing, run_once

@@ -16,11 +16,12 @@ import numpy as np
 import scipy.sparse as sparse
 from pypardiso import PyPardisoSolver
 
-from evfem.attraction import Attraction
-from evfem.electrostatics import Kaczmarek
-from evfem.mesh import Floats, Ints, Mesh
-from evfem.pad import make_pad
-from evfem.surfaces import Flat
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.attraction import Attraction
+from evfem.contact.pad import make_pad
+from evfem.contact.surfaces import Flat
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.mesh.mesh import Mesh
 
 from .peers_apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
 from .peers_problem import (

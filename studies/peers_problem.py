@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Layer, Layers, eps_0
-from evfem.materials import NeoHookean
-from evfem.mesh import Mesh
+from evfem.electrostatics.laws import Layer, Layers, eps_0
+from evfem.mesh.mesh import Mesh
+from evfem.tissue.laws import NeoHookean
 
 from .benchmark import benchmark_mesh
 from .common import Floats

@@ -14,9 +14,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from evfem.fingerpad import Electrical, MeshedFinger
-from evfem.scene import Output, Press, Scene, Slide, Solver
-from evfem.surfaces import Display
+from evfem.contact.surfaces import Display
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
 
 from .peers_apart import measured
 from .peers_problem import (
@@ -31,9 +32,9 @@ from .peers_problem import (
 )
 
 #: what evfem would import while it runs, and what more with its extra `fast`
-LATE = ("evfem.model", "evfem.scenefile", "skfem", "tqdm.auto", "scipy.sparse.linalg")
+LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "scipy.sparse.linalg")
 FAST = (
-    "evfem.kernels",
+    "evfem.tissue.kernels.elastic",
     "numba.np.arraymath",
     "numba.np.linalg",
     "numba.np.npyimpl",
@@ -43,7 +44,7 @@ FAST = (
 
 def evfem_scene(scene: str, element: str, level: int) -> Scene:
     """The scene for evfem."""
-    from evfem.electrostatics import Kaczmarek
+    from evfem.electrostatics.laws import Kaczmarek
 
     electrical = Electrical(STRATUM_CORNEUM.thickness, STRATUM_CORNEUM.eps_r)
     finger = MeshedFinger(scene_mesh(element, level), MATERIALS, electrical)
@@ -59,8 +60,8 @@ def evfem_scene(scene: str, element: str, level: int) -> Scene:
 def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
     for name in LATE + (FAST if find_spec("numba") and find_spec("pypardiso") else ()):
         import_module(name)
-    from evfem.linear import pardiso_library
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
+    from evfem.solver.condensation import pardiso_library
 
     if find_spec("pypardiso"):
         pardiso_library()

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.motion import Press, Slide
-from evfem.scene import Output, Scene, Solver
-from evfem.surfaces import Flat
+from evfem.contact.surfaces import Flat
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
 
 from .benchmark import divided_mesh
 from .common import Series
@@ -73,7 +73,7 @@ def measure_sizes(questions: Sequence[Sequence[int]]) -> list[dict[str, float]]:
 
 def _measured(divisions: tuple[int, int, int], rounds: int) -> Size:
     """One size, run so many times; the least of every step counts."""
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
 
     imported, costs = resident_MB(), []
     for _ in range(rounds):

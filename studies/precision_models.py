@@ -9,8 +9,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from evfem.electrostatics import Kaczmarek
-from evfem.forces import EllipsoidalPad, pad_force_per_depth, plate_force
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth, plate_force
+from evfem.electrostatics.laws import Kaczmarek
 
 from .benchmark import OUTER
 from .peers_problem import LAYERS

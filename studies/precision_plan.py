@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek
-from evfem.fingerpad import FingerPad
-from evfem.motion import Press
-from evfem.result import Result
-from evfem.scene import Output, Scene
-from evfem.strategy import Strategy
-from evfem.surfaces import Display
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.motion import Press
+from evfem.scene.scene import Output, Scene
+from evfem.simulation.result import Result
+from evfem.solver.strategy import Strategy
 
 from .peers_problem import INSULATOR, PLANE
 from .precision_apart import import_s
@@ -122,7 +122,7 @@ def measured(quick: bool) -> list[Saving]:
 
 def saving(row: Row, rounds: int) -> Saving:
     """Both scenes in turn."""
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
 
     def timed(scene: Scene) -> tuple[float, Result]:
         gc.collect()
@@ -148,7 +148,10 @@ def changed(one: Result, other: Result) -> float:
 
 def closed_forms() -> Saving:
     """Importing the closed forms against importing what a simulation needs, each in new processes."""
-    laws, everything = ["evfem.forces"], ["evfem.model", "evfem.simulate", "skfem", "scipy.sparse.linalg"]
+    laws, everything = (
+        ["evfem.electrostatics.forces"],
+        ["evfem.simulation.model", "evfem.simulation.run", "skfem", "scipy.sparse.linalg"],
+    )
     found = [import_s(laws) for _ in range(ROUNDS)]
     if any(heavy for _, heavy in found):
         raise RuntimeError(f"the closed forms import {found[0][1]}")

@@ -38,7 +38,7 @@ class Run:
 
 def warm_up() -> None:
     """Import and compile what the cases need, for every element."""
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
 
     for element in ELEMENTS:
         simulate(build(Case("hover", 0, element)))
@@ -46,7 +46,7 @@ def warm_up() -> None:
 
 def measure(case: Case, rounds: int = ROUNDS) -> Run:
     """Run a case so many times, or until it takes long, and keep the least."""
-    from evfem.simulate import simulate
+    from evfem.simulation.run import simulate
 
     least = float("inf")
     for _ in range(rounds):

@@ -12,13 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek
-from evfem.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.mesh import Mesh
-from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
-from evfem.result import Result
-from evfem.scene import Output, Scene, Solver
-from evfem.surfaces import Display
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.result import Result
 
 from .benchmark import benchmark_mesh
 from .peers_problem import (

@@ -18,8 +18,8 @@ from unittest.mock import patch
 
 import numpy as np
 
-from evfem.motion import Press, Slide
-from evfem.scene import Scene
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene
 
 from .precision_growth import Clock
 from .precision_runs import warm_up
@@ -29,21 +29,24 @@ PARTS = ("assembly", "factorisation", "solve", "contact", "output", "rest")
 #: part -> module, class (or none) and functions that do its work
 WORK: Mapping[str, tuple[tuple[str, str, tuple[str, ...]], ...]] = {
     "assembly": (
-        ("body", "Body", ("forces", "tangent")),
-        ("assembly", "Tissue", ("smallest_J",)),
+        ("tissue.body", "Body", ("forces", "tangent")),
+        ("tissue.weakform", "Tissue", ("smallest_J",)),
     ),
-    "factorisation": (("linear", "Pardiso", ("factorise",)), ("linear", "SuperLU", ("factorise",))),
+    "factorisation": (
+        ("solver.condensation", "Pardiso", ("factorise",)),
+        ("solver.condensation", "SuperLU", ("factorise",)),
+    ),
     "solve": (
-        ("linear", "Pardiso", ("forward", "backward")),
-        ("linear", "SuperLU", ("forward", "backward")),
+        ("solver.condensation", "Pardiso", ("forward", "backward")),
+        ("solver.condensation", "SuperLU", ("forward", "backward")),
     ),
     "contact": (
-        ("condensed", "Step", ("solve",)),
-        ("condensed", "", ("_inverse",)),
-        ("interface", "Interface", ("describe", "obeyed", "deepest", "contact_forces")),
-        ("linearisation", "Linearisation", ("choose_candidates",)),
+        ("contact.condensed", "Step", ("solve",)),
+        ("contact.condensed", "", ("_inverse",)),
+        ("solver.interface", "Interface", ("describe", "obeyed", "deepest", "contact_forces")),
+        ("solver.linearisation", "Linearisation", ("choose_candidates",)),
     ),
-    "output": (("ledger", "Ledger", ("accept", "row")), ("simulate", "", ("frame_of",))),
+    "output": (("simulation.ledger", "Ledger", ("accept", "row")), ("simulation.run", "", ("frame_of",))),
 }
 #: ways through the run: which steps; everything slips from s = 2.7 mm on, and the last step keeps its fields
 PHASES = {"press": slice(0, 20), "stick_slip": slice(20, 44), "full_slip": slice(47, 49)}
@@ -106,8 +109,8 @@ def measure_shares(questions: Sequence[int]) -> list[dict[str, float]]:
 
 def measured(level: int) -> dict[str, float]:
     """One run on a level of the benchmark."""
-    from evfem.model import Model
-    from evfem.simulate import Run
+    from evfem.simulation.model import Model
+    from evfem.simulation.run import Run
 
     begin = time.process_time()
     usual = build(Case("B", level))

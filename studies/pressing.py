@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from evfem import data
-from evfem.contactedge import contact_spans, outline_nodes
-from evfem.electrostatics import Layer, Layers
-from evfem.fingerpad import TABLE_2, FingerPad
-from evfem.materials import NeoHookean
-from evfem.mesh import layer_thickness
-from evfem.motion import Press, VoltageRamp
-from evfem.result import Frame, Result, Saved
-from evfem.scene import Scene
-from evfem.simulate import simulate
-from evfem.surfaces import Display
+from evfem.contact.edge import contact_spans, outline_nodes
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Layer, Layers
+from evfem.finger.fingerpad import TABLE_2, FingerPad
+from evfem.mesh.mesh import layer_thickness
+from evfem.scene.motion import Press, VoltageRamp
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Frame, Result, Saved
+from evfem.simulation.run import simulate
+from evfem.tissue.laws import NeoHookean
 
 from .common import LAWS, Floats
 from .parallel import side_by_side

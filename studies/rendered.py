@@ -10,11 +10,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers
-from evfem.encoding import AreaLaw, Encoding
-from evfem.fingerpad import TABLE_2, Electrical, FingerPad
-from evfem.materials import NeoHookean
-from evfem.rendering import (
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
+from evfem.finger.fingerpad import TABLE_2, Electrical, FingerPad
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.rendering import (
     ApparentFriction,
     Recording,
     Signal,
@@ -25,8 +27,7 @@ from evfem.rendering import (
     replay,
     voltage_for,
 )
-from evfem.scene import Output, Press, Scene, Slide, Solver
-from evfem.surfaces import Display, Flat, Sinusoid
+from evfem.tissue.laws import NeoHookean
 
 from .common import Floats
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Layer, Layers
-from evfem.forces import effective_thickness_from_thresholds, stratum_corneum_from_thresholds
+from evfem.electrostatics.forces import effective_thickness_from_thresholds, stratum_corneum_from_thresholds
+from evfem.electrostatics.laws import Layer, Layers
 
 from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure
 

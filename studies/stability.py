@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from evfem.storage import write_text
+from evfem.common.storage import write_text
 
 from . import stability_contact, stability_electric, stability_lost, stability_same, stability_tissue
 from .common import Series, Study, make_folder

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 
 from evfem.errors import InputError, NotConverged
-from evfem.result import Result
-from evfem.scene import Scene
-from evfem.simulate import simulate
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+from evfem.simulation.run import simulate
 
 #: smallest scale of forces (N/mm) and of energies (N): what is smaller is rounding
 FORCE, ENERGY = 1e-6, 1e-9
@@ -210,9 +210,9 @@ def judge(case: Case) -> Found:
 @cache
 def _warm_up() -> None:
     """Load and compile what the first simulation of a process would have to pay for."""
-    from evfem.electrostatics import Kaczmarek
-    from evfem.motion import Hover, Motion, Press, Slide
-    from evfem.surfaces import Display
+    from evfem.contact.surfaces import Display
+    from evfem.electrostatics.laws import Kaczmarek
+    from evfem.scene.motion import Hover, Motion, Press, Slide
 
     from .stability_scenes import block, finger
 

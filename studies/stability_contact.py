@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
-from evfem.motion import Hover, Motion, Press, Slide, VoltageRamp
-from evfem.result import Result
-from evfem.scene import Scene, Solver
-from evfem.simulate import Run
-from evfem.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.result import Result
+from evfem.simulation.run import Run
 
 from .stability_case import Group, Log, Verdict
 from .stability_scenes import block, finger, pad, scene

@@ -8,16 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.fingerpad import Electrical, MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.motion import Hover, Press, Slide, VoltageRamp
+from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.reference import PullIn, pull_in_kaczmarek, pull_in_strong_troxel
-from evfem.result import Result
-from evfem.scene import Boundary, Scene, form
-from evfem.signals import VoltageProfile
-from evfem.surfaces import Display
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene
+from evfem.scene.terms import Boundary, form
+from evfem.simulation.result import Result
+from evfem.tissue.laws import NeoHookean
 
 from .common import LAWS
 from .stability_case import Group, Log, Verdict

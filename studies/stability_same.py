@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Kaczmarek, Layer
-from evfem.fingerpad import Electrical, MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.mesh import Mesh
-from evfem.motion import Press, Slide, VoltageRamp
-from evfem.result import COLUMNS, Result
-from evfem.scene import Scene, Solver
-from evfem.surfaces import Display, Flat, Sinusoid
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.result import COLUMNS, Result
+from evfem.tissue.laws import NeoHookean
 
 from .stability_case import Group, Log, Verdict
 from .stability_scenes import block, finger, mirrored, pad, renumbered, scaled, scene, shaken

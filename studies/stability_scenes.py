@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics import Layer
-from evfem.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.mesh import Floats, Ints, Mesh
-from evfem.motion import Motion
-from evfem.scene import Output, Scene
+from evfem.common.arrays import Floats, Ints
+from evfem.electrostatics.laws import Layer
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Motion
+from evfem.scene.scene import Output, Scene
+from evfem.tissue.laws import NeoHookean
 
 from .benchmark import benchmark_mesh
 

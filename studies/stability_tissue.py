@@ -9,14 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem.fingerpad import FingerPad
-from evfem.meshcheck import check
-from evfem.meshfile import read
-from evfem.motion import Press, Slide
-from evfem.plan import plan
-from evfem.scene import Solver
-from evfem.simulate import simulate
-from evfem.surfaces import Flat, Profile, Sinusoid
+from evfem.contact.surfaces import Flat, Profile, Sinusoid
+from evfem.finger.fingerpad import FingerPad
+from evfem.mesh.file import read
+from evfem.mesh.quality import check
+from evfem.scene.motion import Press, Slide
+from evfem.scene.plan import plan
+from evfem.scene.scene import Solver
+from evfem.simulation.run import simulate
 
 from .stability_case import Group, Log, Verdict
 from .stability_scenes import (
@@ -79,7 +79,7 @@ for _element, _allowed in ALLOWED.items():
 
 @CONTRAST.case("nail 17 MPa on 0.034 MPa", "a nail 1000 times stiffer still changes F_n by less than 1 %")
 def _nail(log: Log) -> Verdict:
-    from evfem.materials import NeoHookean
+    from evfem.tissue.laws import NeoHookean
 
     motion = Press(indentation=1.0, steps=4), Slide(1.0, steps=5)
     forces = []
@@ -92,7 +92,7 @@ def _nail(log: Log) -> Verdict:
 
 @CONTRAST.case("dry stratum corneum 100 MPa", "a dry skin carries more at the same indentation, also in slip")
 def _dry(log: Log) -> Verdict:
-    from evfem.materials import NeoHookean
+    from evfem.tissue.laws import NeoHookean
 
     forces = []
     for E in (1.0, 100.0):

@@ -20,11 +20,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem import data
-from evfem.electrostatics import Layer, Layers
-from evfem.forces import EllipsoidalPad, pad_force, pad_force_per_depth
-from evfem.samples import Normal, Samples, Uniform
-from evfem.sweep import sweep
-from evfem.sweepfile import Sweep
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force, pad_force_per_depth
+from evfem.electrostatics.laws import Layer, Layers
+from evfem.sweeps.file import Sweep
+from evfem.sweeps.run import sweep
+from evfem.sweeps.samples import Normal, Samples, Uniform
 
 from .common import (
     CASES,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from evfem.storage import write_text
+from evfem.common.storage import write_text
 
 from . import precision_growth as growth
 from . import precision_ideas as ideas

@@ -4,11 +4,12 @@ import numpy as np
 from evfem.studies.benchmark import benchmark_mesh
 from evfem.studies.stability_scenes import INSULATOR, SKIN, block, finger
 
-from evfem.electrostatics import Kaczmarek
-from evfem.fingerpad import MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.scene import Output, Press, Scene, Slide, Solver
-from evfem.surfaces import Display
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.tissue.laws import NeoHookean
 
 __all__ = ["INSULATOR", "SKIN", "balance", "benchmark_finger", "benchmark_scene", "block", "finger"]
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from evfem.mesh import Mesh
-from evfem.result import COLUMNS, Frame, Result
+from evfem.mesh.mesh import Mesh
+from evfem.simulation.result import COLUMNS, Frame, Result
 
 KINDS = ("quad", "quad9", "triangle", "triangle6")
 #: a scene file but for its motion, beside `square_mesh` in square.vtu

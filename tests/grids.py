@@ -7,8 +7,8 @@ from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 from skfem.io.meshio import from_meshio
 
-from evfem.assembly import ELEMENTS, make_space
-from evfem.mesh import Mesh, raised
+from evfem.mesh.mesh import Mesh, raised
+from evfem.tissue.space import ELEMENTS, make_space
 
 #: element -> cells before they are raised to the element's order
 CELLS = {"q1": "quad", "q1_fbar": "quad", "q2": "quad", "q2p1": "quad", "p2": "triangle"}

@@ -4,7 +4,7 @@ import numpy as np
 from evfem.meshes.make import triangles
 from evfem.studies.benchmark import benchmark_mesh
 
-from evfem.mesh import raised
+from evfem.mesh.mesh import raised
 
 #: numbers of its regions
 REGIONS = {"tissue": 0, "skin": 1}

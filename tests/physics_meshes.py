@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from evfem.mesh import Mesh
+from evfem.mesh.mesh import Mesh
 
 
 def graded(fine, size, end, growth):

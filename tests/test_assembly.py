@@ -9,12 +9,13 @@ from grids import CELLS, SHAPES, assembled, fine_points, grid_of, order, quarter
 from scipy.spatial import cKDTree
 from skfem.helpers import ddot, grad
 
-from evfem.assembly import ELEMENTS, Tissue, check_laws, element_for, make_space
 from evfem.errors import InputError
-from evfem.materials import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.mesh import Mesh
-from evfem.splitlaw import embed
+from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, inv, transpose
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
+from evfem.tissue.space import ELEMENTS, element_for, make_space
+from evfem.tissue.splitlaw import embed
+from evfem.tissue.weakform import Tissue, check_laws
 
 MU, LMBDA = 0.7, 1.9
 YOUNG = MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU)

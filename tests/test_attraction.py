@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from evfem.attraction import Attraction
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel
-from evfem.pad import Pad
-from evfem.surfaces import Flat, Sinusoid
+from evfem.contact.attraction import Attraction
+from evfem.contact.pad import Pad
+from evfem.contact.surfaces import Flat, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 
 LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
 SURFACES = [Flat(y=-1.0), Sinusoid(terms=[[0.05, 4.0, 0.3]], y=-1.0)]

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from builders import block, finger
 
-from evfem.electrostatics import Kaczmarek
-from evfem.scene import Press, Scene, Slide, Solver
-from evfem.simulate import simulate
-from evfem.surfaces import Display
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import simulate
 
 HERE = Path(__file__).parent
 NAMES = (
@@ -52,7 +53,7 @@ def test_the_same_numbers_without_the_fast_extra(element):
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     slow, here = json.loads(done.stdout), numbers(element)
     assert slow["backend"] == "SuperLU"
-    assert "evfem.kernels" not in slow["modules"]
+    assert "evfem.tissue.kernels.elastic" not in slow["modules"]
     for name in NAMES:
         np.testing.assert_allclose(slow[name], here[name], rtol=1e-8, atol=1e-11)
     assert max(here["tangential_force"]) > 1e-3

@@ -15,8 +15,9 @@ import pytest
 from fakes import SQUARE_SCENE, square_mesh
 
 import evfem
-from evfem import cli, meshfile
-from evfem.result import COLUMNS
+from evfem import cli
+from evfem.mesh import file as meshfile
+from evfem.simulation.result import COLUMNS
 
 SCENE = f"""{SQUARE_SCENE}
 [output]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from evfem.contact import (
+from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,

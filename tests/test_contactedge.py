@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from evfem.contactedge import contact_spans, outline_nodes
+from evfem.contact.edge import contact_spans, outline_nodes
 from evfem.errors import InputError
-from evfem.fingerpad import FingerPad
+from evfem.finger.fingerpad import FingerPad
 
 
 def spans(x, gap):

@@ -8,10 +8,11 @@ from grids import fine_points, l2_error, order, quarter_ring, rectangle, solve
 from scipy.integrate import solve_ivp
 from scipy.optimize import newton
 
-from evfem.assembly import ELEMENTS, Tissue
-from evfem.materials import NeoHookean
 from evfem.reference import tube_pressure
 from evfem.tensor import det, inv, transpose
+from evfem.tissue.laws import NeoHookean
+from evfem.tissue.space import ELEMENTS
+from evfem.tissue.weakform import Tissue
 
 #: element -> least order in L2 (the theory's 2 and 3, less what coarse meshes cost)
 RATES = {"q1": 1.9, "q1_fbar": 1.9, "q2": 2.8, "q2p1": 2.8, "p2": 2.8}

@@ -15,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from evfem import cli, scenefile, sweepfile
+from evfem import cli
+from evfem.scene import file as scenefile
+from evfem.sweeps import file as sweepfile
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))

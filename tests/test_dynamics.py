@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from grids import assembled, fine_points, rectangle, solve
 
-from evfem.assembly import ELEMENTS, Tissue
-from evfem.body import Body
-from evfem.dynamics import Dynamics, make_dynamics, mass_matrices
-from evfem.forms import make_term
-from evfem.materials import LinearElastic, NeoHookean
-from evfem.scene import form
+from evfem.scene.terms import form
+from evfem.tissue.body import Body
+from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
+from evfem.tissue.forms import make_term
+from evfem.tissue.laws import LinearElastic, NeoHookean
+from evfem.tissue.space import ELEMENTS
+from evfem.tissue.weakform import Tissue
 
 every_element = pytest.mark.parametrize("element", list(ELEMENTS))
 STEP = 2e-3

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.constants import epsilon_0
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0, traction_derivative
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0, traction_derivative
 from evfem.errors import InputError
 
 LAWS = [StrongTroxel(), Kaczmarek(), StrongTroxel(gap_eps_r=2.5), Kaczmarek(gap_eps_r=2.5)]

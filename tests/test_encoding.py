@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evfem import data
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel
-from evfem.encoding import (
+from evfem.electrostatics.encoding import (
     AreaLaw,
     Encoding,
     fit_area_to_friction,
@@ -15,8 +14,9 @@ from evfem.encoding import (
     required_attraction,
     share_not_renderable,
 )
+from evfem.electrostatics.forces import plate_force
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.errors import InputError
-from evfem.forces import plate_force
 
 FILM = Layer(0.09, 3.35)
 LAWS = [StrongTroxel(), Kaczmarek()]

@@ -8,8 +8,8 @@ import pytest
 
 import evfem as ev
 from evfem import export, plotting
-from evfem.result import load
-from evfem.scenefile import loads
+from evfem.scene.file import loads
+from evfem.simulation.result import load
 
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
 DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)

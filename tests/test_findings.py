@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from grids import rectangle
 
-from evfem.body import Body
-from evfem.contact import BACKWARD, FORWARD, OPEN, STICK
-from evfem.findings import findings
-from evfem.materials import NeoHookean
-from evfem.state import Balance, State
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.solver.findings import findings
+from evfem.solver.state import Balance, State
+from evfem.tissue.body import Body
+from evfem.tissue.laws import NeoHookean
 
 
 @pytest.fixture

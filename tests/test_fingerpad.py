@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.fingerpad import RANGES, RESOLUTIONS, TABLE_2, FingerPad, MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.mesh import layer_thickness
-from evfem.meshcheck import check
-from evfem.quality import scaled_jacobian
+from evfem.finger.fingerpad import RANGES, RESOLUTIONS, TABLE_2, FingerPad, MeshedFinger
+from evfem.mesh.mesh import layer_thickness
+from evfem.mesh.quality import check, scaled_jacobian
+from evfem.tissue.laws import NeoHookean
 
 A, B = 8.34, 6.395
 
@@ -31,7 +30,7 @@ def green_area(mesh):
 
 
 def region_area(mesh, name):
-    from evfem.mesh import Mesh
+    from evfem.mesh.mesh import Mesh
 
     cells = mesh.cells[mesh.cells_of(name)]
     return green_area(Mesh(mesh.points, cells, mesh.kind, np.zeros(len(cells), int), {name: 0}))

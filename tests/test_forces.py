@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import IntegrationWarning, quad
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.errors import InputError
-from evfem.forces import (
+from evfem.electrostatics.forces import (
     EllipsoidalPad,
     air_layer_ratio,
     capacitor_force,
@@ -18,6 +16,8 @@ from evfem.forces import (
     plate_force,
     stratum_corneum_from_thresholds,
 )
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.errors import InputError
 
 TABLE_2 = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
 PAD = EllipsoidalPad(16.70, 12.80, 22.5)
@@ -77,7 +77,7 @@ def test_nearly_touching_pads_keep_the_accuracy(monkeypatch):
     # sixteen orders of thickness: the rule with twice the points agrees to 1e-10
     layers = Layers(np.logspace(-6, 2, 17), np.logspace(-5.5, 2.5, 17))
     coarse = [pad_force(law, PAD, 0.0, 1e3, layers, "ellipse") for law in (StrongTroxel(), Kaczmarek())]
-    monkeypatch.setattr("evfem.forces._POINTS", 56)
+    monkeypatch.setattr("evfem.electrostatics.forces._POINTS", 56)
     fine = [pad_force(law, PAD, 0.0, 1e3, layers, "ellipse") for law in (StrongTroxel(), Kaczmarek())]
     np.testing.assert_allclose(coarse, fine, rtol=1e-10)
 

@@ -7,10 +7,10 @@ import pytest
 from grids import assembled, quarter_ring, rectangle
 
 import evfem as ev
-from evfem.assembly import Tissue
 from evfem.errors import InputError
-from evfem.forms import make_term
-from evfem.mesh import Mesh
+from evfem.mesh.mesh import Mesh
+from evfem.tissue.forms import make_term
+from evfem.tissue.weakform import Tissue
 
 MU, LMBDA = 0.7, 1.9
 NEO_HOOKEAN = ev.NeoHookean(E=MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU), nu=LMBDA / (2 * (LMBDA + MU)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evfem.friction import cone_excess, return_map
+from evfem.contact.friction import cone_excess, return_map
 from evfem.tensor import complex_step
 
 MU, PENALTY = 0.3, 50.0

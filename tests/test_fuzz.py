@@ -14,11 +14,13 @@ from fakes import fake_result, square_mesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from evfem import meshfile, result, tables
+from evfem.common import tables
+from evfem.contact.surfaces import Flat, Profile, Sinusoid
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.scenefile import load, loads
-from evfem.signals import VoltageProfile
-from evfem.surfaces import Flat, Profile, Sinusoid
+from evfem.mesh import file as meshfile
+from evfem.scene.file import load, loads
+from evfem.simulation import result
 
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 
@@ -246,8 +248,8 @@ def test_meshes_made_to_take_all_memory_or_time_get_a_sentence(name, tmp_path):
 
 
 def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
-    from evfem.mesh import Mesh
-    from evfem.meshcheck import check
+    from evfem.mesh.mesh import Mesh
+    from evfem.mesh.quality import check
 
     n = 60_000
     points = np.zeros((n, 2))
@@ -260,8 +262,8 @@ def test_many_nodes_in_one_place_are_found_without_looking_at_all_pairs():
 
 
 def test_an_outline_of_many_short_and_many_long_edges_is_refused():
-    from evfem.mesh import Mesh
-    from evfem.meshcheck import check
+    from evfem.mesh.mesh import Mesh
+    from evfem.mesh.quality import check
 
     n = 6000  # a fan of needles: edges as long as the finger beside each other
     angle = np.linspace(0.0, 1.0, n)

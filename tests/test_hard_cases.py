@@ -8,11 +8,12 @@ from evfem.studies.stability import CASES
 from evfem.studies.stability_case import judge
 from evfem.studies.stability_scenes import pad, scene
 
-from evfem import friction
-from evfem.electrostatics import Layer, StrongTroxel
-from evfem.scene import Press, Scene, Slide, Solver
-from evfem.simulate import Run, simulate
-from evfem.surfaces import Display, Flat
+from evfem.contact import friction
+from evfem.contact.surfaces import Display, Flat
+from evfem.electrostatics.laws import Layer, StrongTroxel
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import Run, simulate
 
 HARD = (
     "friction.jump_steep",
@@ -49,7 +50,7 @@ def test_a_thin_insulator_by_strong_troxels_law():
 
 def test_penalised_friction_obeys_the_return_map():
     """The penalty variant is a compliance of the interface; pointwise it is the return map of
-    `evfem.friction`.
+    `evfem.contact.friction`.
     """
     solver = Solver(contact="penalty", penalty_normal=50.0, penalty_tangential=20.0)
     motion = [Press(indentation=0.3, steps=1), Slide(0.05, steps=2)]

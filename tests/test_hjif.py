@@ -8,12 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evfem import cli, hjif
-from evfem.electrostatics import Kaczmarek, Layer, Layers
-from evfem.encoding import AreaLaw, Encoding
+from evfem import cli
+from evfem.electrostatics import hjif
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
+from evfem.electrostatics.signalfile import Playback, write_signal
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.signalfile import Playback, write_signal
-from evfem.signals import VoltageProfile
 
 JUMP = VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])
 DEVICE = Playback(full_scale=2000.0, speed=20.0, friction=(0.5, 0.6))

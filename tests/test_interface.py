@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from builders import block, finger
 
-from evfem.contact import FORWARD, OPEN, STICK
-from evfem.model import make_model
-from evfem.scene import Press, Scene
-from evfem.surfaces import Flat, Sinusoid
+from evfem.contact.signorini import FORWARD, OPEN, STICK
+from evfem.contact.surfaces import Flat, Sinusoid
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene
+from evfem.simulation.model import make_model
 
 ROUND = finger(block(8, 3, sag=0.4))
 SURFACES = [Flat(y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1)]

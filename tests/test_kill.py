@@ -13,11 +13,12 @@ import pytest
 from evfem.studies import killing
 
 import evfem
-from evfem import cli, export, runfolder, storage
-from evfem.result import COLUMNS, Saved, csv_header
-from evfem.scenefile import load
-from evfem.simulate import simulate
-from evfem.storage import load_arrays, save_arrays
+from evfem import cli, export, runfolder
+from evfem.common import storage
+from evfem.common.storage import load_arrays, save_arrays
+from evfem.scene.file import load
+from evfem.simulation.result import COLUMNS, Saved, csv_header
+from evfem.simulation.run import simulate
 
 
 def called(folder, *words):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from grids import rectangle
 
-from evfem.lanes import FAR, LANES, blocked, displacement_gradient, gather, spread, volume
+from evfem.tissue.kernels.lanes import FAR, LANES, blocked, displacement_gradient, gather, spread, volume
 
 RANDOM = np.random.default_rng(3)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from grids import rectangle
 
-from evfem.body import Body
-from evfem.linear import Pardiso, Pattern, Singular, SuperLU, make_condensation, mkl_library
-from evfem.materials import NeoHookean
+from evfem.solver.condensation import Pardiso, Singular, SuperLU, make_condensation, mkl_library
+from evfem.tissue.body import Body, Pattern
+from evfem.tissue.laws import NeoHookean
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
 BACK_ENDS = [Pardiso, SuperLU] if importlib.util.find_spec("pypardiso") else [SuperLU]

@@ -6,14 +6,15 @@ import numpy as np
 import pytest
 from builders import INSULATOR, block, finger
 
-from evfem.contact import OPEN, STICK
-from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
-from evfem.linear import Singular
-from evfem.model import make_model
-from evfem.scene import Press, Scene, Solver
-from evfem.state import StepFailed
-from evfem.strategy import Strategy
-from evfem.surfaces import Display, Sinusoid
+from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.surfaces import Display, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.solver.condensation import Singular
+from evfem.solver.state import StepFailed
+from evfem.solver.strategy import Strategy
 
 SAG = 0.4
 ROUND = finger(block(8, 3, sag=SAG))

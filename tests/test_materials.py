@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.materials import LAWS, LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, from_table, split
-from evfem.splitlaw import UserLaw, embed
 from evfem.tensor import complex_step, ddot, det, inv, mul, trace, transpose
+from evfem.tissue.laws import LAWS, LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, from_table, split
+from evfem.tissue.splitlaw import UserLaw, embed
 
 rng = np.random.default_rng(2)
 BUILT_IN = [

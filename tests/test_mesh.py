@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.mesh import Mesh, layer_thickness, raised
-from evfem.quality import scaled_jacobian
+from evfem.mesh.mesh import Mesh, layer_thickness, raised
+from evfem.mesh.quality import scaled_jacobian
 
 
 def strip(columns=4, order=1):

@@ -6,9 +6,9 @@ import pytest
 from evfem.studies.benchmark import benchmark_mesh
 from mesh_parts import REGIONS, of_kind, raw
 
-from evfem import meshfile
 from evfem.errors import InputError
-from evfem.mesh import Mesh
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
 
 
 def shifted_copy(gap):

@@ -10,9 +10,9 @@ import pytest
 from evfem.meshes.make import RECIPES
 from evfem.studies.benchmark import LEVELS, benchmark_mesh
 
-from evfem import meshfile
 from evfem.errors import InputError
-from evfem.quality import scaled_jacobian
+from evfem.mesh import file as meshfile
+from evfem.mesh.quality import scaled_jacobian
 
 
 @pytest.mark.parametrize("level", LEVELS)

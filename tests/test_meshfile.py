@@ -6,12 +6,12 @@ import pytest
 from evfem.studies.benchmark import benchmark_mesh
 from mesh_parts import REGIONS, of_kind, raw
 
-from evfem import meshfile
 from evfem.errors import InputError, StorageError
-from evfem.fingerpad import FingerPad, MeshedFinger
-from evfem.materials import NeoHookean
-from evfem.mesh import Mesh
-from evfem.quality import scaled_jacobian
+from evfem.finger.fingerpad import FingerPad, MeshedFinger
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh
+from evfem.mesh.quality import scaled_jacobian
+from evfem.tissue.laws import NeoHookean
 
 
 def stored(folder, **changes):

@@ -6,7 +6,7 @@ import pytest
 from fakes import square_mesh
 
 from evfem.errors import InputError
-from evfem.meshfile import read, write
+from evfem.mesh.file import read, write
 
 
 @pytest.mark.parametrize(("ending", "options"), [(".vtk", {}), (".vtk", {"binary": False})])

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.contact import OPEN, STICK
-from evfem.mixing import Mixing
-from evfem.state import KILOVOLT, State
+from evfem.contact.signorini import OPEN, STICK
+from evfem.solver.anderson import Mixing
+from evfem.solver.state import KILOVOLT, State
 
 NODES = 2
 

@@ -7,16 +7,17 @@ import numpy as np
 import pytest
 from builders import INSULATOR, balance, benchmark_finger, block, finger
 
-from evfem import condensed
-from evfem.contact import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
-from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
+from evfem.contact import condensed
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
-from evfem.model import make_model
-from evfem.newton import StepFailed, Target
-from evfem.scene import Hover, Press, Scene, Slide, Solver
-from evfem.simulate import simulate
-from evfem.strategy import Strategy
-from evfem.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.scene.motion import Hover, Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.simulation.run import simulate
+from evfem.solver.equilibrium import StepFailed, Target
+from evfem.solver.strategy import Strategy
 
 ROUND = finger(block(8, 3, sag=0.4))
 GENTLE = Sinusoid(friction=0.3, terms=[[0.02, 2.0, 0.4]], insulator=INSULATOR)

@@ -12,8 +12,8 @@ from builders import INSULATOR, SKIN, block
 from matplotlib.figure import Figure
 
 import evfem as ev
+from evfem.contact.own import completed
 from evfem.errors import InputError
-from evfem.ownsurface import completed
 from evfem.protocols import CompleteSurface, Observer, Surface
 from evfem.runfolder import RunFolder, saved
 

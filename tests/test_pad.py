@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from builders import block
 
+from evfem.contact.pad import Pad, frame, make_pad
+from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
-from evfem.mesh import Mesh, raised
-from evfem.pad import Pad, frame, make_pad
-from evfem.surfaces import Flat, Sinusoid
+from evfem.mesh.mesh import Mesh, raised
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
 

@@ -7,8 +7,6 @@ from grids import assembled, quarter_ring, rectangle
 from physics_meshes import block, both_sides, graded, pad_state, parabola
 
 import evfem as ev
-from evfem.assembly import Tissue
-from evfem.forms import make_term
 from evfem.reference import (
     BondedLayer,
     CattaneoMindlin,
@@ -17,6 +15,8 @@ from evfem.reference import (
     sliding_force_ratio,
     tube_inner_radius,
 )
+from evfem.tissue.forms import make_term
+from evfem.tissue.weakform import Tissue
 
 
 def press(mesh, law, surface, *motion, element=None):

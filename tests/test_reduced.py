@@ -11,13 +11,13 @@ import pytest
 from builders import balance, block, finger
 
 import evfem as ev
-from evfem.condensedpad import CondensedPad, sums
-from evfem.contact import BACKWARD, FORWARD, OPEN, STICK, Border, ContactProblem, Pull
-from evfem.keptcontact import Factors, KeptProblem
-from evfem.padstep import PadEquilibrium
-from evfem.reduced import FastModel
-from evfem.simulate import Run
-from evfem.state import Limits, StepFailed, Target
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Border, ContactProblem, Pull
+from evfem.fast.memory import CondensedPad, sums
+from evfem.fast.model import FastModel
+from evfem.fast.step import PadEquilibrium
+from evfem.fast.woodbury import Factors, KeptProblem
+from evfem.simulation.run import Run
+from evfem.solver.state import Limits, StepFailed, Target
 
 INSULATOR = ev.Layer(thickness=0.09, eps_r=3.35)
 PRESS = ev.Press(force=0.05, steps=5)
@@ -280,7 +280,7 @@ def test_damaged_and_foreign_files_are_refused(trained, tmp_path):
     path.write_bytes(data[: len(data) // 2])
     with pytest.raises(ev.InputError, match="cut off"):
         FastModel.load(path)
-    from evfem.storage import load_arrays, save_arrays
+    from evfem.common.storage import load_arrays, save_arrays
 
     path.write_bytes(data)
     arrays = load_arrays(path, "reduced", "evfem-reduced-1")

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 from evfem.errors import InputError
 from evfem.reference import (
     BondedLayer,

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from builders import block, finger
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers, StrongTroxel
-from evfem.encoding import AreaLaw, Encoding
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.motion import Press, Slide
-from evfem.rendering import (
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.rendering import (
     ApparentFriction,
     apparent_friction,
     compare,
@@ -20,9 +23,6 @@ from evfem.rendering import (
     replay,
     voltage_for,
 )
-from evfem.scene import Scene, Solver
-from evfem.signals import Amplifier, FollowForce, VoltageProfile
-from evfem.surfaces import Display, Flat, Sinusoid
 
 PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)
 LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))

@@ -1,7 +1,7 @@
 """The table of forces fits the terminal and shows the end of every motion."""
 
-from evfem.report import chosen, table
-from evfem.result import COLUMNS
+from evfem.runfolder import chosen, table
+from evfem.simulation.result import COLUMNS
 
 
 def rows(*counts):

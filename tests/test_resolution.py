@@ -7,10 +7,11 @@ import pytest
 from builders import block, finger
 
 from evfem.cli import main
-from evfem.plan import plan
-from evfem.scene import Press, Scene
-from evfem.simulate import simulate
-from evfem.surfaces import Flat, Profile, Sinusoid
+from evfem.contact.surfaces import Flat, Profile, Sinusoid
+from evfem.scene.motion import Press
+from evfem.scene.plan import plan
+from evfem.scene.scene import Scene
+from evfem.simulation.run import simulate
 
 X = np.arange(-5.0, 5.001, 0.05)
 #: grooves 0.05 mm deep, 0.1 mm wide, 0.5 mm apart

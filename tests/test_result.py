@@ -10,7 +10,7 @@ import pytest
 from fakes import KINDS, fake_result, fake_row
 
 from evfem.errors import InputError, StorageError
-from evfem.result import COLUMNS, Checkpoint, Result, csv_header, csv_line, load, versions
+from evfem.simulation.result import COLUMNS, Checkpoint, Result, csv_header, csv_line, load, versions
 
 CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "

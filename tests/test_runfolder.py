@@ -8,9 +8,9 @@ from fakes import fake_frame, fake_row, square_mesh
 
 from evfem import export
 from evfem.errors import InputError, StorageError
-from evfem.result import Checkpoint, Result, csv_line
 from evfem.runfolder import RunFolder, saved
-from evfem.scene import default_scene
+from evfem.scene.scene import default_scene
+from evfem.simulation.result import Checkpoint, Result, csv_line
 
 SCENE = default_scene()
 MESH = square_mesh("quad")

@@ -7,25 +7,15 @@ from dataclasses import FrozenInstanceError, replace
 import numpy as np
 import pytest
 
-from evfem.digest import digest
-from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
+from evfem.common.digest import digest
+from evfem.contact.surfaces import Display, Flat
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.fingerpad import FingerPad
-from evfem.scene import (
-    Boundary,
-    Hover,
-    Output,
-    Press,
-    Region,
-    Scene,
-    Slide,
-    Solver,
-    VoltageRamp,
-    default_scene,
-    form,
-)
-from evfem.signals import VoltageProfile
-from evfem.surfaces import Display, Flat
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver, default_scene
+from evfem.scene.terms import Boundary, Region, form
 
 FINGER = FingerPad()
 PRESS = Press(force=0.05)

@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from fakes import square_mesh
 
-from evfem import meshfile
-from evfem.electrostatics import Kaczmarek, Layer, StrongTroxel
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.materials import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.scene import Boundary, Hover, Output, Press, Scene, Slide, Solver, VoltageRamp, default_scene, form
-from evfem.scenefile import dump, load, loads
-from evfem.signals import VoltageProfile
-from evfem.strategy import Strategy
-from evfem.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.mesh import file as meshfile
+from evfem.scene.file import dump, load, loads
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver, default_scene
+from evfem.scene.terms import Boundary, form
+from evfem.solver.strategy import Strategy
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 
 DISPLAY = """
 version = 1

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from evfem.electrostatics.signals import Amplifier, VoltageProfile, applied_voltage, carrier_amplitude
 from evfem.errors import InputError
-from evfem.signals import Amplifier, VoltageProfile, applied_voltage, carrier_amplitude
 
 JUMP = VoltageProfile([0.0, 2.0, 2.0, 4.0], [10.0, 10.0, 100.0, 50.0])
 

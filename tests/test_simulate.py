@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 from builders import INSULATOR, balance, benchmark_scene, block, finger
 
-from evfem.electrostatics import Kaczmarek, StrongTroxel
-from evfem.result import COLUMNS, Saved
-from evfem.scene import Hover, Output, Press, Scene, Slide, Solver, VoltageRamp
-from evfem.simulate import simulate
-from evfem.surfaces import Display, Flat, Sinusoid
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.result import COLUMNS, Saved
+from evfem.simulation.run import simulate
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from builders import INSULATOR, balance, benchmark_finger, benchmark_scene, block, finger
 
-from evfem.electrostatics import Kaczmarek, Layer, Layers
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
-from evfem.scene import Hover, Press, Scene, Slide, VoltageRamp
-from evfem.signals import VoltageProfile
-from evfem.simulate import simulate
-from evfem.surfaces import Display
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene
+from evfem.simulation.run import simulate
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from builders import block, finger
 
+from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
-from evfem.scene import Press, Scene, Slide, Solver
-from evfem.simulate import simulate
-from evfem.state import Record, StepFailed
-from evfem.stepping import Stepper
-from evfem.strategy import Strategy
-from evfem.surfaces import Flat
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import simulate
+from evfem.solver.state import Record, StepFailed
+from evfem.solver.stepping import Stepper
+from evfem.solver.strategy import Strategy
 
 WRONG = {
     "iterations": (0, -1, 10_001, 2.5, "many", True, np.nan),

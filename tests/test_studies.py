@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from evfem import data
-from evfem.electrostatics import Layer
+from evfem.electrostatics.laws import Layer
 from evfem.errors import InputError, StorageError
 from evfem.reference import cylinder_force
 

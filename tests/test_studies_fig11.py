@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.motion import Press, VoltageRamp
-from evfem.simulate import simulate
+from evfem.scene.motion import Press, VoltageRamp
+from evfem.simulation.run import simulate
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 fig11, pressing = (importlib.import_module(f"{studies.__name__}.{name}") for name in ("fig11", "pressing"))

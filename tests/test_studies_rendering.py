@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError, NotConverged
-from evfem.rendering import ApparentFriction
+from evfem.simulation.rendering import ApparentFriction
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 names = ("fig12", "fig13", "rendered", "parallel")

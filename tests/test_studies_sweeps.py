@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from evfem import scenefile
-from evfem.simulate import simulate
+from evfem.scene import file as scenefile
+from evfem.simulation.run import simulate
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 common, measured, people, uncertainty = (

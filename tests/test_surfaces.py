@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from evfem.electrostatics import Layer
+from evfem.common.tables import numbers, piecewise_linear, read_columns
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Layer
 from evfem.errors import InputError
-from evfem.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.tables import numbers, piecewise_linear, read_columns
 from evfem.tensor import complex_step
 
 X = np.linspace(-1.7137, 2.3071, 41)  # meets no sample, where curvatures jump

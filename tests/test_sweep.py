@@ -14,9 +14,14 @@ from builders import block
 from workers import work_or_die
 
 import evfem as ev
-from evfem import cli, meshfile, pools, scenefile, sweepfile, sweepfolder
+from evfem import cli
 from evfem.errors import InputError, StorageError
-from evfem.sweep import compute
+from evfem.mesh import file as meshfile
+from evfem.scene import file as scenefile
+from evfem.sweeps import file as sweepfile
+from evfem.sweeps import folder as sweepfolder
+from evfem.sweeps import pools
+from evfem.sweeps.run import compute
 
 SWEEP = """
 version = 1

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem import sweepfile
 from evfem.errors import InputError
+from evfem.sweeps import file as sweepfile
 
 SCENE = """
 version = 1

@@ -16,7 +16,9 @@ import pytest
 from fakes import SQUARE_SCENE, square_mesh
 
 import evfem as ev
-from evfem import cli, meshfile, notices
+from evfem import cli
+from evfem.common import notices
+from evfem.mesh import file as meshfile
 
 SCENE = f"""{SQUARE_SCENE}
 [[motion]]
@@ -153,7 +155,7 @@ def test_a_long_line_is_broken_between_words_in_a_terminal_alone(monkeypatch):
 
 STATUS = """
 import sys, threading
-from evfem import notices
+from evfem.common import notices
 drawn, write = threading.Event(), sys.stderr.write
 sys.stderr.write = lambda text: ("case" in text and drawn.set(), write(text))[1]
 notices.PATIENCE, notices.EVERY = float(sys.argv[1]), 0.05
@@ -194,7 +196,7 @@ def test_compiling_is_told_once():
     """A loop of the package says that it is compiled, one of others does not, without numba nobody."""
     if find_spec("numba") is None:
         return
-    from evfem import lanes
+    from evfem.tissue.kernels import lanes
 
     def ours(x):
         return x + 1
@@ -202,7 +204,7 @@ def test_compiling_is_told_once():
     def theirs(x):
         return x - 1
 
-    ours.__module__, theirs.__module__ = "evfem.kernels", "elsewhere"
+    ours.__module__, theirs.__module__ = "evfem.tissue.kernels.elastic", "elsewhere"
     heard = []
     handler = logging.Handler()
     handler.emit = heard.append

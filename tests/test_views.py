@@ -10,8 +10,8 @@ import pytest
 from fakes import fake_result
 
 import evfem as ev
-from evfem import scenefile
-from evfem.result import Result
+from evfem.scene import file as scenefile
+from evfem.simulation.result import Result
 
 NAIL = ev.NeoHookean(E=20.0, nu=0.3)
 EVIL = "<script>alert('&')</script>"
@@ -121,7 +121,7 @@ def test_provenance_of_a_scene_that_no_file_can_hold_is_complete():
         def traction(self, gap, voltage, layers):
             return 0.0 * gap
 
-    from evfem.result import provenance
+    from evfem.simulation.result import provenance
 
     scene = replace(ev.default_scene(), law=Law(), finger=ev.FingerPad(nail_width=10.5))
     text = provenance(scene, fake_result().mesh, {})["parameters"]

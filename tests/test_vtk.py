@@ -12,7 +12,7 @@ import pytest
 
 import evfem as ev
 from evfem.export import instants, paraview
-from evfem.result import CELL_FIELDS, POINT_FIELDS
+from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS
 
 DOCS = Path(__file__).parents[1] / "docs"
 MACRO = DOCS / "paraview_macro.py"

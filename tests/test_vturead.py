@@ -10,8 +10,9 @@ import pytest
 from fakes import KINDS, square_mesh
 from meshio.vtu import write
 
-from evfem import meshfile, vturead
-from evfem.meshparts import Unreadable
+from evfem.mesh import file as meshfile
+from evfem.mesh import vtu as vturead
+from evfem.mesh.formats import Unreadable
 
 NUMBERS = {"soft": 0, "hard": 1}
 

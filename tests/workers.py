@@ -4,7 +4,7 @@ import os
 import time
 from pathlib import Path
 
-from evfem.sweepfolder import Answer
+from evfem.sweeps.folder import Answer
 
 
 def work_or_die(job):

@@ -23,7 +23,7 @@ import numpy as np
 
 import evfem as ev
 from evfem import data
-from evfem.forces import EllipsoidalPad, pad_force, pad_force_per_depth
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force, pad_force_per_depth
 
 people = data.load("table1")
 print(people.title)

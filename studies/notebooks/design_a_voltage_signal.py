@@ -23,9 +23,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import evfem as ev
-from evfem.electrostatics import Layers
-from evfem.encoding import AreaLaw, Encoding
-from evfem.rendering import apparent_friction, compare, exact, record, replay, voltage_for
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import Layers
+from evfem.simulation.rendering import apparent_friction, compare, exact, record, replay, voltage_for
 
 # %% [markdown]
 # ## 1. Slide over the real surface

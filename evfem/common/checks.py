@@ -1,0 +1,108 @@
+"""Checks of a user's input; each returns the clean value or raises InputError.
+
+`real`, `count` and `choice` take single values; `above`, `at_least` and `finite` also arrays of numbers.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+
+from evfem.errors import InputError
+
+MOST_STEPS = 1_000_000
+
+
+def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = lambda x: True) -> float:
+    """`value` as a finite float that passes `test`.
+
+    >>> real("gap", 1, "a gap in mm, not negative", lambda gap: gap >= 0)
+    1.0
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InputError(key, value, allowed)
+    try:
+        number = float(value)
+    except OverflowError:  # an integer beyond all floats
+        number = math.inf
+    if not (math.isfinite(number) and test(number)):
+        raise InputError(key, value, allowed)
+    return number
+
+
+def count(key: str, value: object, most: int = MOST_STEPS) -> int:
+    """`value` as a whole number from 1 to `most`.
+
+    >>> count("steps", 2.5)
+    Traceback (most recent call last):
+    evfem.errors.InputError: steps: given 2.5; allowed: a whole number from 1 to 1000000
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or not 1 <= int(value) <= most:
+        raise InputError(key, value, f"a whole number from 1 to {most}")
+    return int(value)
+
+
+def choice(key: str, value: object, names: tuple[str, ...]) -> str:
+    """`value` if it is one of `names`."""
+    if not isinstance(value, str) or value not in names:
+        raise InputError(key, value, " | ".join(names))
+    return value
+
+
+def set_frozen(target: object, **values: object) -> None:
+    """Store checked values in a frozen dataclass under construction."""
+    for name, value in values.items():
+        object.__setattr__(target, name, value)
+
+
+Values = Any  # a number, or an array of numbers: real, or complex in a complex step
+
+
+def plain(value: Values) -> Values:
+    """A Python number for a single value, the array itself otherwise.
+
+    >>> plain(np.array(2.5))
+    2.5
+    """
+    return value.item() if np.ndim(value) == 0 and isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def above(key: str, given: Values, lowest: float, allowed: str) -> Values:
+    """`given` as float or array of floats, all finite and (by their real part) > `lowest`.
+
+    >>> above("area", -1.0, 0.0, "an area in mm2 above zero")
+    Traceback (most recent call last):
+    evfem.errors.InputError: area: given -1.0; allowed: an area in mm2 above zero
+    """
+    value = finite(key, given, allowed)
+    if not np.all(np.real(value) > lowest):
+        raise InputError(key, _worst(given), allowed)
+    return value
+
+
+def at_least(key: str, given: Values, lowest: float, allowed: str) -> Values:
+    """As `above`, with `lowest` itself allowed."""
+    value = finite(key, given, allowed)
+    if not np.all(np.real(value) >= lowest):
+        raise InputError(key, _worst(given), allowed)
+    return value
+
+
+def finite(key: str, given: Values, allowed: str) -> Values:
+    """`given` as float or array of floats (complex if it was), all finite."""
+    try:
+        value = np.asarray(given)
+    except ValueError as error:  # rows of different length
+        raise InputError(key, given, allowed) from error
+    if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
+        raise InputError(key, given, allowed)
+    return plain(value * 1.0)
+
+
+def _worst(given: Values) -> Values:
+    """The smallest of the values, so that a long array does not flood the message."""
+    return float(np.min(np.real(given)))

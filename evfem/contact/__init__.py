@@ -1,0 +1,1 @@
+"""Where finger and surface meet: surfaces, pad, attraction, Signorini-Coulomb on the dense compliance."""

@@ -1,0 +1,95 @@
+r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
+
+Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j.
+
+Trial states that penetrate count as touching, g = 0.
+
+- ``vertical`` (the paper): :math:`f_y = -p(g_j) A_j`. Not conservative: moving a neighbour sideways changes
+  A_j without work.
+- ``normal``: minus the derivative of :math:`W = \sum_j \Pi(g_j) A_j`, the Maxwell traction on the deformed
+  outline; its tangent is symmetric.
+
+Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+
+from evfem.common.arrays import Floats
+from evfem.contact import pad as outline
+from evfem.electrostatics.laws import traction_derivative
+
+#: gaps up to this (mm) count as closed
+TOUCHING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Attraction:
+    """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface` the
+    electrode's outline.
+    """
+
+    law: Any
+    layers: Any
+    pad: outline.Pad
+    surface: Any
+    direction: str = "vertical"
+    air_layer: bool = True
+
+    def forces(self, position: Floats, voltage: float, touching: Any) -> Floats:
+        """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air layer."""
+        if voltage == 0.0:
+            return np.zeros_like(position)
+        frame = outline.frame(self.surface, position)
+        gap = np.maximum(frame.gap, 0.0)
+        on = 1.0 if self.air_layer else touching.astype(float)
+        weight = on * self.law.traction(gap, voltage, self.layers) * self.pad.length(position[:, 0])
+        if self.direction == "vertical":
+            return np.stack([np.zeros_like(weight), -weight], axis=1)
+        of, moved, value = self.pad.length_gradient(position[:, 0])
+        potential = on * self.law.potential(gap, voltage, self.layers)
+        sideways = -np.bincount(moved, potential[of] * value, weight.size)
+        return np.stack([sideways + weight * frame.slope, -weight], axis=1)
+
+    def fall(self, position: Floats, voltage: float, touching: Any) -> Floats:
+        """How fast the pull of a node falls with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where it
+        touches: there contact holds the gap.
+        """
+        gap = outline.frame(self.surface, position).gap
+        on = 1.0 if self.air_layer else touching.astype(float)
+        rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
+        return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
+
+    def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
+        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
+        component).
+        """
+        size = position.shape[0]
+        frame = outline.frame(self.surface, position)
+        length = self.pad.length(position[:, 0])
+        on = 1.0 if self.air_layer else touching.astype(float)
+        p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
+        dp = -self.fall(position, voltage, touching)
+        of, moved, value = self.pad.length_gradient(position[:, 0])
+        nodes = np.arange(size)
+        rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]
+        columns = [2 * nodes + 1, 2 * nodes, 2 * moved]
+        values = [-dp, dp * frame.slope, -p[of] * value]
+        if self.direction == "normal":
+            w = p * length
+            rows += [2 * nodes, 2 * nodes, 2 * of, 2 * moved, 2 * moved]
+            columns += [2 * nodes + 1, 2 * nodes, 2 * moved, 2 * of + 1, 2 * of]
+            values += [
+                dp * frame.slope,
+                w * frame.curvature - dp * frame.slope**2,
+                (p * frame.slope)[of] * value,
+                -p[of] * value,
+                (p * frame.slope)[of] * value,
+            ]
+        triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sparse.csr_matrix(triplets, shape=(2 * size, 2 * size))

@@ -1,0 +1,308 @@
+r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
+it.
+
+With the condensed tangent S, the bone's known step b and extra unknowns d (the
+bone's travel under a prescribed force, the squared voltage under a prescribed friction force) that push with
+p,
+
+.. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
+          S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
+
+:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
+the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness
+changes in every iteration but touches only the nodes near contact, so it is put into their small block alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.pad import Frame
+from evfem.contact.signorini import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    Border,
+    ContactProblem,
+    ContactSolution,
+    Pull,
+    solve_pulled,
+)
+
+#: an attraction whose feedback on its own node is weaker than this share is left to the next iteration
+WEAK = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,),
+    contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
+    interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
+    for the penalty variant, which thereby needs no other solver. `fall` (c,) N/mm per mm: how fast the
+    attraction falls with the gap; `closing` (c,) N/mm: what it gains when the gap closes; `rise` (c,): slope
+    of the friction coefficient in 1/mm.
+    """
+
+    frame: Frame
+    slip: Floats
+    force: Floats
+    status: Ints
+    friction: Floats
+    softness: Floats
+    fall: Floats
+    closing: Floats
+    rise: Floats
+
+    @cached_property
+    def axes(self) -> Floats:
+        """Rows n and t of every node, (c, 2, 2)."""
+        cos, sin = 1.0 / self.frame.stretch, self.frame.slope / self.frame.stretch
+        return np.stack([np.stack([-sin, cos], axis=1), np.stack([cos, sin], axis=1)], axis=1)
+
+    @property
+    def turning(self) -> Floats:
+        """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2): it
+        turns with the profile, and friction grows where its coefficient does.
+        """
+        axes = self.axes
+        rate = self.frame.curvature / self.frame.stretch**2
+        turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+        sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
+        return turned + (sign * self.rise * self.force[:, 0])[:, None] * axes[:, 1]
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses (c,), the
+    extra unknowns, number of dense contact solves, and whether the attraction's fall had to be reduced.
+    """
+
+    moved: Floats
+    force: Floats
+    status: Ints
+    extra: Floats
+    solves: int
+    reduced: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, coupled by
+    the attraction.
+    """
+
+    schur: Floats
+    compliance: Floats
+    _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def make(cls, schur: Floats, coupling: Floats | None) -> Condensed:
+        """From S (m, m) and the attraction's stiffness between nodes (m - 2, m - 2), or None."""
+        inner = schur[:-2, :-2] if coupling is None else schur[:-2, :-2] - coupling
+        return cls(schur, _inverse(inner, symmetric=coupling is None))
+
+    def among(self, near: Ints) -> Floats:
+        """Compliance among these candidates (2 k, 2 k), y before x; they are often those of the last call."""
+        key = near.tobytes()
+        if key not in self._last:
+            rows = y_before_x(near)
+            self._last.clear()
+            self._last[key] = self.compliance[np.ix_(rows, rows)]
+        return self._last[key]
+
+    @cached_property
+    def bone_rows(self) -> Floats:
+        """Forces on the bone's x and y by forces on the candidates, (2, m - 2)."""
+        return self.schur[-2:, :-2] @ self.compliance
+
+
+@dataclass(frozen=True, eq=False)
+class Unknown:
+    """A number that a step has to find beside the displacements, and the force on the bone that settles it.
+
+    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose force shall be
+    `force`.
+    """
+
+    push: Floats
+    axis: int
+    force: float
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes
+    back.
+
+    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known step; `unknowns` what else moves the
+    body; `snap`: nodes that the body cannot hold against the attraction close at once.
+    """
+
+    body: Condensed
+    candidates: Candidates
+    residual: Floats
+    bone: Floats
+    unknowns: tuple[Unknown, ...] = ()
+    snap: bool = False
+
+    def solve(self) -> Motion:
+        """Contact among the candidates, their motion, and the extra unknowns."""
+        free = self._free_motion()
+        normal_gap = self.candidates.frame.normal_gap
+        # under the present contact forces: without them the whole pad would sink
+        gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
+        status, solves = self.candidates.status.copy(), 0
+        own = np.diagonal(self.body.compliance)[1::2]
+        near = np.flatnonzero((status != OPEN) | (gap < 0.0) | (self.candidates.fall * own > WEAK))
+        if not near.size:
+            near = np.array([np.argmin(gap)])
+        while True:
+            found, pushed = self._solve_near(near, free, status[near])
+            solves += found.solves
+            status[near] = found.status
+            moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
+            gap = normal_gap + self._along_normal(moved)
+            gap[near] = 0.0
+            hit = np.flatnonzero(gap < -1e-12 * (1.0 + np.abs(self.candidates.frame.gap)))
+            if not hit.size:
+                break
+            near = np.union1d(near, hit)
+        force = np.zeros_like(self.candidates.force)
+        force[near] = found.force.reshape(2, -1).T
+        return Motion(moved, force, status, found.extra, solves, found.reduced)
+
+    def _along_normal(self, moved: Floats) -> Floats:
+        return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
+
+    def _free_motion(self) -> Floats:
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 + p)."""
+        right = self.residual[:-2] - self._present - self.body.schur[:-2, -2:] @ self.bone
+        return self.body.compliance @ np.column_stack(
+            [right, *(unknown.push[:-2] for unknown in self.unknowns)]
+        )
+
+    @cached_property
+    def _present(self) -> Floats:
+        """Present contact forces on the candidates (2 c,), in the laboratory frame."""
+        return np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
+
+    def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
+        """Candidates' motion (2 c,) by forces (2 k,), y before x, on the near ones."""
+        force = np.zeros(2 * self.candidates.status.size)
+        force[y_before_x(near)] = pushed
+        return self.body.compliance @ force
+
+    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
+        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y before x, that
+        move the body, turning included.
+        """
+        known, rows = self.candidates, y_before_x(near)
+        turning = Turning.of(known, near)
+        C, W = turning.soften(self.body.among(near), free[rows])
+        axes = known.axes[near]
+        start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
+            [known.frame.normal_gap[near], known.slip[near]]
+        )
+        compliance = _local(axes, _local(axes, C).T).T
+        if known.softness.any():
+            compliance = compliance + np.diag(known.softness[near].T.ravel())
+        border = self._border(rows, free, (C, W), turning, axes) if self.unknowns else None
+        problem = ContactProblem(start, compliance, known.friction[near], border)
+        pull = Pull(known.fall[near], known.frame.normal_gap[near], known.closing[near])
+        found = solve_pulled(problem, pull, status, self.snap)
+        pressed = (found.force + found.relief).reshape(2, -1)
+        force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
+        if turning.loaded.size:
+            force = force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
+        return found, force
+
+    def _border(
+        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], turning: Turning, axes: Floats
+    ) -> Border:
+        """Balance of the bone along the unknowns' axes, as the equations that settle them."""
+        C, W = near
+        axis = [unknown.axis - 2 for unknown in self.unknowns]
+        S = self.body.schur[axis]
+        pushes = np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
+        wanted = np.array([unknown.force for unknown in self.unknowns])
+        row = self.body.bone_rows[[unknown.axis for unknown in self.unknowns]][:, rows]
+        pivot = S[:, :-2] @ free[:, 1:] - pushes
+        value = self.residual[axis] + wanted - S[:, -2:] @ self.bone - S[:, :-2] @ free[:, 0]
+        through = turning.transposed(row)
+        row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
+        # a body that nothing holds has a zero here, whose rounding may be negative: let it fall, not rise
+        floor = 1e-10 * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
+        own = np.diagonal(pivot)
+        pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
+        return Border(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y per x
+    displacement of the loaded nodes. Components of others come y before x.
+    """
+
+    size: int
+    loaded: Ints
+    rate: Floats
+
+    @classmethod
+    def of(cls, candidates: Candidates, near: Ints) -> Turning:
+        """Of the `near` nodes; on a flat surface no node is loaded."""
+        rate = candidates.turning[near]
+        loaded = np.flatnonzero(rate.any(axis=1))
+        return cls(near.size, loaded, rate[loaded])
+
+    def soften(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
+        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small system, T
+        has few columns.
+        """
+        if not self.loaded.size:
+            return C, W
+        x, y = self.size + self.loaded, self.loaded
+        B = C[:, x] * self.rate[:, 0] + C[:, y] * self.rate[:, 1]
+        gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
+        return C + gain @ C[x], W + gain @ W[x]
+
+    def force(self, moved: Floats) -> Floats:
+        """Change of the forces (2 k,) by displacements (2 k,)."""
+        change = np.zeros((2, self.size))
+        change[:, self.loaded] = self.rate.T[::-1] * moved[self.size + self.loaded]
+        return change.ravel()
+
+    def transposed(self, rows: Floats) -> Floats:
+        """Rows (p, 2 k) times T."""
+        through, x = np.zeros_like(rows), self.size + self.loaded
+        through[:, x] = rows[:, x] * self.rate[:, 0] + rows[:, self.loaded] * self.rate[:, 1]
+        return through
+
+
+def _inverse(matrix: Floats, symmetric: bool) -> Floats:
+    """Inverse; a positive definite one by Cholesky, which takes a third of the time."""
+    if symmetric:
+        from scipy.linalg import lapack
+
+        factor, failed = lapack.dpotrf(matrix, lower=True)
+        if not failed:
+            lower, _ = lapack.dpotri(factor, lower=True)
+            return lower + np.tril(lower, -1).T
+    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+
+
+def y_before_x(nodes: Ints) -> Ints:
+    """Rows (2 k,) of these nodes among interleaved x and y components."""
+    return np.concatenate([2 * nodes + 1, 2 * nodes])
+
+
+def _local(axes: Floats, columns: Floats) -> Floats:
+    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat surface."""
+    if not axes[:, 0, 0].any():
+        return columns
+    y, x = columns.reshape(2, len(axes), -1)
+    normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
+    return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])

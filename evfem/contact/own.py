@@ -1,0 +1,118 @@
+"""What contact needs of a surface, for surfaces of the user's own that only have a height."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import set_frozen
+from evfem.contact.surfaces import Flat
+from evfem.errors import InputError
+from evfem.protocols import CompleteSurface, Surface
+from evfem.tensor import STEP, Array
+
+#: central difference of fourth order: f' = sum of c (f(x + n h) - f(x - n h)) / h, and its step in mm
+DIFFERENCE = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+LENGTH = 1e-4
+
+
+def completed(surface: Surface) -> CompleteSurface:
+    """The surface itself if it has everything, else an `OwnSurface` around it.
+
+    Raises InputError for an object without `height(x)`, and for a friction, y or insulator that cannot be.
+
+    >>> class Ramp:
+    ...     friction = 0.3
+    ...     def height(self, x): return 0.1 * x
+    >>> ramp = completed(Ramp())
+    >>> ramp.slope(np.array([2.0])).tolist(), ramp.friction_coefficient(np.array([2.0])).tolist()
+    ([0.1], [0.3])
+    """
+    if isinstance(surface, CompleteSurface):
+        return surface
+    if isinstance(surface, type) or not isinstance(surface, Surface):
+        allowed = "Flat, Display, Sinusoid, Profile, or an object with a method height(x)"
+        raise InputError("surface", surface, allowed)
+    plain = Flat(
+        getattr(surface, "friction", 0.0), getattr(surface, "y", None), getattr(surface, "insulator", None)
+    )
+    return OwnSurface(surface, plain, plain.y)
+
+
+@dataclass(frozen=True)
+class OwnSurface:
+    """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
+
+    own: Any
+    plain: Flat
+    y: float | None = field(default=None)
+    is_flat = False
+
+    @property
+    def insulator(self) -> Any:
+        """Layer over the electrode, or None."""
+        return self.plain.insulator
+
+    @property
+    def friction(self) -> Any:
+        """The user's number or table."""
+        return self.plain.friction
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the friction coefficient may be positive anywhere."""
+        return self.plain.has_friction or hasattr(self.own, "friction_coefficient")
+
+    @property
+    def friction_jumps(self) -> Array:
+        """Jumps of a table of friction; a method of the user's has none."""
+        return self.plain.friction_jumps
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        return np.asarray(self.own.height(x))
+
+    def slope(self, x: Array) -> Array:
+        """The user's own slope, or the derivative of the height."""
+        own = getattr(self.own, "slope", None)
+        return np.asarray(own(x)) if own is not None else _derivative(self.own.height, x)
+
+    def curvature(self, x: Array) -> Array:
+        """The user's own curvature, or the derivative of the slope (1/mm)."""
+        own = getattr(self.own, "curvature", None)
+        return np.asarray(own(x)) if own is not None else _derivative(self.slope, x)
+
+    def friction_coefficient(self, x: Array) -> Array:
+        """The user's own coefficient, or that of the number or table."""
+        own = getattr(self.own, "friction_coefficient", None)
+        return np.asarray(own(x)) if own is not None else self.plain.friction_coefficient(x)
+
+    def friction_slope(self, x: Array) -> Array:
+        """Derivative of the friction coefficient (1/mm)."""
+        own = getattr(self.own, "friction_coefficient", None)
+        return _difference(own, x) if own is not None else self.plain.friction_slope(x)
+
+    def shifted(self, y: float) -> OwnSurface:
+        """The same surface with its height shifted by `y` (mm)."""
+        moved = copy(self)
+        set_frozen(moved, y=y)
+        return moved
+
+
+def _derivative(function: Callable[[Array], Any], x: Array) -> Array:
+    """Derivative at real x: by a complex step, or by differences of a function that drops it."""
+    try:
+        stepped = np.asarray(function(np.asarray(x) + 1j * STEP))
+    except TypeError:  # numpy functions of real numbers alone
+        return _difference(function, x)
+    return stepped.imag / STEP if np.iscomplexobj(stepped) else _difference(function, x)
+
+
+def _difference(function: Callable[[Array], Any], x: Array) -> Array:
+    x = np.real(x)
+    ahead = [c * (function(x + n * LENGTH) - function(x - n * LENGTH)) for n, c in DIFFERENCE]
+    return np.asarray(sum(ahead)) / LENGTH

@@ -1,0 +1,129 @@
+r"""The outline that faces the surface: pad nodes, tributary lengths projected on x, gaps, normals and contact
+widths.
+
+A pad edge with ends a, b carries :math:`\max(0, x_b - x_a)` of projected length, shared 1/2, 1/2 between its
+nodes, or 1/6, 4/6, 1/6 on quadratic edges (the outward normal faces down exactly where x grows along the
+edge, the body being on its left). The vertical gap is :math:`g = y - h(x)`, positive when open; normal and
+tangent of the surface are :math:`n = (-h', 1)/r`, :math:`t = (1, h')/r`, :math:`r = \sqrt{1 + h'^2}`. Arrays:
+P pad nodes in ascending number.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+
+SHARES = {2: np.array([0.5, 0.5]), 3: np.array([1.0, 1.0, 4.0]) / 6.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Pad:
+    """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those not on the
+    bone).
+
+    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free` (P,) bool.
+    """
+
+    nodes: Ints
+    edges: Ints
+    free: Any
+
+    @property
+    def shares(self) -> Floats:
+        """Part of an edge's projected length that each of its nodes carries."""
+        return SHARES[self.edges.shape[1]]
+
+    def length(self, x: Floats) -> Floats:
+        """Tributary length of every node projected on x, where the outline faces down (P,) in mm."""
+        width = np.maximum(x[self.edges[:, 1]] - x[self.edges[:, 0]], 0.0)
+        shared = np.outer(width, self.shares).ravel()
+        return np.bincount(self.edges.ravel(), shared, self.nodes.size).astype(float, copy=False)
+
+    def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
+        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
+        start, end = self.edges[:, :1], self.edges[:, 1:2]
+        facing = (x[end] > x[start]) * self.shares
+        of = np.broadcast_to(self.edges, facing.shape).ravel()
+        moved = [np.broadcast_to(node, facing.shape).ravel() for node in (start, end)]
+        return (
+            np.concatenate([of, of]),
+            np.concatenate(moved),
+            np.concatenate([-facing.ravel(), facing.ravel()]),
+        )
+
+    def contact_widths(self, x: Floats, touching: Any) -> tuple[float, float]:
+        """Overall and real contact width (mm): outer ends of the first and last touching node's share,
+        and the sum of all shares.
+        """
+        if not touching.any():
+            return 0.0, 0.0
+        left, right = np.full(self.nodes.size, np.inf), np.full(self.nodes.size, -np.inf)
+        a, b = x[self.edges[:, 0]], x[self.edges[:, 1]]
+        ends = np.cumsum(np.concatenate([[0.0], self.shares[[0, *range(2, self.shares.size), 1]]]))
+        order = [0, *range(2, self.shares.size), 1]
+        facing = b > a
+        for place, column in enumerate(order):
+            node = self.edges[facing, column]
+            np.minimum.at(left, node, (a + ends[place] * (b - a))[facing])
+            np.maximum.at(right, node, (a + ends[place + 1] * (b - a))[facing])
+        inside = touching & np.isfinite(left)
+        if not inside.any():
+            return 0.0, 0.0
+        return float(right[inside].max() - left[inside].min()), float(self.length(x)[inside].sum())
+
+
+def make_pad(mesh: Mesh) -> Pad:
+    """The pad of a mesh; raises InputError where no outer edge belongs to it."""
+    edges = mesh.edges_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
+    if not len(edges):
+        raise InputError(
+            "finger.mesh",
+            "no outer edge whose nodes are all on `pad`",
+            "point data or a physical group `pad`",
+        )
+    nodes, local = np.unique(edges, return_inverse=True)
+    free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))
+    return Pad(nodes, local.reshape(edges.shape), free)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The surface below (or above) the pad nodes: vertical gap, gap along the normal, slope and
+    curvature, all (P,).
+    """
+
+    gap: Floats
+    slope: Floats
+    curvature: Floats
+
+    @property
+    def stretch(self) -> Floats:
+        """Arc length of the profile per unit of x."""
+        return np.sqrt(1.0 + self.slope**2)
+
+    @property
+    def normal_gap(self) -> Floats:
+        """Gap along the profile's normal at the node's x (first order)."""
+        return self.gap / self.stretch
+
+
+def frame(surface: Any, position: Floats) -> Frame:
+    """Surface frame at current node positions (P, 2); `surface` has y set, so that h(x) = surface.y +
+    surface.height(x).
+    """
+    x = position[:, 0]
+    if surface.is_flat:
+        zero = np.zeros_like(x)
+        return Frame(position[:, 1] - surface.y, zero, zero)
+    return Frame(position[:, 1] - surface.y - surface.height(x), surface.slope(x), surface.curvature(x))
+
+
+def normals(frame: Frame) -> Floats:
+    """Unit normals of the profile at the nodes (P, 2), pointing towards the finger."""
+    return np.stack([-frame.slope, np.ones_like(frame.slope)], axis=1) / frame.stretch[:, None]

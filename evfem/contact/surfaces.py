@@ -1,0 +1,327 @@
+"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient, insulator.
+
+A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED profile: the
+scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical gap of the undeformed
+finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear between its rows, constant beyond
+them; at a repeated x the later row holds from that x on. `insulator` is the layer between the surface and
+the electrode under it (None: no electrode). x may be any array, real or complex (for
+`tensor.complex_step`); the results have its shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from evfem.common.checks import real, set_frozen
+from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
+from evfem.common.views import changed
+from evfem.electrostatics.laws import Layer
+from evfem.errors import InputError
+from evfem.tensor import Array
+
+Rows = Sequence[Sequence[float]]
+
+FRICTION = (
+    "a number from 0 to 100, or a table [[x, mu], ...] with mu from 0 to 100 and x not decreasing, "
+    "within 1e6 mm, in at most 10000 rows"
+)
+TERMS = (
+    "a list of at most 1000 rows [amplitude, wavenumber, phase], amplitudes within 1e3 mm, wavenumbers and "
+    "phases within 1e6"
+)
+#: what a surface may be at most: rows of a table, sines of a sum, samples of a profile; positions (mm),
+#: heights and amplitudes (mm), wavenumbers (rad/mm), coefficients of friction; how near samples may be (mm)
+MOST_ROWS, MOST_TERMS, MOST_SAMPLES = 10_000, 1_000, 1_000_000
+FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
+#: Equation (25) of the paper, 0.025 (sin 6x + cos 12x - 1) in mm, as rows amplitude, wavenumber, phase.
+EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
+
+
+class _Surface:
+    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
+
+    friction: float | Rows
+    y: float | None
+    insulator: Layer | None
+    is_flat = False
+
+    def _check_common(self) -> None:
+        set_frozen(self, friction=_friction(self.friction))
+        if self.y is not None:
+            allowed = "a height within 1e3 mm, or None for first touch at the start"
+            set_frozen(self, y=real("surface.y", self.y, allowed, lambda y: abs(y) <= HIGHEST))
+        if not (self.insulator is None or isinstance(self.insulator, Layer)):
+            raise InputError("surface.insulator", self.insulator, "Layer(thickness, eps_r), or None")
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether the friction coefficient is positive anywhere."""
+        return bool(np.max(np.atleast_2d(self.friction)[:, -1]) > 0.0)
+
+    def friction_coefficient(self, x: Array) -> Array:
+        """Friction coefficient at x (mm), real.
+
+        >>> step = Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]])
+        >>> step.friction_coefficient(np.array([-1.0, 1.9, 2.0, 9.0])).tolist()
+        [0.5, 0.5, 0.6, 0.6]
+        """
+        if isinstance(self.friction, float):
+            return np.full(np.shape(x), self.friction)
+        place, mu = np.array(self.friction).T
+        return piecewise_linear(place, mu, x)
+
+    def friction_slope(self, x: Array) -> Array:
+        """Derivative (1/mm) of the friction coefficient at x (mm), jumps left out.
+
+        >>> Flat(friction=[[0.0, 0.25], [2.0, 0.75]]).friction_slope(np.array([1.0, 3.0])).tolist()
+        [0.25, 0.0]
+        """
+        if isinstance(self.friction, float):
+            return np.zeros(np.shape(x))
+        place, mu = np.array(self.friction).T
+        return piecewise_slope(place, mu, x)
+
+    @property
+    def friction_jumps(self) -> Array:
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on.
+
+        >>> Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]]).friction_jumps.tolist()
+        [[2.0, 0.5, 0.6]]
+        """
+        if isinstance(self.friction, float):
+            return np.zeros((0, 3))
+        place, mu = np.array(self.friction).T
+        first = np.concatenate([[True], np.diff(place) > 0])
+        last = np.concatenate([np.diff(place) > 0, [True]])
+        jumps = np.stack([place[last], mu[first], mu[last]], axis=1)
+        return jumps[jumps[:, 1] != jumps[:, 2]]
+
+    def shifted(self, y: float) -> Self:
+        """The same surface with its height shifted by `y` (mm)."""
+        moved = copy(self)
+        set_frozen(moved, y=y)
+        return moved
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        raise NotImplementedError
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        raise NotImplementedError
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        raise NotImplementedError
+
+
+class _Level(_Surface):
+    """A level surface: height, slope and curvature are zero."""
+
+    is_flat = True
+
+    def height(self, x: Array) -> Array:
+        """Zero at every x."""
+        return np.zeros_like(x, dtype=np.result_type(x, float))
+
+    slope = curvature = height
+
+
+@dataclass(frozen=True)
+class Flat(_Level):
+    """A level rigid surface.
+
+    >>> Flat(friction=0.4).height(np.array([1.0, 2.0])).tolist()
+    [0.0, 0.0]
+    """
+
+    friction: float | Rows = 0.3
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+
+
+@dataclass(frozen=True)
+class Display(_Level):
+    """A level display: an insulator over an electrode, by default that of Table 2 (0.09 mm, eps_r 3.35).
+
+    >>> Display().insulator
+    Layer(thickness=0.09, eps_r=3.35)
+    """
+
+    insulator: Layer | None = field(default_factory=lambda: Layer(thickness=0.09, eps_r=3.35))
+    friction: float | Rows = 0.3
+    y: float | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+
+
+@dataclass(frozen=True)
+class Sinusoid(_Surface):
+    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
+
+    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the paper,
+    height(x) = 0.025 (sin 6x + cos 12x - 1).
+
+    >>> float(Sinusoid().height(0.0))
+    0.0
+    """
+
+    friction: float | Rows = 0.3
+    terms: Rows | None = None
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __post_init__(self) -> None:
+        self._check_common()
+        terms = EQUATION_25 if self.terms is None else self.terms
+        rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
+        if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
+            raise InputError("surface.terms", terms, TERMS)
+        set_frozen(self, terms=rows)
+
+    def _sum(self, x: Array, order: int) -> Array:
+        """Derivative of the given order: each one is a factor k and a quarter of a turn."""
+        assert self.terms is not None
+        sines = [a * k**order * np.sin(k * x + phase + order * np.pi / 2) for a, k, phase in self.terms]
+        return np.sum(sines, axis=0)
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        return self._sum(x, 0)
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        return self._sum(x, 1)
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        return self._sum(x, 2)
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Profile(_Surface):
+    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond the ends.
+
+    x must increase; at least two points (kept as `x` and `samples`). Between two samples the height stays
+    between their heights, its slope is continuous, its curvature jumps at samples. Source: Fritsch and
+    Carlson, SIAM J. Numer. Anal. 17 (1980) 238-246, doi:10.1137/0717021.
+
+    >>> Profile([0.0, 1.0, 2.0], [0.0, 0.5, 0.0]).height(np.array([-1.0, 1.0, 1.5])).tolist()
+    [0.0, 0.5, 0.375]
+    """
+
+    x: Array
+    samples: Array
+    friction: float | Rows = 0.3
+    y: float | None = None
+    insulator: Layer | None = None
+
+    def __init__(
+        self,
+        x: Any,
+        height: Any,
+        friction: float | Rows = 0.3,
+        y: float | None = None,
+        insulator: Layer | None = None,
+    ) -> None:
+        set_frozen(self, friction=friction, y=y, insulator=insulator)
+        self._check_common()
+        set_frozen(self, x=numbers("surface.x", x, "a list of positions in mm"))
+        set_frozen(self, samples=numbers("surface.height", height, "a list of heights in mm"))
+        _check_samples(self.x, self.samples)
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        friction: float | Rows = 0.3,
+        y: float | None = None,
+        insulator: Layer | None = None,
+    ) -> Profile:
+        """The profile in a file with the header `x,height` and one point (mm) in each further line."""
+        x, height = read_columns(Path(path), ["x", "height"], "surface.file")
+        return cls(x, height, friction, y, insulator)
+
+    def __repr__(self) -> str:
+        x, low, high = self.x, self.samples.min(), self.samples.max()
+        size = f"{x.size} points, x {x[0]:.4g} to {x[-1]:.4g} mm, height {low:.4g} to {high:.4g} mm"
+        more = [f"{key}={v!r}" for key, v in changed(self).items() if key not in ("x", "samples")]
+        return f"Profile({', '.join([size, *more])})"
+
+    @cached_property
+    def _cubics(self) -> Array:
+        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left end."""
+        from scipy.interpolate import PchipInterpolator
+
+        with np.errstate(over="ignore"):  # slopes next to nothing have infinite inverses, and so vanish
+            inner = PchipInterpolator(self.x, self.samples).c
+        ends = np.zeros((4, 2))
+        ends[3] = self.samples[0], self.samples[-1]
+        return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
+
+    def _piece(self, x: Array) -> tuple[Array, Array]:
+        """Cubic (4, ...) at x, and distance (...) from the left end of its piece."""
+        piece = np.searchsorted(self.x, np.real(x), side="right")
+        return self._cubics[:, piece], x - self.x[np.maximum(piece - 1, 0)]
+
+    def height(self, x: Array) -> Array:
+        """Height (mm) of the unshifted profile at x (mm)."""
+        c, d = self._piece(x)
+        return c[3] + d * (c[2] + d * (c[1] + d * c[0]))
+
+    def slope(self, x: Array) -> Array:
+        """Derivative of the height at x (mm)."""
+        c, d = self._piece(x)
+        return c[2] + d * (2.0 * c[1] + d * 3.0 * c[0])
+
+    def curvature(self, x: Array) -> Array:
+        """Second derivative (1/mm) of the height at x (mm)."""
+        c, d = self._piece(x)
+        return 2.0 * c[1] + d * 6.0 * c[0]
+
+
+def _friction(given: Any) -> float | Rows:
+    """A number as float, a table as a tuple of rows."""
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
+        return real("surface.friction", given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
+    rows = _rows("surface.friction", given, 2, FRICTION, MOST_ROWS)
+    x, mu = np.array(rows).T
+    if not ((mu >= 0.0) & (mu <= ROUGHEST) & (np.abs(x) <= FARTHEST)).all() or (np.diff(x) < 0.0).any():
+        raise InputError("surface.friction", given, FRICTION)
+    return rows
+
+
+def _rows(key: str, given: Any, columns: int, allowed: str, most: int) -> tuple[tuple[float, ...], ...]:
+    """A table of numbers as a tuple of rows."""
+    table = numbers(key, given, allowed, axes=2)
+    if table.shape[1] != columns or not 0 < len(table) <= most:
+        raise InputError(key, given, allowed)
+    return tuple(map(tuple, table.tolist()))
+
+
+def _check_samples(x: Array, height: Array) -> None:
+    if len(x) < 2 or len(x) != len(height):
+        given = f"{len(x)} values of x, {len(height)} heights"
+        raise InputError("surface.x", given, "at least two points, and as many heights as x")
+    if len(x) > MOST_SAMPLES:
+        raise InputError("surface.x", f"{len(x)} points", f"at most {MOST_SAMPLES} points")
+    for key, values, most in (("surface.x", x, FARTHEST), ("surface.height", height, HIGHEST)):
+        if np.abs(values).max() > most:
+            given = f"{values[np.argmax(np.abs(values))]:g}"
+            raise InputError(key, given, f"lengths in mm within {most:g} mm")
+    wrong = np.flatnonzero(np.diff(x) < NEAREST)
+    if len(wrong):
+        n = int(wrong[0])
+        given = f"{x[n]:g}, then {x[n + 1]:g} (points {n + 1}, {n + 2})"
+        raise InputError("surface.x", given, f"increasing values, at least {NEAREST:g} mm apart")

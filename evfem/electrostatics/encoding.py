@@ -1,0 +1,220 @@
+"""Closed-form rendering: from the friction of a real surface to a display's voltage, (1), (12)-(20b).
+
+Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is ``F_e = A p(0, U)`` with
+the contact area ``A = k F_n^m``; the air layer around it is left out. Units: mm, N, V. In plane strain,
+forces are per mm of depth; then only a linear area law (m = 1) keeps its k, in mm^2/N.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.electrostatics.laws import Layers
+from evfem.errors import InputError
+from evfem.protocols import ForceLaw
+
+Floats = npt.NDArray[np.float64]
+POSITIVE_FORCE = "a normal force above zero"
+
+
+@dataclass(frozen=True)
+class AreaLaw:
+    """Contact area ``A = k F_n^m``, equation (15): mm^2 for N, with k in mm^2/N^m.
+
+    >>> round(AreaLaw(k=63.0, m=0.68)(1.0), 6)
+    63.0
+    """
+
+    k: float
+    m: float = 1.0
+
+    def __post_init__(self) -> None:
+        above("k", self.k, 0.0, "an area per N^m in mm^2 above zero")
+        finite("m", self.m, "a finite exponent")
+
+    def __call__(self, normal_force: Values) -> Values:
+        """Area in mm^2 at `normal_force` in N, 0 or more."""
+        force = at_least("normal_force", normal_force, 0.0, "a normal force in N, not negative")
+        return plain(self.k * np.asarray(force) ** self.m)
+
+    def linearised(self, highest: float) -> AreaLaw:
+        """The line through the origin closest to this law in least squares over 0 <= F_n <= `highest`.
+
+        k' = 3 k highest^(m - 1) / (m + 2): what the paper's k' in (20a) stands for.
+
+        >>> round(AreaLaw(63.0, 0.68).linearised(0.2).k, 1)
+        118.0
+        """
+        above("highest", highest, 0.0, POSITIVE_FORCE)
+        return AreaLaw(3.0 * self.k * highest ** (self.m - 1.0) / (self.m + 2.0))
+
+
+def required_attraction(friction: Values, display_friction: Values, normal_force: Values) -> Values:
+    """Attraction (force of `normal_force`'s unit) that makes the display feel like `friction`, equation (18).
+
+    ``F_e = (mu_rs / mu_hd - 1) F_n``; 0 where the surface is slipperier than the display, because attraction
+    can only add friction (see `share_not_renderable`).
+    """
+    surface = at_least("friction", friction, 0.0, "a friction coefficient, not negative")
+    display = above("display_friction", display_friction, 0.0, "a friction coefficient above zero")
+    force = at_least("normal_force", normal_force, 0.0, "a normal force, not negative")
+    excess = np.asarray(surface) / display - 1.0
+    return plain(np.where(excess.real > 0.0, excess, 0.0) * force)
+
+
+def share_not_renderable(position: Values, friction: Values, display_friction: float) -> float:
+    """Share of the path on which `friction` (linear between `position` in mm) is below the display's own.
+
+    >>> share_not_renderable([0.0, 1.0, 2.0], [0.4, 0.6, 0.6], display_friction=0.5)
+    0.25
+    """
+    x = np.asarray(finite("position", position, "positions in mm"))
+    above("display_friction", display_friction, 0.0, "a friction coefficient above zero")
+    excess = np.asarray(finite("friction", friction, "friction coefficients")) - display_friction
+    length = np.diff(x)
+    if x.ndim != 1 or x.shape != excess.shape or x.size < 2 or np.any(length < 0) or not np.any(length > 0):
+        raise InputError("position", f"shape {x.shape}", "positions that do not fall, as many as frictions")
+    lower, upper = np.minimum(excess[:-1], excess[1:]), np.maximum(excess[:-1], excess[1:])
+    rise = np.where(upper > lower, upper - lower, 1.0)
+    below = np.where(upper <= lower, lower < 0.0, np.clip(-lower / rise, 0.0, 1.0))
+    return float(np.sum(below * length) / np.sum(length))
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """A display with what is needed to encode friction as voltage: law, solid layers, area law, own friction.
+
+    The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with `StrongTroxel`;
+    (20a) and (20b) have a linear area law, where the voltage does not depend on the normal force. The
+    law must be quadratic in the voltage, as electrostatics is.
+
+    >>> from evfem.electrostatics.laws import Kaczmarek, Layer
+    >>> skin, film = Layer(0.20, 1650.0), Layer(0.09, 3.35)
+    >>> display = Encoding(Kaczmarek(), Layers.of(skin, film), AreaLaw(112.0), friction=0.5)
+    >>> round(display.voltage_for_friction(0.6), 2)
+    1776.73
+    """
+
+    law: ForceLaw
+    layers: Layers
+    area: AreaLaw
+    friction: float
+
+    def __post_init__(self) -> None:
+        above("friction", self.friction, 0.0, "a friction coefficient above zero")
+        one, two = (np.asarray(self.law.traction(0.0, u, self.layers)) for u in (1.0, 2.0))
+        if not np.allclose(two, 4.0 * one, rtol=1e-9, atol=0.0):
+            raise InputError("law", self.law, "a law whose traction grows with the square of the voltage")
+
+    def attraction(self, normal_force: Values, voltage: Values) -> Values:
+        """F_e in N of touching skin, equations (14) and (15)."""
+        return plain(self.area(normal_force) * np.asarray(self.law.traction(0.0, voltage, self.layers)))
+
+    def tangential_force(self, normal_force: Values, voltage: Values) -> Values:
+        """F_t = mu_hd (F_n + F_e) in N in full slip, equations (1), (13), (16a), (16b)."""
+        return plain(self.friction * np.asarray(normal_force + self.attraction(normal_force, voltage)))
+
+    def voltage_for_attraction(self, attraction: Values, normal_force: Values) -> Values:
+        """U in V that attracts with `attraction` N at `normal_force` N, equation (17)."""
+        wanted = at_least("attraction", attraction, 0.0, "a force in N, not negative")
+        force = above("normal_force", normal_force, 0.0, POSITIVE_FORCE)
+        per_square_volt = self.law.traction(0.0, 1.0, self.layers) * self.area(force)
+        return plain(np.sqrt(np.asarray(wanted) / per_square_volt))
+
+    def voltage_for_friction(self, friction: Values, normal_force: Values = 1.0) -> Values:
+        """U in V that makes the display feel like `friction`, equations (19), (20a), (20b).
+
+        0 where the surface is slipperier than the display. `normal_force` in N matters only if m differs
+        from 1.
+        """
+        wanted = required_attraction(friction, self.friction, normal_force)
+        return self.voltage_for_attraction(wanted, normal_force)
+
+
+@dataclass(frozen=True)
+class PowerFit:
+    """``y = k x^m`` fitted to points, with the standard errors of both (infinite with only two points)."""
+
+    k: float
+    m: float
+    k_error: float
+    m_error: float
+
+
+def fit_power(x: Values, y: Values, *, relative: bool = True) -> PowerFit:
+    """Least-squares fit of ``y = k x^m`` to at least two points.
+
+    `relative` (the default) minimises the errors of ln y, which needs y > 0; otherwise those of y
+    itself. Area laws (15) are ``fit_power(normal_force, area)``; in (11), alpha is k and beta is -m.
+    Raises InputError for other than two equally long lists, x <= 0, or fewer than two different x.
+
+    >>> fit = fit_power([0.1, 0.5, 1.0], [63.0 * 0.1**0.68, 63.0 * 0.5**0.68, 63.0])
+    >>> round(fit.k, 9), round(fit.m, 9)
+    (63.0, 0.68)
+    """
+    x, y = _points(x, y)
+    if relative:
+        above("y", y, 0.0, "values above zero for a fit of relative errors")
+        k, m = _straight_line(np.log(x), np.log(y))
+        errors = _standard_errors(
+            np.stack([np.ones_like(x), np.log(x)]), np.log(y) - np.log(k) - m * np.log(x)
+        )
+        return PowerFit(k, m, k * errors[0], errors[1])
+    from scipy.optimize import least_squares
+
+    usable = y > 0
+    enough = np.unique(x[usable]).size >= 2
+    start = _straight_line(np.log(x[usable]), np.log(y[usable])) if enough else (float(np.mean(y)), 1.0)
+    scale = np.max(np.abs(y))
+    found = least_squares(
+        lambda p: (start[0] * p[0] * x ** p[1] - y) / scale,
+        (1.0, start[1]),
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
+    errors = _standard_errors(found.jac.T, found.fun)
+    return PowerFit(float(start[0] * found.x[0]), float(found.x[1]), abs(start[0]) * errors[0], errors[1])
+
+
+def _points(x: Values, y: Values) -> tuple[Floats, Floats]:
+    x = np.asarray(above("x", x, 0.0, "values above zero"))
+    y = np.asarray(finite("y", y, "finite values"))
+    if x.ndim != 1 or x.shape != y.shape or np.unique(x).size < 2:
+        raise InputError(
+            "x, y", f"shapes {x.shape} and {y.shape}", "two lists of equal length, two different x"
+        )
+    return x, y
+
+
+def _straight_line(log_x: Floats, log_y: Floats) -> tuple[float, float]:
+    m, log_k = np.polyfit(log_x, log_y, 1)
+    return float(np.exp(log_k)), float(m)
+
+
+def _standard_errors(jacobian: Floats, residual: Floats) -> Floats:
+    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters, points)."""
+    freedom = residual.size - len(jacobian)
+    if freedom == 0:
+        return np.full(len(jacobian), np.inf)
+    covariance = np.linalg.inv(jacobian @ jacobian.T) * (residual @ residual) / freedom
+    return np.sqrt(np.diag(covariance))
+
+
+def fit_area_to_friction(
+    normal_force: Values, tangential_force: Values, voltage: float, display: Encoding
+) -> PowerFit:
+    """Area law that explains friction measured with `voltage` on: (16a), (16b) fitted for k and m.
+
+    `display` gives law, layers and friction coefficient (its own area law is not used). Least squares in the
+    tangential force, in N; k in mm^2/N^m. The two laws give the same m, and k in the inverse ratio of their
+    contact pressures.
+    """
+    above("voltage", voltage, 0.0, "a voltage in V above zero")
+    excess = np.asarray(tangential_force) / display.friction - np.asarray(normal_force)
+    pressure = display.law.traction(0.0, voltage, display.layers)
+    return fit_power(normal_force, excess / pressure, relative=False)

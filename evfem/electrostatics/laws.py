@@ -1,0 +1,198 @@
+"""Electrostatic attraction between skin and an insulated electrode: solid layers and the two force laws.
+
+Both laws treat skin and electrode as parallel plates with solid layers (stratum corneum, insulator) and
+a gap in series. With ``s`` = sum of d / eps_r over the solid layers (`Layers.reduced`), ``D`` = their
+total thickness (`Layers.thickness`), the gap ``g``, the permittivity ``e`` of what fills it (1 for air)
+and the voltage ``U``::
+
+    StrongTroxel   p = e eps_0 U^2 / (2 (g + e s)^2)            equations (3), (6), (8a), (9a)
+    Kaczmarek      p = e eps_0 U^2 / (2 (g + e s) (g + D))      equations (5), (7), (8b), (9b)
+
+`StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers stretch
+with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are positive where
+they attract. Equation numbers are those of the paper on modelling and validating electrovibration
+displays that the project starts from. Every function takes scalars or arrays that broadcast, real or
+complex (for derivatives by complex step); scalars give a float.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.constants import epsilon_0 as eps_0
+
+from evfem.common.checks import Values, at_least, plain
+from evfem.errors import InputError
+from evfem.protocols import ForceLaw
+from evfem.tensor import STEP
+
+__all__ = ["Kaczmarek", "Layer", "Layers", "StrongTroxel", "eps_0", "traction_derivative"]
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or arrays.
+
+    >>> Layer(thickness=0.09, eps_r=3.35)
+    Layer(thickness=0.09, eps_r=3.35)
+    """
+
+    thickness: Values
+    eps_r: Values
+
+    def __post_init__(self) -> None:
+        thickness = at_least("layer thickness", self.thickness, 0.0, "a finite length in mm, not negative")
+        eps_r = at_least("layer eps_r", self.eps_r, 1.0, "a relative permittivity of at least 1")
+        object.__setattr__(self, "thickness", thickness)
+        object.__setattr__(self, "eps_r", eps_r)
+
+
+@dataclass(frozen=True)
+class Layers:
+    """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d, in mm.
+
+    Both are numbers or arrays per node. `Layers.of` adds up any number of layers.
+
+    >>> stack = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+    >>> round(stack.thickness, 9), round(stack.reduced, 9)
+    (0.47, 0.027095975)
+    """
+
+    reduced: Values
+    thickness: Values
+
+    def __post_init__(self) -> None:
+        for name in ("reduced", "thickness"):
+            value = at_least(f"layers.{name}", getattr(self, name), 0.0, "a length in mm, not negative")
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of(cls, *layers: Layer) -> Layers:
+        """The stack of these layers, in any order; without layers both sums are zero."""
+        return cls(
+            sum(layer.thickness / layer.eps_r for layer in layers), sum(layer.thickness for layer in layers)
+        )
+
+
+def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Values]:
+    """g + e s and g + D; both must be positive, or the conductors would touch."""
+    gap = np.asarray(gap)
+    near, far = gap + gap_eps_r * layers.reduced, gap + layers.thickness
+    if not (np.all(near.real > 0) and np.all(far.real > 0)):
+        lowest = float(np.min(gap.real))
+        raise InputError(
+            "gap", lowest, "a gap in mm for which gap + layers stays positive: without any insulation "
+            "between skin and electrode the pressure would be infinite",
+        )  # fmt: skip
+    return near, far
+
+
+def _check_medium(gap_eps_r: float) -> None:
+    at_least("gap_eps_r", gap_eps_r, 1.0, "the relative permittivity of the gap, at least 1")
+
+
+@dataclass(frozen=True)
+class StrongTroxel:
+    """Attraction of rigid layers over a movable gap, equations (3) and (6).
+
+    ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))`` with
+    ``p = dPi/dg``. A slightly negative gap (a penetrating trial state) continues the formula.
+    `gap_eps_r` is ``e``, the permittivity of what fills the gap: 1 for air.
+
+    >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+    >>> round(1e3 * StrongTroxel().traction(0.0, 2000.0, layers), 1)      # kPa, touching skin
+    24.1
+    """
+
+    gap_eps_r: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_medium(self.gap_eps_r)
+
+    def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
+        near, _ = _lengths(gap, layers, self.gap_eps_r)
+        return plain(0.5 * self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2)
+
+    def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """dp/dg in MPa/mm (negative)."""
+        near, _ = _lengths(gap, layers, self.gap_eps_r)
+        return plain(-self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2 / near)
+
+    def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """Pi in N/mm (= N mm per mm^2), zero at infinite gap."""
+        near, _ = _lengths(gap, layers, self.gap_eps_r)
+        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near)
+
+
+def _log1p_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """ln(1 + r) / r to rounding for every r > -1, with the limit 1 at r = 0; complex-safe."""
+    small = np.abs(ratio) < 1e-3
+    r = np.where(small, 1.0, ratio)
+    if np.iscomplexobj(r):  # numpy's complex log1p cancels for small arguments
+        logarithm = 0.5 * np.log1p(r.real * (2.0 + r.real) + r.imag**2) + 1j * np.arctan2(
+            r.imag, 1.0 + r.real
+        )
+    else:
+        logarithm = np.log1p(r)
+    q = np.where(small, ratio, 0.0)
+    series = 1.0 - q * (1 / 2 - q * (1 / 3 - q * (1 / 4 - q * (1 / 5 - q * (1 / 6 - q / 7)))))
+    return np.where(small, series, logarithm / r)
+
+
+@dataclass(frozen=True)
+class Kaczmarek:
+    """Attraction of layers that stretch with the gap, equations (5) and (7).
+
+    ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
+    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for ``D -> e s``
+    both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap: 1 for air.
+
+    >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+    >>> round(1e3 * Kaczmarek().traction(0.0, 2000.0, layers), 2)         # kPa, touching skin
+    1.39
+    """
+
+    gap_eps_r: float = 1.0
+
+    def __post_init__(self) -> None:
+        _check_medium(self.gap_eps_r)
+
+    def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
+        near, far = _lengths(gap, layers, self.gap_eps_r)
+        return plain(0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far))
+
+    def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """dp/dg in MPa/mm (negative)."""
+        near, far = _lengths(gap, layers, self.gap_eps_r)
+        traction = 0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far)
+        return plain(-traction * (1.0 / near + 1.0 / far))
+
+    def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
+        """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e s."""
+        near, _ = _lengths(gap, layers, self.gap_eps_r)
+        ratio = np.asarray((layers.thickness - self.gap_eps_r * layers.reduced) / near)
+        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * _log1p_ratio(ratio))
+
+
+def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
+    """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on `traction`.
+
+    A law that drops the imaginary part (it takes absolute values, say) is differenced with a step of
+    1e-6 mm instead.
+    """
+    own = getattr(law, "traction_derivative", None)
+    if own is not None:
+        return own(gap, voltage, layers)
+    stepped = law.traction(np.asarray(gap) + 1j * STEP, voltage, layers)
+    if np.iscomplexobj(stepped):
+        return plain(np.asarray(stepped).imag / STEP)
+    step = 1e-6
+    change = law.traction(np.asarray(gap) + step, voltage, layers) - law.traction(
+        np.asarray(gap) - step, voltage, layers
+    )
+    return plain(np.asarray(change / (2.0 * step)))

@@ -1,0 +1,299 @@
+"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv and WAV.
+
+A WAV runs over time, a signal over position; the sliding speed turns one into the other. What a file needs to
+be understood (volts of the largest sample, speed, first position) stands in its own comment. Units: V, mm,
+mm/s, Hz.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import count, real, set_frozen
+from evfem.common.storage import replacing, write_text
+from evfem.common.tables import MOST_ROWS, Floats
+from evfem.electrostatics import hjif
+from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
+from evfem.errors import InputError, readable
+
+WAV_FORM, MAP_FORM = "evfem-voltage-1", "evfem-friction-map-1"
+WAV_KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
+LARGEST_SAMPLE = 32_767
+MOST_SAMPLES, MOST_COLUMNS, ROWS = 50_000_000, 100_000, 64
+#: comment and headers of a file on top of its samples
+MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
+PCM, MONO, BITS = 1, 1, 16
+WAV_ALLOWED = f"a 16-bit mono WAV with evfem's comment ({WAV_FORM}) in it"
+
+
+@dataclass(frozen=True)
+class Playback:
+    """What turns volts over millimetres into a file for a device: the scale, and how the finger slides.
+
+    `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav and .hjif;
+    `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is the WAV's, `carrier`
+    (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which attracts like the effective U.
+    `pixel` (mm) is the width of a column of the friction map.
+
+    >>> Playback(full_scale=2000.0, speed=-1.0)
+    Traceback (most recent call last):
+    evfem.errors.InputError: speed: given -1.0; allowed: a speed in mm/s above zero
+    """
+
+    full_scale: float
+    speed: float | None = None
+    friction: tuple[float, float] | None = None
+    rate: int = 48_000
+    carrier: float | None = None
+    pixel: float = 0.1
+
+    def __post_init__(self) -> None:
+        set_frozen(
+            self,
+            full_scale=_positive("full_scale", self.full_scale, "a voltage in V"),
+            pixel=_positive("pixel", self.pixel, "a width in mm"),
+            rate=count("rate", self.rate),
+        )
+        if self.speed is not None:
+            set_frozen(self, speed=_positive("speed", self.speed, "a speed in mm/s"))
+        if self.friction is not None:
+            set_frozen(self, friction=_coefficients(self.friction))
+        if self.carrier is not None:
+            allowed = f"a frequency in Hz above 0 and below half the rate of {self.rate} Hz"
+            set_frozen(
+                self, carrier=real("carrier", self.carrier, allowed, lambda f: 0.0 < f < self.rate / 2)
+            )
+
+
+def _positive(key: str, value: object, what: str) -> float:
+    return real(key, value, f"{what} above zero", lambda x: x > 0.0)
+
+
+def _coefficients(given: Any) -> tuple[float, float]:
+    allowed = "two friction coefficients, at 0 V and at full scale, the second one larger"
+    if not isinstance(given, (tuple, list)) or len(given) != 2:
+        raise InputError("friction", given, allowed)
+    natural = real("friction", given[0], allowed, lambda mu: mu >= 0.0)
+    return natural, real("friction", given[1], allowed, lambda mu: mu > natural)
+
+
+def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback | None = None) -> None:
+    """Write `profile` to `path` in one step; its ending says as what.
+
+    - `.csv`: position,voltage, to the last bit; needs no `playback`.
+    - `.wav`: 16 bit, one channel; sample k is the voltage at the first position + k speed / rate, rounded to
+      full_scale / 32767. Full scale, speed and first position stand in the comment (LIST/INFO/ICMT, JSON).
+    - `.png`: friction map, 8-bit grey, columns along the slide: 0 natural friction, 255 that at full scale.
+      It is 255 (U / full_scale)^2, as attraction grows with U^2, in the middle of each column. The scale
+      stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
+    - `.hjif`: MPEG haptics, see `hjif.document`.
+
+    Raises InputError for another ending, a profile without length, more volts than full scale, or something
+    missing in `playback`; StorageError when the disk refuses.
+
+    >>> slope = VoltageProfile([0.0, 5.0, 10.0], [0.0, 1500.0, 1500.0])
+    >>> write_signal("slope.wav", slope, Playback(full_scale=2000.0, speed=20.0, rate=8000))
+    >>> back = read_signal("slope.wav")
+    >>> float(abs(back(back.position) - slope(back.position)).max()) < 0.5 * 2000.0 / 32767
+    True
+    """
+    if not isinstance(profile, VoltageProfile):
+        raise InputError("profile", profile, "a VoltageProfile")
+    ending = Path(path).suffix.lower()
+    if ending not in (".csv", ".wav", ".png", ".hjif"):
+        raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
+    if playback is not None:
+        _check_fit(profile, playback)
+    if ending == ".csv":
+        profile.to_csv(path)
+        return
+    if playback is None:
+        raise _missing("full_scale", "a voltage in V", ending)
+    if not np.ptp(profile.position) > 0.0:
+        raise InputError("profile", f"{profile.position.size} rows at one position", "a signal with a length")
+    if ending == ".hjif":
+        write_text(path, _hjif(profile, playback))
+        return
+    data = _wav(profile, playback) if ending == ".wav" else _map(profile, playback)
+    with replacing(path) as temporary:
+        temporary.write_bytes(data)
+
+
+def read_signal(path: str | Path) -> VoltageProfile:
+    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for `Scene`.
+
+    A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the samples, linear
+    in between, so that a jump takes speed / rate mm. A file with another ending is taken for csv. Raises
+    InputError for `.png` and `.hjif`, a missing, cut off or foreign file, more than 1,000,000 rows, and a
+    WAV with a carrier, whose samples are not the effective voltage.
+    """
+    ending = Path(path).suffix.lower()
+    if ending == ".wav":
+        return _from_wav(Path(path))
+    if ending in (".png", ".hjif"):
+        raise InputError("path", str(path), "a csv file or .wav: others do not keep the whole signal")
+    return VoltageProfile.from_csv(path)
+
+
+def _check_fit(profile: VoltageProfile, playback: Playback) -> None:
+    largest = float(np.max(np.abs(profile.voltage)))
+    if largest > playback.full_scale:
+        raise _too_much(f"{largest:g} V", playback)
+
+
+def _too_much(given: str, playback: Playback) -> InputError:
+    return InputError("voltage", given, f"at most the full scale of {playback.full_scale:g} V")
+
+
+def _missing(key: str, what: str, ending: str) -> InputError:
+    return InputError(key, "nothing", f"{what}, needed for {ending}")
+
+
+def _hjif(profile: VoltageProfile, playback: Playback) -> str:
+    if playback.speed is None:
+        raise _missing("speed", "a speed in mm/s", ".hjif")
+    if playback.friction is None:
+        raise _missing("friction", "two friction coefficients, at 0 V and at full scale", ".hjif")
+    file = hjif.document(profile, playback.full_scale, playback.speed, playback.friction)
+    return json.dumps(file, separators=(",", ":")) + "\n"
+
+
+def _positions(number: int, start: float, spacing: float) -> Floats:
+    """Where the samples are, the same to the last bit when written and when read."""
+    with np.errstate(over="ignore"):  # infinite positions in a damaged file are refused by the profile
+        return np.asarray(start + spacing * np.arange(number), dtype=np.float64)
+
+
+def _number(profile: VoltageProfile, spacing: float, most: int, what: str) -> int:
+    """How many spacings cover the profile."""
+    number = float(np.ptp(profile.position)) / spacing
+    if number > most:
+        raise InputError("path", f"a file of {number:.3g} {what}", f"at most {most} of them")
+    return max(int(np.ceil(number - 1e-9)), 1)
+
+
+def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
+    if playback.speed is None:
+        raise _missing("speed", "a speed in mm/s", ".wav")
+    spacing, start = playback.speed / playback.rate, float(profile.position[0])
+    number = _number(profile, spacing, MOST_SAMPLES - 1, "samples") + 1
+    volts = profile(_positions(number, start, spacing))
+    if playback.carrier is not None:
+        volts = carrier_amplitude(volts)
+        if np.max(np.abs(volts)) > playback.full_scale:
+            raise _too_much(f"{np.max(np.abs(volts)):g} V at the carrier's peaks", playback)
+        volts = volts * np.sin(2.0 * np.pi * playback.carrier / playback.rate * np.arange(number))
+    samples = np.rint(volts / playback.full_scale * LARGEST_SAMPLE).astype("<i2").tobytes()
+    scale = {
+        "format": WAV_FORM,
+        "full_scale_V": playback.full_scale,
+        "speed_mm_per_s": playback.speed,
+        "start_mm": start,
+        "carrier_Hz": playback.carrier,
+    }
+    comment = json.dumps(scale).encode("ascii") + b"\0"
+    width = MONO * BITS // 8
+    header = struct.pack("<HHIIHH", PCM, MONO, playback.rate, playback.rate * width, width, BITS)
+    body = _part(b"fmt ", header) + _part(b"LIST", b"INFO" + _part(b"ICMT", comment))
+    return _part(b"RIFF", b"WAVE" + body + _part(b"data", samples))
+
+
+def _part(name: bytes, content: bytes) -> bytes:
+    """A RIFF chunk, padded to an even length."""
+    return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
+
+
+def _parts(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """The chunks in `data`; ValueError for one that is longer than what is there."""
+    at = 0
+    while at + 8 <= len(data):
+        (size,) = struct.unpack_from("<I", data, at + 4)
+        content = data[at + 8 : at + 8 + size]
+        if len(content) < size:
+            raise ValueError("cut off")
+        yield data[at : at + 4], content
+        at += 8 + size + size % 2
+
+
+def _from_wav(path: Path) -> VoltageProfile:
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError("path", f"{path} ({error.strerror or error})", WAV_ALLOWED) from None
+    try:
+        if len(data) > MOST_BYTES:
+            raise ValueError("too long")
+        rate, scale, samples = _decoded(data)
+    except (ValueError, KeyError, TypeError, struct.error, RecursionError):
+        given = f"{path}, cut off, of another kind or without the comment"
+        raise InputError("path", given, WAV_ALLOWED) from None
+    if scale["carrier_Hz"] is not None:
+        given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
+        raise InputError("path", given, "a WAV without a carrier: its samples are the voltage itself")
+    if samples.size > MOST_ROWS:  # before they take four times the memory
+        raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
+    try:
+        full_scale = _positive("full_scale_V", scale["full_scale_V"], "a voltage in V")
+        speed = _positive("speed_mm_per_s", scale["speed_mm_per_s"], "a speed in mm/s")
+        start = real("start_mm", scale["start_mm"], "a position in mm")
+    except InputError as error:
+        given = f"{path}, whose {error.key} is {readable(error.given)}"
+        raise InputError("path", given, error.allowed) from None
+    position = _positions(samples.size, start, speed / rate)
+    return VoltageProfile(position, samples / LARGEST_SAMPLE * full_scale)
+
+
+def _decoded(data: bytes) -> tuple[int, dict[str, Any], Any]:
+    """Rate, what the comment says, and samples; an error of Python's own for anything unexpected."""
+    ((name, body),) = _parts(data)
+    if name != b"RIFF" or body[:4] != b"WAVE":
+        raise ValueError("not a WAV")
+    parts = dict(_parts(body[4:]))
+    kind, channels, rate, _, _, bits = struct.unpack_from("<HHIIHH", parts[b"fmt "])
+    if (kind, channels, bits) != (PCM, MONO, BITS) or rate == 0 or parts[b"LIST"][:4] != b"INFO":
+        raise ValueError("another kind of WAV")
+    scale = json.loads(dict(_parts(parts[b"LIST"][4:]))[b"ICMT"].rstrip(b"\0"))
+    if scale["format"] != WAV_FORM or not set(scale) >= WAV_KEYS:
+        raise ValueError("another comment")
+    samples = np.frombuffer(parts[b"data"], dtype="<i2")
+    if samples.size == 0:
+        raise ValueError("no samples")
+    return rate, scale, samples
+
+
+def _map(profile: VoltageProfile, playback: Playback) -> bytes:
+    columns = _number(profile, playback.pixel, MOST_COLUMNS, "columns")
+    start = float(profile.position[0])
+    middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
+    share = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
+    row = b"\0" + np.rint(255.0 * share).astype(np.uint8).tobytes()  # 0: the row is not filtered
+    natural, largest = playback.friction or (None, None)
+    scale = {
+        "format": MAP_FORM,
+        "grey": "255 (U / full scale)^2: 0 natural friction, 255 friction at full scale",
+        "full_scale_V": playback.full_scale,
+        "pixel_mm": playback.pixel,
+        "start_mm": start,
+        "natural_friction": natural,
+        "largest_friction": largest,
+    }
+    per_metre = max(min(round(1000.0 / playback.pixel), 2**31 - 1), 1)
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", columns, ROWS, 8, 0, 0, 0, 0)),
+        (b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1)),
+        (b"tEXt", b"Software\0evfem"),
+        (b"tEXt", b"Comment\0" + json.dumps(scale).encode("ascii")),
+        (b"IDAT", zlib.compress(row * ROWS, 9)),
+        (b"IEND", b""),
+    ]
+    framed = (struct.pack(">I", len(c)) + n + c + struct.pack(">I", zlib.crc32(n + c)) for n, c in chunks)
+    return b"\x89PNG\r\n\x1a\n" + b"".join(framed)

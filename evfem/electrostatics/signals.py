@@ -1,0 +1,225 @@
+"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make of it.
+
+The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import Values, above, plain
+from evfem.common.storage import write_text
+from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
+from evfem.errors import InputError
+
+#: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
+APPLIED_TO_EFFECTIVE = 2.0
+HEADER = ["position", "voltage"]
+#: largest magnitude of a position (mm) and of a voltage (V)
+LARGEST = 1e6
+
+
+@dataclass(frozen=True)
+class VoltageProfile:
+    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and the last.
+
+    Positions must not fall; at a repeated position the later row holds from that position on (a jump).
+    Calling the profile with positions gives voltages of the same shape.
+
+    >>> profile = VoltageProfile([0.0, 5.0, 5.0], [0.0, 100.0, 400.0])
+    >>> profile(2.5), profile(5.0), profile(9.0)
+    (50.0, 400.0, 400.0)
+    """
+
+    position: Any
+    voltage: Any
+
+    def __post_init__(self) -> None:
+        position = numbers("position", self.position, "a list of positions in mm")
+        voltage = numbers("voltage", self.voltage, "a list of voltages in V")
+        if position.size == 0 or position.size != voltage.size:
+            sizes = f"{position.size} positions and {voltage.size} voltages"
+            raise InputError("voltage profile", sizes, "equally many positions and voltages, at least one")
+        if position.size > MOST_ROWS:
+            raise InputError("position", f"{position.size} rows", f"at most {MOST_ROWS} rows")
+        for key, values, unit in (("position", position, "mm"), ("voltage", voltage, "V")):
+            if np.abs(values).max() > LARGEST:
+                given = f"{values[np.argmax(np.abs(values))]:g}"
+                raise InputError(key, given, f"numbers within {LARGEST:g} {unit}")
+        falls = np.flatnonzero(np.diff(position) < 0)
+        if falls.size:
+            row = int(falls[0])
+            given = f"{position[row]} followed by {position[row + 1]}"
+            raise InputError("position", given, "positions in mm that never fall")
+        object.__setattr__(self, "position", position)
+        object.__setattr__(self, "voltage", voltage)
+
+    def __repr__(self) -> str:
+        x, U = self.position, self.voltage
+        where = f"{x.size} rows, x {x[0]:.4g} to {x[-1]:.4g} mm"
+        return f"VoltageProfile({where}, {U.min():.4g} to {U.max():.4g} V)"
+
+    def __call__(self, position: Values) -> Values:
+        """Voltage in V at `position` in mm."""
+        return plain(piecewise_linear(self.position, self.voltage, position))
+
+    @classmethod
+    def from_csv(cls, path: str | Path) -> VoltageProfile:
+        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per point.
+
+        Raises InputError for a missing file, another header, or a row that is not two numbers.
+        """
+        return cls(*read_columns(Path(path), HEADER, "voltage_file"))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the file that `from_csv` reads back to the last bit."""
+        rows = (f"{x!r},{u!r}\n" for x, u in zip(self.position.tolist(), self.voltage.tolist(), strict=True))
+        write_text(path, ",".join(HEADER) + "\n" + "".join(rows))
+
+    def rms(self, start: float, stop: float) -> float:
+        """Root mean square in V over start <= position <= stop: exact, since the profile is piecewise linear.
+
+        At constant speed this is the mean over time. The mean attraction follows rms(U)^2.
+        """
+        if not (np.isfinite([start, stop]).all() and start < stop):
+            raise InputError("start, stop", (start, stop), "two positions in mm, the second one larger")
+        inside = (self.position > start) & (self.position < stop)
+        x = np.concatenate([[start], self.position[inside], [stop]])
+        before = np.concatenate([self.voltage[inside], [self._just_before(stop)]])  # limit from the left
+        after = np.concatenate([[self(start)], self.voltage[inside]])
+        square = (after**2 + after * before + before**2) / 3.0
+        return float(np.sqrt(np.sum(np.diff(x) * square) / (stop - start)))
+
+    def _just_before(self, position: float) -> float:
+        """The limit from the left at `position`: the first of repeated rows counts."""
+        reverse = VoltageProfile(-self.position[::-1], self.voltage[::-1])
+        return float(reverse(-position))
+
+    def steepest(self) -> float:
+        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
+        rise, run = np.abs(np.diff(self.voltage)), np.diff(self.position)
+        rise, run = rise[rise > 0], run[rise > 0]
+        if rise.size == 0:
+            return 0.0
+        return float(np.max(rise / run)) if np.all(run > 0) else float("inf")
+
+
+@dataclass(frozen=True)
+class FollowForce:
+    """A voltage that is not given but found: whatever makes the friction force on the bone follow a wish.
+
+    `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between its rows;
+    during slides the effective voltage stays between 0 and `largest_voltage` (V), elsewhere it stays as it
+    is. For `Scene(voltage=...)`.
+
+    >>> FollowForce([0.0, 1.0], [0.0, 0.02], largest_voltage=2000.0)(0.5)
+    0.01
+    """
+
+    position: Any
+    tangential_force: Any
+    largest_voltage: float = 10_000.0
+
+    def __post_init__(self) -> None:
+        profile = VoltageProfile(self.position, self.tangential_force)
+        above("largest_voltage", self.largest_voltage, 0.0, "a voltage in V above zero")
+        object.__setattr__(self, "position", profile.position)
+        object.__setattr__(self, "tangential_force", profile.voltage)
+
+    def __call__(self, position: Values) -> Values:
+        """Wished force in N/mm at `position` in mm."""
+        return plain(piecewise_linear(self.position, self.tangential_force, position))
+
+
+def carrier_amplitude(effective: Values) -> Values:
+    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage: sqrt(2) U.
+
+    >>> round(carrier_amplitude(1000.0), 3)
+    1414.214
+    """
+    return plain(np.sqrt(2.0) * np.asarray(effective))
+
+
+def applied_voltage(effective: Values) -> Values:
+    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
+
+    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is the
+    mean alone.
+    """
+    return plain(APPLIED_TO_EFFECTIVE * np.asarray(effective))
+
+
+@dataclass(frozen=True)
+class Amplifier:
+    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
+
+    >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
+    [0.0, 200.0, 200.0]
+    >>> jump = VoltageProfile([0.0, 1.0, 1.0, 9.0], [0.0, 0.0, 100.0, 100.0])
+    >>> slow = Amplifier(voltage_max=200.0, slew=500.0).limit(jump, speed=10.0)
+    >>> slow.position.tolist(), slow.voltage.tolist()
+    ([0.0, 1.0, 3.0, 9.0], [0.0, 0.0, 100.0, 100.0])
+    """
+
+    voltage_max: float
+    slew: float | None = None
+
+    def __post_init__(self) -> None:
+        above("voltage_max", self.voltage_max, 0.0, "a voltage in V above zero")
+        if self.slew is not None:
+            above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
+
+    def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
+        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s).
+
+        Both are exact: rows are added where the profile crosses the limit, and where the amplifier, which
+        moves towards the wish as fast as it can, catches up with it. Raises InputError for a slew without
+        a speed.
+        """
+        cut = self._clipped(profile)
+        if self.slew is None:
+            return cut
+        if speed is None:
+            raise InputError("speed", "nothing", "a speed in mm/s, needed with a slew")
+        return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
+
+    def _clipped(self, profile: VoltageProfile) -> VoltageProfile:
+        x, u = profile.position, profile.voltage
+        parts_x, parts_u = [x[:1]], [u[:1]]
+        for i in range(x.size - 1):
+            levels = [
+                level
+                for level in (-self.voltage_max, self.voltage_max)
+                if (u[i] - level) * (u[i + 1] - level) < 0
+            ]
+            crossings = sorted((level - u[i]) / (u[i + 1] - u[i]) for level in levels)
+            share = np.array([*crossings, 1.0])
+            parts_x.append(x[i] + share * (x[i + 1] - x[i]))
+            parts_u.append(u[i] + share * (u[i + 1] - u[i]))
+        voltage = np.clip(np.concatenate(parts_u), -self.voltage_max, self.voltage_max)
+        return VoltageProfile(np.concatenate(parts_x), voltage)
+
+
+def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
+    """What follows the profile from its first row on with a slope of at most `steepest` (V/mm)."""
+    now = float(profile.voltage[0])
+    rows = [(float(profile.position[0]), now)]
+    for i in np.flatnonzero(np.diff(profile.position) > 0):
+        (x, end), (wish, last) = profile.position[i : i + 2], profile.voltage[i : i + 2]
+        slope, lag = (last - wish) / (end - x), now - wish
+        side = np.sign(lag)
+        closing = steepest + side * slope
+        if lag != 0.0 and abs(lag) >= closing * (end - x):  # never catches up on this piece
+            now -= side * steepest * (end - x)
+        else:
+            if lag != 0.0:
+                x += abs(lag) / closing
+                now = wish + abs(lag) / closing * slope
+                rows.append((x, now))
+            now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
+        rows.append((end, now))
+    return VoltageProfile(*np.array(rows).T)

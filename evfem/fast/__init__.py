@@ -1,0 +1,1 @@
+"""The fast model: a pad remembered from a few equilibria."""

@@ -1,0 +1,1 @@
+"""The finger pad: outline with ridges, layers, structured quadrilaterals, presets."""

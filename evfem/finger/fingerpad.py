@@ -1,0 +1,319 @@
+"""The finger: a parametric cross-section, or a user's mesh, with its materials.
+
+`FingerPad` is the finger of the paper: outline, stratum corneum, ridges and moduli of its Table 2. What the
+paper leaves open (thicknesses of the other layers, nail, bone, shape of the ridges) are parameters with the
+defaults given there; every length is in mm.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import choice, real, set_frozen
+from evfem.common.views import called, changed, short, table
+from evfem.errors import InputError
+from evfem.finger.outline import Ellipse, Ridges
+from evfem.finger.section import FULL, ZONE, Divisions, Section
+from evfem.mesh import file as meshfile
+from evfem.mesh.mesh import Mesh, raised
+from evfem.mesh.quality import check
+from evfem.protocols import Material
+from evfem.tissue.laws import NeoHookean
+
+#: Young's modulus (MPa) and Poisson's ratio of each region: Table 2 of the paper.
+TABLE_2: Mapping[str, tuple[float, float]] = {
+    "stratum_corneum": (1.000, 0.30),
+    "epidermis": (0.136, 0.30),
+    "dermis": (0.080, 0.48),
+    "hypodermis": (0.034, 0.48),
+    "nail": (17.000, 0.30),
+}
+
+#: parameter of `FingerPad` -> lowest and highest value, and its unit.
+RANGES: Mapping[str, tuple[float, float, str]] = {
+    "width": (12.0, 24.0, " mm"),
+    "height": (9.0, 20.0, " mm"),
+    "ridge_height": (0.02, 0.4, " mm"),
+    "ridge_width": (0.3, 0.8, " mm"),
+    "ridge_exponent": (2.0, 16.0, ""),
+    "ridge_phase": (-1.0, 1.0, " pitches"),
+    "ridge_crest": (0.0, 0.9, " of the pitch"),
+    "ridge_groove": (0.0, 0.5, " of the pitch"),
+    "stratum_corneum_thickness": (0.1, 0.8, " mm"),
+    "epidermis_thickness": (0.15, 1.0, " mm"),
+    "dermis_thickness": (0.5, 2.0, " mm"),
+    "nail_thickness": (0.2, 1.0, " mm"),
+    "nail_width": (4.0, 18.0, " mm"),
+    "bone_width": (2.0, 12.0, " mm"),
+    "bone_height": (2.0, 10.0, " mm"),
+    "bone_offset": (-1.0, 3.0, " mm"),
+    "viscosity": (0.0, 1e3, " s"),
+}
+#: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, the
+#: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
+#: inverse.
+STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
+
+#: resolution -> divisions in quadratic cells.
+RESOLUTIONS: Mapping[str, Divisions] = {
+    "coarse": Divisions(6, (2, 2, 2, 3), ((1, 0), (2, -1)), (3, 3, 6)),
+    "medium": Divisions(12, (4, 4, 4, 5), ((1, 0), (2, -1)), (5, 5, 10)),
+    "paper": Divisions(12, (2, 11, 6, 6), ((2, -2), (2, -1)), (5, 5, 26)),
+    "fine": Divisions(24, (8, 10, 14, 14), ((1, 0), (2, -1)), (9, 9, 18)),
+}
+
+
+@dataclass(frozen=True)
+class Electrical:
+    """The dielectric between the pad's surface and the conducting tissue below.
+
+    `stratum_corneum_thickness` in mm; None: the local thickness of that region of the mesh.
+    """
+
+    stratum_corneum_thickness: float | None = None
+    stratum_corneum_eps_r: float = 1650.0
+
+    def __post_init__(self) -> None:
+        d, eps = self.stratum_corneum_thickness, self.stratum_corneum_eps_r
+        if d is not None and not 0.0 < d < 10.0:
+            raise InputError("finger.electrical.stratum_corneum_thickness", d, "a thickness up to 10 mm")
+        if not 1.0 <= eps < 1e9:
+            raise InputError("finger.electrical.stratum_corneum_eps_r", eps, "a number of at least 1")
+
+
+@dataclass(frozen=True)
+class FingerPad:
+    """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail above.
+
+    **Outline.** Full axes `width` and `height`; on the lower side fingerprint ridges: their crests lie on
+    the ellipse, grooves are cut in. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the
+    point of the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, measured along the ellipse's
+    normal. Crests stand at x = (k + `ridge_phase`) `ridge_width`. With `ridge_crest` > 0 the ridges are
+    flat-topped instead: crest and groove are flat over the fractions `ridge_crest` and `ridge_groove` of
+    the pitch, with cosine-shaped walls. Ridges fade out between 0.72 and 0.79 of half the width (6.0 to 6.6
+    mm). `ridge_exponent` 7 is the shape that meets the ratio of ridge to gross contact area of Adams et al.
+    (doi:10.1098/rsif.2012.0467) within 10 %.
+
+    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
+    stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height` less in a groove. Its
+    default and those of outline and ridges are Table 2 of the paper. Assumed, of the size that finger
+    models use (for example doi:10.1115/1.1613673): epidermis 0.47 mm, dermis 1.0 mm. Below the nail
+    everything down to the bone is dermis (the nail bed). The hypodermis fills the rest.
+
+    **Nail and bone.** Nail 0.45 mm thick (measured 0.40 to 0.48 mm: Wollina et al., Skin Res. Technol. 7
+    (2001) 60-64), `nail_width` its chord (assumed). The bone is an ellipse with the full axes `bone_width`,
+    `bone_height` of the benchmark problem, its centre `bone_offset` above that of the finger (assumed:
+    there is more pulp than nail bed).
+
+    **Mesh.** `resolution` coarse, medium, paper or fine: about 3k, 10k, 22k and 50k nodes, with 12, 24, 24
+    and 48 linear cells per ridge within about 3.5 mm of the middle. `paper` spreads its cells over the
+    layers as the paper does. Sets of nodes: `pad` (the outline with y <= 0), `bone`, `nail` (the outer side
+    of the nail).
+
+    `materials` replaces the laws of Table 2 by region; `viscosity` is the relaxation time (s) of materials
+    without their own. Raises `InputError` for values out of range and for geometry that cannot exist.
+
+    >>> finger = FingerPad(resolution="coarse", materials={"nail": NeoHookean(E=20.0, nu=0.3)})
+    >>> mesh = finger.mesh(order=1)
+    >>> sorted(mesh.node_sets), mesh.kind, float(mesh.points[:, 1].min())
+    (['bone', 'nail', 'pad'], 'quad', -6.395)
+    >>> FingerPad(ridge_height=0.5)
+    Traceback (most recent call last):
+    evfem.errors.InputError: finger.ridge_height: given 0.5; allowed: 0.02 to 0.4 mm
+    """
+
+    width: float = 16.68
+    height: float = 12.79
+    ridges: bool = True
+    ridge_height: float = 0.15
+    ridge_width: float = 0.50
+    ridge_exponent: float = 7.0
+    ridge_phase: float = 0.0
+    ridge_crest: float = 0.0
+    ridge_groove: float = 0.0
+    stratum_corneum_thickness: float = 0.38
+    epidermis_thickness: float = 0.47
+    dermis_thickness: float = 1.0
+    nail_thickness: float = 0.45
+    nail_width: float = 11.0
+    bone_width: float = 6.0
+    bone_height: float = 5.0
+    bone_offset: float = 1.0
+    resolution: str = "medium"
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    electrical: Electrical = field(default_factory=Electrical)
+    viscosity: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, (low, high, unit) in RANGES.items():
+            allowed = f"{low:g} to {high:g}{unit}"
+            set_frozen(
+                self, **{name: real(f"finger.{name}", getattr(self, name), allowed, _between(low, high))}
+            )
+        if not isinstance(self.ridges, bool):
+            raise InputError("finger.ridges", self.ridges, "true or false")
+        choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+        set_frozen(self, materials=_all_materials(self.materials))
+        _check_section(self, self._section)
+
+    def __repr__(self) -> str:
+        """What differs from Table 2."""
+        return called("FingerPad", self._changed())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: sizes, and what differs from Table 2."""
+        ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
+        rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
+        rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
+        rows.append(("resolution", self.resolution))
+        told = {"width", "height", "ridges", "ridge_height", "ridge_width", "stratum_corneum_thickness"}
+        own = {name: v for name, v in self._changed().items() if name not in told | {"resolution"}}
+        return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
+
+    def _changed(self) -> dict[str, Any]:
+        laws = {name: law for name, law in self.materials.items() if law != _all_materials({}).get(name)}
+        return {k: v for k, v in changed(self).items() if k != "materials"} | (
+            {"materials": laws} if laws else {}
+        )
+
+    def mesh(self, order: int = 2) -> Mesh:
+        """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order 2.
+
+        Both have about the same number of nodes; mid-nodes lie on the true outline, interfaces and bone.
+        """
+        if order not in (1, 2):
+            raise InputError("order", order, "1 or 2")
+        return self._section.mesh(order)
+
+    @property
+    def _section(self) -> Section:
+        outer = Ellipse(0.5 * self.width, 0.5 * self.height)
+        bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
+        ridges = None
+        if self.ridges:
+            profile = (self.ridge_height, self.ridge_width, self.ridge_exponent, self.ridge_phase)
+            ridges = Ridges(*profile, self.ridge_crest, self.ridge_groove, FULL * outer.a, ZONE * outer.a)
+        layers = (self.stratum_corneum_thickness, self.epidermis_thickness, self.dermis_thickness)
+        return Section(
+            outer, bone, layers, self.nail_thickness, self.nail_width, ridges, RESOLUTIONS[self.resolution]
+        )
+
+
+def _between(low: float, high: float) -> Callable[[float], bool]:
+    return lambda value: low <= value <= high
+
+
+def _all_materials(own: object) -> dict[str, Any]:
+    if not isinstance(own, Mapping):
+        raise InputError("finger.materials", own, "a law for each region that is not to have that of Table 2")
+    laws: dict[str, Any] = {name: NeoHookean(E=E, nu=nu) for name, (E, nu) in TABLE_2.items()}
+    for name, law in own.items():
+        if name not in laws:
+            raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
+        laws[name] = law
+    return laws
+
+
+def _check_section(pad: FingerPad, section: Section) -> None:
+    """Refuse geometry whose parts do not fit into each other."""
+    corneum, epidermis, dermis = section.layers
+    ridges, outer = section.ridges, section.outer
+    low, high = SLIMMEST
+    if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
+        raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
+    if ridges:
+        _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
+        _at_most("ridge_height", ridges.height, 0.7 * corneum, "0.7 times the stratum corneum's thickness")
+        _at_most(
+            "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
+        )
+        _check_walls(ridges, outer)
+    _at_most(
+        "nail_thickness", pad.nail_thickness, corneum + 0.7 * epidermis, "stratum corneum + 0.7 epidermis"
+    )
+    _at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
+    skin = corneum + epidermis + dermis
+    _at_most(
+        "dermis_thickness",
+        skin,
+        0.6 * outer.smallest_radius,
+        "0.6 times the outline's smallest radius, together with stratum corneum and epidermis",
+    )
+    theta = np.linspace(-np.pi, np.pi, 361)
+    inside = outer.point(theta) - skin * outer.normal(theta)
+    away = (inside - [0.0, section.bone.centre]) / [section.bone.a, section.bone.b]
+    clear = (1.0 - 1.0 / np.hypot(*away.T)) * np.hypot(*(inside - [0.0, section.bone.centre]).T)
+    if not clear.min() >= CLEARANCE:
+        raise InputError(
+            "finger.bone_height",
+            f"a bone that leaves {clear.min():.3g} mm to the dermis",
+            f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers",
+        )
+
+
+def _check_walls(ridges: Ridges, outer: Ellipse) -> None:
+    slope = ridges.steepest / (1.0 - ridges.height * outer.b / outer.a**2)
+    limit = STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
+    if slope > limit:
+        raise InputError(
+            "finger.ridge_height",
+            f"walls with a slope of {slope:.3g}",
+            f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest",
+        )
+
+
+def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
+    if value > limit * (1.0 + 1e-12):
+        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} mm ({meaning})")
+
+
+@dataclass(frozen=True)
+class MeshedFinger:
+    """A finger on a mesh of the user's own: a file or a `Mesh`, one material law per region.
+
+    `regions` maps names to numbers as in `meshfile.read`; `viscosity` is the relaxation time in s of every
+    material that has none of its own. The mesh is read and checked at once: raises `InputError` when it is
+    faulty or does not fit the materials.
+    """
+
+    source: str | os.PathLike[str] | Mesh
+    materials: Mapping[str, Material]
+    electrical: Electrical = field(default_factory=Electrical)
+    viscosity: float = 0.0
+    regions: Mapping[str, int] | None = None
+
+    def __post_init__(self) -> None:
+        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", _between(0.0, 1e3))
+        set_frozen(self, viscosity=viscosity, materials=dict(self.materials))
+        if not isinstance(self.source, Mesh):
+            set_frozen(self, source=Path(self.source))
+        names = self._own.region_names
+        for name in names:
+            if name not in self.materials:
+                raise InputError(
+                    f"finger.materials.{name}", "nothing", "a material for every region of the mesh"
+                )
+        for name in self.materials:
+            if name not in names:
+                raise InputError(f"finger.materials.{name}", "no such region", " | ".join(names))
+
+    def mesh(self, order: int = 2) -> Mesh:
+        """The mesh with cells of `order` 1 or 2; a linear mesh is raised with straight edges."""
+        if order == 2:
+            return raised(self._own)
+        if self._own.order == 2:
+            given = f"a linear element on a mesh of {self._own.kind}"
+            raise InputError("solver.element", given, "q2 or q2p1 (p2 on triangles)")
+        return self._own
+
+    @cached_property
+    def _own(self) -> Mesh:
+        source = self.source
+        return check(source) if isinstance(source, Mesh) else meshfile.read(source, self.regions)

@@ -1,0 +1,88 @@
+"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its lower side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+
+
+@dataclass(frozen=True)
+class Ellipse:
+    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x axis."""
+
+    a: float
+    b: float
+    centre: float = 0.0
+
+    @property
+    def smallest_radius(self) -> float:
+        """Smallest radius of curvature: normal offsets inwards must stay below it."""
+        return min(self.a**2 / self.b, self.b**2 / self.a)
+
+    def point(self, theta: Floats) -> Floats:
+        """Points (N, 2)."""
+        return np.column_stack([self.a * np.cos(theta), self.centre + self.b * np.sin(theta)])
+
+    def normal(self, theta: Floats) -> Floats:
+        """Outward unit normals (N, 2)."""
+        n = np.column_stack([self.b * np.cos(theta), self.a * np.sin(theta)])
+        return n / np.hypot(n[:, 0], n[:, 1])[:, None]
+
+    def towards(self, points: Floats) -> Floats:
+        """Where the lines from the centre to `points` (N, 2) cross the ellipse, (N, 2)."""
+        centre = np.array([0.0, self.centre])
+        away = points - centre
+        return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]
+
+    def evenly(self, start: float, end: float, count: int) -> Floats:
+        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between them."""
+        fine = np.linspace(start, end, 2001)
+        middle = 0.5 * (fine[1:] + fine[:-1])
+        speed = np.hypot(self.a * np.sin(middle), self.b * np.cos(middle))
+        arc = np.concatenate([[0.0], np.cumsum(speed)])
+        return np.interp(np.linspace(0.0, arc[-1], count + 1), arc, fine)
+
+
+@dataclass(frozen=True)
+class Ridges:
+    """Profile of the ridges over the abscissa x of the ellipse (mm): how deep a point lies below the crest
+    line.
+
+    t = |x - crest| / (pitch/2) runs from 0 at a crest to 1 in a groove; crests at x = (k + phase) pitch.
+    Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped (`crest` > 0): crest and groove are
+    flat over these fractions of the pitch, and depth = height (1 - cos(pi s)) / 2 on the walls, s from 0 to
+    1. The depth is multiplied by a fade: 1 up to |x| = `full`, a quintic step down to 0 at |x| = `end`.
+    """
+
+    height: float
+    pitch: float
+    exponent: float
+    phase: float
+    crest: float
+    groove: float
+    full: float
+    end: float
+
+    @property
+    def steepest(self) -> float:
+        """Largest slope of the wall."""
+        if self.crest == 0.0:
+            return self.height * self.exponent * 2.0 / self.pitch
+        return self.height * np.pi / self.pitch / (1.0 - self.crest - self.groove)
+
+    def depth(self, x: Floats) -> Floats:
+        """Depth below the crest line, along the ellipse's normal (mm)."""
+        t = 2.0 * np.abs((x / self.pitch - self.phase + 0.5) % 1.0 - 0.5)
+        if self.crest == 0.0:
+            shape = t**self.exponent
+        else:
+            s = np.clip((t - self.crest) / (1.0 - self.crest - self.groove), 0.0, 1.0)
+            shape = 0.5 * (1.0 - np.cos(np.pi * s))
+        return self.height * shape * self._fade(np.abs(x))
+
+    def _fade(self, x: Floats) -> Floats:
+        s = np.clip((self.end - x) / (self.end - self.full), 0.0, 1.0)
+        return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

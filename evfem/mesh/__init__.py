@@ -1,0 +1,1 @@
+"""The mesh: the container, its quality, its files."""

@@ -1,0 +1,264 @@
+"""A user's mesh in, any finger mesh out: names, encoding and checks.
+
+Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero: belongs).
+Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no
+table is needed to read them back.
+Encoding of `.msh` files: physical groups of surfaces (regions) and of lines or points (sets of nodes).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from evfem.common.arrays import Ints
+from evfem.common.storage import replacing
+from evfem.errors import InputError, StorageError
+from evfem.mesh import formats as meshioread
+from evfem.mesh import msh as mshread
+from evfem.mesh import vtu as vturead
+from evfem.mesh.formats import LARGEST, Parts, Unreadable
+from evfem.mesh.mesh import KINDS, Mesh
+from evfem.mesh.msh import PHYSICAL
+from evfem.mesh.quality import check
+
+#: Cells that are no part of the body: kept only for the nodes of a physical group.
+LOWER = {"vertex", "line", "line3"}
+#: Prefix of the field data that carry the names of regions in a `.vtu` file.
+PREFIX = "region:"
+
+_Names = dict[tuple[int, int], str]
+
+
+def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
+    """The checked mesh, in mm, of a `.vtu` or `.msh` file of at most 128 MB, or of another that meshio reads.
+
+    `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of
+    gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are turned
+    counter-clockwise. Raises `InputError` naming `finger.mesh` or `finger.regions` for everything that
+    cannot be a finger.
+    """
+    path = Path(path)
+    raw = _parts(path)
+    blocks = raw.blocks
+    names = raw.names
+    solid = [k for k, (kind, cells) in enumerate(blocks) if kind not in LOWER and len(cells)]
+    kind = _one_kind(path, [blocks[k][0] for k in solid])
+    cells = np.vstack([blocks[k][1] for k in solid]).astype(np.int64)
+    if names:
+        region, region_names = _groups(path, raw, solid, names)
+        sets = _group_sets(raw, names)
+    else:
+        region, region_names = _numbers(path, raw, solid, regions)
+        sets = {}
+    sets.update(_point_sets(path, raw))
+    mesh = Mesh(_plane(path, raw.points), cells, kind, region, region_names, sets)
+    return check(mesh, str(path))
+
+
+def _parts(path: Path) -> Parts:
+    if not path.is_file():
+        raise InputError("finger.mesh", str(path), "a mesh file that exists")
+    reader = READERS.get(path.suffix.lower())
+    try:
+        if path.stat().st_size > LARGEST:
+            raise Unreadable(f"more than {LARGEST // 2**20} MB")
+        return meshioread.read(path) if reader is None else reader(path.read_bytes())
+    except (Unreadable, MemoryError) as error:
+        reason = " ".join(str(error).split())[:200] or "not enough memory"
+        allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
+        raise InputError("finger.mesh", f"{path} ({reason})", allowed) from error
+    except OSError as error:
+        raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def _one_kind(path: Path, kinds: list[str]) -> str:
+    found = sorted(set(kinds))
+    if len(found) == 1 and found[0] in KINDS:
+        return found[0]
+    allowed = "cells of one kind: quad, quad9, triangle or triangle6"
+    if "quad8" in found:
+        allowed += " (quad8 has no middle node: export quad9 or quad)"
+    given = f"{path} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
+    raise InputError("finger.mesh", given, allowed)
+
+
+def _plane(path: Path, points: np.ndarray) -> np.ndarray:
+    points = np.asarray(points, dtype=float)
+    if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
+        given = f"{path} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
+        raise InputError("finger.mesh", given, "a plane mesh: the same z everywhere")
+    return np.ascontiguousarray(points[:, :2])
+
+
+def _groups(path: Path, raw: Parts, solid: list[int], names: _Names) -> tuple[Ints, dict[str, int]]:
+    tag = np.concatenate([raw.cell_data[PHYSICAL][k] for k in solid])
+    region_names = {name: number for (dimension, number), name in names.items() if dimension == 2}
+    lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
+    if lost:
+        given = f"{path} with {int(np.isin(tag, lost).sum())} cells outside every named group"
+        raise InputError("finger.mesh", given, "every cell in a physical surface with a name")
+    present = set(np.unique(tag).tolist())
+    return tag, {name: number for name, number in region_names.items() if number in present}
+
+
+def _group_sets(raw: Parts, names: _Names) -> dict[str, Ints]:
+    sets: dict[str, Ints] = {}
+    for (kind, cells), tag in zip(raw.blocks, raw.cell_data[PHYSICAL], strict=True):
+        dimension = {"vertex": 0, "line": 1, "line3": 1}.get(kind, 2)
+        for (d, number), name in names.items():
+            if dimension < 2 and d == dimension and len(nodes := np.unique(cells[tag == number])):
+                sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
+    return sets
+
+
+def _numbers(
+    path: Path, raw: Parts, solid: list[int], regions: Mapping[str, int] | None
+) -> tuple[Ints, dict[str, int]]:
+    if "region" not in raw.cell_data:
+        raise InputError(
+            "finger.mesh",
+            f"{path} without region numbers",
+            "integer cell data `region`, or a .msh file with named physical groups",
+        )
+    region = np.concatenate([np.asarray(raw.cell_data["region"][k]).reshape(-1) for k in solid])
+    if not np.isfinite(region).all() or (region != np.round(region)).any():
+        given = f"{path} with cell data `region` that are no integers"
+        raise InputError("finger.mesh", given, "one integer per cell")
+    region = region.astype(np.int64)
+    if regions is None:
+        regions = {
+            name.removeprefix(PREFIX): int(number.flat[0])
+            for name, number in raw.field_data.items()
+            if name.startswith(PREFIX) and number.size and np.isfinite(number).all()
+        }
+    return region, _checked_names(path, region, regions)
+
+
+def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict[str, int]:
+    present = np.unique(region).tolist()
+    nameless = [n for n in present if n not in regions.values()]
+    if nameless:
+        raise InputError(
+            "finger.regions",
+            f"no name for {', '.join(map(str, nameless))} of {path}",
+            "name = number for every number in the cell data `region`",
+        )
+    absent = [name for name, number in regions.items() if number not in present]
+    if absent:
+        raise InputError(
+            "finger.regions",
+            f"{absent[0]} = {regions[absent[0]]}",
+            f"numbers that occur in {path}: {', '.join(map(str, present))}",
+        )
+    double = sorted(name for name, number in regions.items() if list(regions.values()).count(number) > 1)
+    if double:
+        given = f"{' and '.join(double)} with the same number"
+        raise InputError("finger.regions", given, "one name per number")
+    return dict(regions)
+
+
+def _point_sets(path: Path, raw: Parts) -> dict[str, Ints]:
+    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and 1."""
+    sets = {}
+    for name, values in raw.point_data.items():
+        values = np.asarray(values)
+        values = values[:, 0] if values.ndim == 2 and values.shape[1] == 1 else values
+        if values.ndim != 1:
+            continue
+        if name in ("pad", "bone"):
+            if not np.isfinite(values).all():
+                given = f"{path} with NaN in point data `{name}`"
+                raise InputError("finger.mesh", given, "0 or 1 at every point")
+        elif values.dtype.kind not in "iub" or not np.isin(values, (0, 1)).all():
+            continue
+        sets[name] = np.flatnonzero(values).astype(np.int64)
+    return sets
+
+
+def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
+    """Write `.vtu` (binary, uncompressed) or `.msh` (2.2, named physical groups), the whole file or nothing.
+
+    Raises `InputError` for a format that cannot carry the names, `StorageError` if the file cannot be made.
+    """
+    path = Path(path)
+    writer = WRITERS.get(path.suffix.lower())
+    if writer is None:
+        raise InputError(
+            "--out",
+            path.name,
+            "a file that ends with "
+            + " or ".join(WRITERS)
+            + " (other formats cannot carry the names of regions and boundaries)",
+        )
+    with replacing(path) as part, contextlib.redirect_stderr(io.StringIO()):
+        writer(mesh, part)
+
+
+def _three(points: np.ndarray) -> np.ndarray:
+    return np.column_stack([points, np.zeros(len(points))])
+
+
+def _write_vtu(mesh: Mesh, path: Path) -> None:
+    import meshio
+
+    point_data = {}
+    for name, nodes in mesh.node_sets.items():
+        point_data[name] = np.zeros(len(mesh.points), dtype=np.uint8)
+        point_data[name][nodes] = 1
+    out = meshio.Mesh(
+        _three(mesh.points),
+        [(mesh.kind, mesh.cells.astype(np.int32))],
+        point_data,
+        {"region": [mesh.region.astype(np.int32)]},
+    )
+    out.write(path, file_format="vtu", compression=None)
+    add_region_names(path, mesh)
+
+
+def add_region_names(path: Path, mesh: Mesh) -> None:
+    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number."""
+    form = '<DataArray type="Int32" Name="{}{}" NumberOfTuples="1" format="ascii">{}</DataArray>'
+    arrays = "".join(form.format(PREFIX, name, number) for name, number in mesh.region_names.items())
+    tag = b"<UnstructuredGrid>"
+    path.write_bytes(path.read_bytes().replace(tag, tag + f"<FieldData>{arrays}</FieldData>".encode(), 1))
+
+
+def _write_msh(mesh: Mesh, path: Path) -> None:
+    import meshio
+
+    lines = "line3" if mesh.order == 2 else "line"
+    numbers = {name: i for i, name in enumerate(mesh.region_names, 1)}
+    table = np.zeros(max(mesh.region_names.values()) + 1, dtype=np.int32)
+    for name, number in mesh.region_names.items():
+        table[number] = numbers[name]
+    blocks, tags = [(mesh.kind, mesh.cells)], [table[mesh.region]]
+    names = [f'2 {i} "{name}"' for name, i in numbers.items()]
+    for i, name in enumerate(mesh.node_sets, len(numbers) + 1):
+        edges = _all_edges(mesh, name)
+        blocks.append((lines, edges))
+        tags.append(np.full(len(edges), i, dtype=np.int32))
+        names.insert(0, f'1 {i} "{name}"')
+    data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
+    meshio.Mesh(_three(mesh.points), blocks, cell_data=data).write(path, file_format="gmsh22", binary=False)
+    head = b"$EndMeshFormat\n"
+    text = f"$PhysicalNames\n{len(names)}\n" + "\n".join(names) + "\n$EndPhysicalNames\n"
+    path.write_bytes(path.read_bytes().replace(head, head + text.encode(), 1))
+
+
+def _all_edges(mesh: Mesh, name: str) -> Ints:
+    edges = mesh.edges_of(name)
+    lost = np.setdiff1d(mesh.node_sets[name], edges)
+    if len(lost):
+        given = f"a .msh file for the set {name} with node {lost[0]}, which no outer edge of the set has"
+        raise InputError("--out", given, ".vtu, which carries sets of nodes (.msh: sets of outer edges)")
+    return edges
+
+
+READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vturead.read, ".msh": mshread.read}
+WRITERS: Mapping[str, Callable[[Mesh, Path], None]] = {".vtu": _write_vtu, ".msh": _write_msh}

@@ -1,0 +1,165 @@
+"""The finite element mesh: points, cells of one kind, named regions and named sets of nodes.
+
+Nodes keep the order of the file they came from; cells are in VTK order, counter-clockwise. Lengths in mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError
+
+#: kind -> (number of corners, order); the local edges of a cell are (corner i, corner i+1[, mid-node i])
+KINDS: Mapping[str, tuple[int, int]] = {
+    "quad": (4, 1),
+    "quad9": (4, 2),
+    "triangle": (3, 1),
+    "triangle6": (3, 2),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Points (N, 2), cells (E, n) in VTK order, an integer region per cell, and named sets.
+
+    `region_names` maps a name to its number in `region`; `node_sets` maps `pad`, `bone`, `nail` ... to sorted
+    node numbers.
+    """
+
+    points: Floats
+    cells: Ints
+    kind: str
+    region: Ints
+    region_names: Mapping[str, int]
+    node_sets: Mapping[str, Ints] = field(default_factory=dict)
+
+    @property
+    def order(self) -> int:
+        """Polynomial order of the cells: 1 or 2."""
+        return KINDS[self.kind][1]
+
+    @property
+    def corners(self) -> int:
+        """Number of corners of a cell: 3 or 4."""
+        return KINDS[self.kind][0]
+
+    def cells_of(self, name: str) -> Ints:
+        """Numbers of the cells in the region `name`."""
+        return np.flatnonzero(self.region == self.region_names[name])
+
+    @cached_property
+    def outer_edges(self) -> Ints:
+        """Edges of one cell only, (K, 2) or (K, 3): start, end[, middle], the body on the left."""
+        _, of_cell = self.edges
+        alone = np.bincount(of_cell.ravel())[of_cell] == 1
+        return self.cell_edges[alone]
+
+    @property
+    def cell_edges(self) -> Ints:
+        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle], counter-
+        clockwise.
+        """
+        m = self.corners
+        i = np.arange(m)
+        columns = [i, (i + 1) % m] + ([m + i] if self.order == 2 else [])
+        return self.cells[:, np.array(columns).T]
+
+    @cached_property
+    def edges(self) -> tuple[Ints, Ints]:
+        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E, corners)."""
+        ends = np.sort(self.cell_edges[..., :2], axis=2).reshape(-1, 2)
+        code, inverse = np.unique(ends[:, 0] * len(self.points) + ends[:, 1], return_inverse=True)
+        return np.column_stack(np.divmod(code, len(self.points))), inverse.reshape(-1, self.corners)
+
+    def edges_of(self, name: str) -> Ints:
+        """Outer edges all of whose nodes are in the set `name`, same columns as `outer_edges`."""
+        inside = np.zeros(len(self.points), dtype=bool)
+        inside[self.node_sets[name]] = True
+        return self.outer_edges[inside[self.outer_edges].all(axis=1)]
+
+
+def raised(mesh: Mesh) -> Mesh:
+    """The quadratic mesh on the same cells: straight edges, new nodes halfway.
+
+    New nodes are numbered after the old ones. The new node of an outer edge belongs to every set that holds
+    both ends of that edge; other new nodes belong to none.
+
+    >>> square = Mesh(np.array([[0., 0.], [1., 0.], [1., 1.], [0., 1.]]), np.array([[0, 1, 2, 3]]), "quad",
+    ...               np.zeros(1, int), {"skin": 0}, {"pad": np.array([0, 1])})
+    >>> raised(square).kind, raised(square).points[4].tolist(), raised(square).node_sets["pad"].tolist()
+    ('quad9', [0.5, 0.0], [0, 1, 4])
+    """
+    if mesh.order == 2:
+        return mesh
+    edges, of_cell = mesh.edges
+    first = len(mesh.points)
+    points = [mesh.points, mesh.points[edges].mean(axis=1)]
+    columns = [mesh.cells, first + of_cell]
+    if mesh.corners == 4:
+        points.append(mesh.points[mesh.cells].mean(axis=1))
+        columns.append(first + len(edges) + np.arange(len(mesh.cells))[:, None])
+    outer = np.bincount(of_cell.ravel(), minlength=len(edges)) == 1
+    sets = {name: _with_middles(nodes, edges, outer, first) for name, nodes in mesh.node_sets.items()}
+    kind = "quad9" if mesh.corners == 4 else "triangle6"
+    return Mesh(np.vstack(points), np.hstack(columns), kind, mesh.region, mesh.region_names, sets)
+
+
+def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> Ints:
+    both = np.isin(edges, nodes).all(axis=1) & outer
+    return np.union1d(nodes, first + np.flatnonzero(both))
+
+
+def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
+    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that layer
+    there.
+
+    The interface is every edge that a cell of `region` shares with a cell of another region; on quadratic
+    cells it is the parabola through the edge's nodes. Raises `InputError` if there is no such region or
+    interface.
+    """
+    if region not in mesh.region_names:
+        raise InputError("region", region, " | ".join(mesh.region_names))
+    inside = mesh.region == mesh.region_names[region]
+    edges, of_cell = mesh.edges
+    own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(edges)) for cells in (inside, ~inside))
+    shared = (own > 0) & (other > 0)
+    interface = mesh.cell_edges[inside][shared[of_cell[inside]]]
+    if not len(interface):
+        raise InputError("region", region, "a region that has another one below it")
+    curves = _parabolas(mesh.points[interface])
+    points = mesh.points[nodes]
+    chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)
+    return np.concatenate([_distance(points[chunk], curves) for chunk in chunks])
+
+
+def _parabolas(ends: Floats) -> Floats:
+    """Coefficients (3, K, 2) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle] (K, 2 or
+    3, 2).
+    """
+    middle = 0.5 * (ends[:, 0] + ends[:, 1])
+    centre = ends[:, 2] if ends.shape[1] == 3 else middle
+    return np.array([centre, 0.5 * (ends[:, 1] - ends[:, 0]), middle - centre])
+
+
+def _distance(points: Floats, curves: Floats) -> Floats:
+    """Smallest distance of points (P, 2) from the curves: Newton's method on the six nearest of each."""
+    places = np.array([-1.0, 0.0, 1.0])
+    samples = curves[0] + places[:, None, None] * curves[1] + (places**2)[:, None, None] * curves[2]
+    away = np.linalg.norm(points[:, None, None] - samples, axis=-1)
+    nearest = away.min(axis=1)
+    near = np.argpartition(nearest, min(6, nearest.shape[1]) - 1, axis=1)[:, :6]
+    s = places[np.take_along_axis(away.argmin(axis=1), near, axis=1)]
+    c0, c1, c2 = curves[0][near] - points[:, None], curves[1][near], curves[2][near]
+    for _ in range(12):
+        t = s[..., None]
+        place, slope = c0 + t * c1 + t * t * c2, c1 + 2.0 * t * c2
+        speed = (slope**2).sum(-1)
+        bend = speed + 2.0 * (place * c2).sum(-1)
+        s = np.clip(s - (place * slope).sum(-1) / np.where(bend > 0.1 * speed, bend, speed), -1.0, 1.0)
+    t = s[..., None]
+    return np.linalg.norm(c0 + t * c1 + t * t * c2, axis=-1).min(axis=1)

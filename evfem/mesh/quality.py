@@ -1,0 +1,272 @@
+"""What a mesh must fulfil before anything is computed on it, and the shape of its cells: the scaled Jacobian.
+
+Every fault becomes one sentence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError
+from evfem.mesh.mesh import KINDS, Mesh
+
+#: Corner, mid-edge and middle nodes of a quad in -1..1, and of a triangle in 0..1, in VTK order.
+SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0))
+TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
+
+
+def scaled_jacobian(mesh: Mesh) -> Floats:
+    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or equilateral
+    triangle.
+
+    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate lines at the
+    node; in triangles the longest two of the three directions count, and sin 60 degrees is divided out.
+    Zero or less: the cell is degenerate or turned inside out.
+
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> square = Mesh(corners, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, dtype=int), {"skin": 0})
+    >>> scaled_jacobian(square).tolist()
+    [1.0]
+    """
+    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
+    x = mesh.points[mesh.cells]
+    smallest = np.full(len(x), np.inf)
+    for place in (SQUARE if mesh.corners == 4 else TRIANGLE)[: mesh.cells.shape[1]]:
+        t = slopes_at(place, mesh.order) @ x
+        det = t[:, 0, 0] * t[:, 1, 1] - t[:, 0, 1] * t[:, 1, 0]
+        first, second = np.hypot(t[:, 0, 0], t[:, 0, 1]), np.hypot(t[:, 1, 0], t[:, 1, 1])
+        lengths = first * second
+        if mesh.corners == 3:
+            third = np.hypot(*(t[:, 1] - t[:, 0]).T)
+            lengths = np.maximum(lengths, third * np.maximum(first, second)) * np.sqrt(0.75)
+        smallest = np.minimum(smallest, det / np.maximum(lengths, 1e-300))
+    return smallest
+
+
+def _square_slopes(place: tuple[float, float], order: int) -> Floats:
+    """Derivatives (2, nodes) of a quad's shape functions at a place."""
+    (f, df), (g, dg) = (_line(s, order) for s in place)
+    i, j = (np.array(SQUARE[: (order + 1) ** 2]).T + 1) // (3 - order)
+    return np.array([df[i] * g[j], f[i] * dg[j]])
+
+
+def _line(s: float, order: int) -> tuple[Floats, Floats]:
+    """Shape functions of a line at s, in rising order of their nodes, and their derivatives."""
+    if order == 1:
+        return np.array([1.0 - s, 1.0 + s]) / 2.0, np.array([-0.5, 0.5])
+    return np.array([s * (s - 1.0) / 2.0, 1.0 - s * s, s * (s + 1.0) / 2.0]), np.array(
+        [s - 0.5, -2.0 * s, s + 0.5]
+    )
+
+
+def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:
+    """Derivatives (2, nodes) of a triangle's shape functions at a place."""
+    d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    if order == 1:
+        return d
+    area = np.array([1.0 - place[0] - place[1], *place])
+    following = np.roll(np.arange(3), -1)
+    return np.hstack([d * (4.0 * area - 1.0), 4.0 * (d * area[following] + area * d[:, following])])
+
+
+#: Extent of a finger's outline in mm: other numbers mean other units.
+SMALLEST, LARGEST = 1.0, 200.0
+#: Two nodes closer than this part of the outline's extent are the same place.
+SAME_PLACE = 1e-7
+#: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
+MOST_PAIRS = 8_000_000
+
+
+def check(mesh: Mesh, source: str = "mesh") -> Mesh:
+    """The same mesh, its cells counter-clockwise and its set `pad` reduced to the outline.
+
+    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first fault found:
+    values, numbers of nodes, units, names, double and unused nodes, orientation, connection, overlap.
+    """
+
+    def refuse(fault: str, allowed: str) -> None:
+        raise InputError("finger.mesh", f"{source} with {fault}", allowed)
+
+    _arrays(mesh, refuse)
+    _extent(mesh, refuse)
+    _nodes(mesh, refuse)
+    mesh = _oriented(mesh, refuse)
+    _shapes(mesh, refuse)
+    _connection(mesh, refuse)
+    _outline(mesh, refuse)
+    return _with_sets(mesh, refuse)
+
+
+Refuse = Callable[[str, str], None]
+
+
+def _some(numbers: Ints) -> str:
+    listed = ", ".join(str(n) for n in numbers[:3])
+    return listed + (f" and {len(numbers) - 3} more" if len(numbers) > 3 else "")
+
+
+def _arrays(mesh: Mesh, refuse: Refuse) -> None:
+    if mesh.kind not in KINDS:
+        refuse(f"{mesh.kind} cells", "cells of one kind: " + ", ".join(KINDS))
+    bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
+    if len(bad):
+        refuse(f"no finite coordinates at node {_some(bad)}", "finite numbers")
+    if not len(mesh.cells):
+        refuse("no cells", "at least one cell")
+    if mesh.cells.min() < 0 or mesh.cells.max() >= len(mesh.points):
+        refuse(f"cells of node {mesh.cells.max()}", f"node numbers from 0 to {len(mesh.points) - 1}")
+    ordered = np.sort(mesh.cells, axis=1)
+    bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
+    if len(bad):
+        refuse(f"the same node twice in cell {_some(bad)}", "different nodes in a cell")
+    bad = np.setdiff1d(mesh.region, list(mesh.region_names.values()))
+    if len(mesh.region) != len(mesh.cells) or len(bad):
+        refuse(f"cells in the nameless region {_some(bad)}", "a named region for every cell")
+
+
+def _extent(mesh: Mesh, refuse: Refuse) -> None:
+    extent = float(np.ptp(mesh.points, axis=0).max())
+    if not SMALLEST <= extent <= LARGEST:
+        allowed = f"an outline between {SMALLEST:g} and {LARGEST:g} mm (lengths are in mm)"
+        refuse(f"an extent of {extent:.4g} mm", allowed)
+
+
+def _nodes(mesh: Mesh, refuse: Refuse) -> None:
+    from scipy.spatial import cKDTree
+
+    unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
+    if len(unused):
+        refuse(f"{len(unused)} nodes that no cell uses (node {_some(unused)})", "only nodes of cells")
+    radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
+    # first by boxes, for of many nodes in one place there would be too many pairs
+    box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
+    order = np.lexsort(box.T)
+    same = np.flatnonzero((np.diff(box[order], axis=0) == 0).all(axis=1))
+    pairs = np.stack([order[same], order[same + 1]], axis=1)
+    if not len(pairs):
+        pairs = cKDTree(mesh.points).query_pairs(radius, output_type="ndarray")
+    if len(pairs):
+        first, second = pairs[0]
+        fault = f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})"
+        refuse(fault, "one node per place: merge double nodes, or the parts come loose")
+
+
+def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
+    """Cells counter-clockwise if all of them were clockwise; a mixture is refused."""
+    corner = mesh.points[mesh.cells[:, : mesh.corners]]
+    x, y = corner[..., 0], corner[..., 1]
+    area = 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
+    if (area < 0.0).all():
+        m = mesh.corners
+        order = [0, *range(m - 1, 0, -1)]
+        if mesh.order == 2:
+            order += [m + i for i in range(m - 1, -1, -1)] + ([8] if m == 4 else [])
+        return replace(mesh, cells=mesh.cells[:, order])
+    bad = np.flatnonzero(area <= 0.0)
+    if len(bad):
+        refuse(f"inverted or empty cells (cell {_some(bad)})", "all cells turning the same way round")
+    return mesh
+
+
+def _shapes(mesh: Mesh, refuse: Refuse) -> None:
+    shape = scaled_jacobian(mesh)
+    bad = np.flatnonzero(shape <= 1e-6)
+    if len(bad):
+        fault = f"tangled cells (cell {_some(bad)}, scaled Jacobian {shape.min():.3g})"
+        refuse(fault, "convex cells with mid-nodes near the middle of their edges")
+
+
+def _connection(mesh: Mesh, refuse: Refuse) -> None:
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges, of_cell = mesh.edges
+    cells_of_edge = np.bincount(of_cell.ravel())
+    if (cells_of_edge > 2).any():
+        a, b = edges[np.argmax(cells_of_edge > 2)]
+        refuse(f"more than two cells on the edge of nodes {a} and {b}", "cells that do not overlap")
+    along = mesh.cell_edges[..., 0] < mesh.cell_edges[..., 1]
+    turns = np.bincount(of_cell.ravel(), weights=np.where(along, 1.0, -1.0).ravel())
+    folded = (cells_of_edge == 2) & (turns != 0.0)
+    if folded.any():
+        a, b = edges[np.argmax(folded)]
+        refuse(f"two cells on the same side of the edge of nodes {a} and {b}", "cells that do not overlap")
+    if mesh.order == 2:
+        middles = mesh.cells[:, mesh.corners : 2 * mesh.corners]
+        if len(np.unique(middles)) != len(edges):
+            refuse(
+                "neighbouring cells with different mid-nodes on their common edge", "one mid-node per edge"
+            )
+    ones = np.ones(of_cell.size, dtype=np.int8)
+    cell = np.repeat(np.arange(len(of_cell)), mesh.corners)
+    table = coo_array((ones, (cell, of_cell.ravel())), shape=(len(of_cell), len(edges))).tocsr()
+    parts, _ = connected_components(table @ table.T, directed=False)
+    if parts > 1:
+        refuse(f"{parts} separate parts", "one body, its cells joined by common edges")
+
+
+def _outline(mesh: Mesh, refuse: Refuse) -> None:
+    """The outline must not cross or touch itself: else cells overlap, or nodes hang on another cell's
+    edge.
+    """
+    edges = mesh.outer_edges
+    if not len(edges):
+        refuse("no outline", "a body with an outline")
+    if mesh.order == 2:
+        edges = np.vstack([edges[:, [0, 2]], edges[:, [2, 1]]])
+    pairs = _near_pairs(mesh.points[edges], refuse)
+    apart = (edges[pairs[:, 0]][:, :, None] != edges[pairs[:, 1]][:, None, :]).all(axis=(1, 2))
+    a, b = mesh.points[edges[pairs[:, 0]]], mesh.points[edges[pairs[:, 1]]]
+    (across, along), (back, _) = _frame(a, b), _frame(b, a)
+    in_line = (across == 0.0).all(axis=1)
+    overlapping = (along.max(axis=1) > 1e-9) & (along.min(axis=1) < 1.0 - 1e-9)
+    crossing = apart & ~in_line & (across.prod(axis=1) <= 0.0) & (back.prod(axis=1) <= 0.0)
+    crossing |= in_line & overlapping
+    if crossing.any():
+        first = pairs[np.argmax(crossing)]
+        fault = f"an outline that crosses or touches itself near node {edges[first[0]][0]}"
+        refuse(fault, "cells that do not overlap, and no node on another cell's edge")
+
+
+def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
+    """Pairs of segments (K, 2, 2) whose middles are near enough for them to meet."""
+    from scipy.spatial import cKDTree
+
+    half, middle = 0.5005 * np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1), segments.mean(axis=1)
+    tree, reach = cKDTree(middle), 2.0 * float(half.max())
+    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
+        refuse(
+            "edges of the outline too close for their lengths", "edges of similar lengths along the outline"
+        )
+    pairs = np.asarray(tree.query_pairs(reach, output_type="ndarray"))
+    distance = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
+    return pairs[distance <= half[pairs].sum(axis=1)]
+
+
+def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2) each."""
+    direction = a[:, 1] - a[:, 0]
+    away = b - a[:, :1]
+    square = (direction**2).sum(axis=1)[:, None]
+    across = (direction[:, None, 0] * away[..., 1] - direction[:, None, 1] * away[..., 0]) / square
+    across[np.abs(across) < 1e-9] = 0.0
+    return across, (away * direction[:, None]).sum(axis=-1) / square
+
+
+def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
+    have = ", ".join(sorted(mesh.node_sets)) or "none"
+    for name in ("pad", "bone"):
+        if not len(mesh.node_sets.get(name, ())):
+            refuse(f"no boundary {name} (it has {have})", "point data, or physical groups, `pad` and `bone`")
+    if len(mesh.node_sets["bone"]) < 2:
+        refuse("a bone of a single node", "a bone of at least two nodes, so that the finger cannot turn")
+    pad = np.unique(mesh.edges_of("pad")).astype(np.int64)
+    if not len(pad):
+        refuse("a pad without an edge of the outline", "a pad of whole edges: all their nodes in `pad`")
+    if np.isin(pad, mesh.node_sets["bone"]).all():
+        refuse("a pad that lies on the bone", "a pad with nodes that can move")
+    return replace(mesh, node_sets={**mesh.node_sets, "pad": pad})

@@ -1,0 +1,256 @@
+"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its reason.
+
+`make_model` builds what the plan says, so the printout and the run cannot disagree.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Hover, VoltageRamp
+from evfem.scene.resolution import unresolved
+from evfem.scene.scene import Scene
+from evfem.tissue.laws import split
+
+#: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
+RIGID_BELOW = 1e-4
+#: columns of a printed plan, at most
+WIDTH = 79
+
+
+@dataclass(frozen=True)
+class Term:
+    """One ingredient of a scene: whether it is in, and why."""
+
+    name: str
+    needed: bool
+    reason: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Terms, numbers of unknowns and solver of a scene; `str(plan)` is meant to be read."""
+
+    name: str
+    element: str
+    nodes: int
+    cells: int
+    unknowns: int
+    pad_nodes: int
+    steps: int
+    terms: tuple[Term, ...]
+    solver: tuple[str, ...]
+    warning: str | None = None
+
+    def has(self, name: str) -> bool:
+        """Whether the term called `name` is in."""
+        return next(term.needed for term in self.terms if term.name == name)
+
+    def __str__(self) -> str:
+        lines = [
+            f"Scene {self.name}: {self.steps} steps, {self.nodes} nodes, {self.cells} cells ({self.element})",
+            "",
+            "Terms",
+        ]
+        for term in self.terms:
+            lines += _wrapped(f"  {'+' if term.needed else '-'} {term.name:<13} ", term.reason)
+        lines += [
+            "",
+            "Unknowns",
+            f"  {self.unknowns} displacements, with the bone; {self.pad_nodes} pad nodes may touch",
+        ]
+        lines += ["", "Solver"]
+        for line in self.solver:
+            lines += _wrapped("  ", line)
+        if self.warning is not None:
+            lines += ["", *_wrapped("Warning: ", self.warning)]
+        return "\n".join(lines)
+
+
+def _wrapped(begin: str, text: str) -> list[str]:
+    """A text behind its beginning, as lines that fit a terminal."""
+    indent = " " * max(len(begin), 4)
+    return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
+
+
+def plan(scene: Scene) -> Plan:
+    """Which terms, unknowns and solver a scene needs, and why; builds the mesh, solves nothing.
+
+    >>> from evfem import Flat, FingerPad, Press, Scene
+    >>> smooth = FingerPad(ridges=False, resolution="coarse")
+    >>> needed = plan(Scene(smooth, Flat(friction=0.0), motion=[Press(indentation=0.5)]))
+    >>> [term.name for term in needed.terms if not term.needed]
+    ['friction', 'electricity', 'time', 'user forms']
+    """
+    mesh, element = scene_mesh(scene)
+    return plan_on(scene, mesh, element)
+
+
+def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
+    """The finger's mesh and the element to use on it."""
+    linear = scene.solver.element in ("q1", "q1_fbar")
+    mesh = scene.finger.mesh(1 if linear else 2)
+    return mesh, scene.solver.element_on(mesh.corners)
+
+
+def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
+    """The plan of a scene whose mesh is already there."""
+    for name in ("pad", "bone"):
+        if not len(mesh.node_sets.get(name, ())):
+            raise InputError(
+                "finger.mesh", f"no nodes on `{name}`", "point data or physical groups `pad` and `bone`"
+            )
+    bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
+    terms = (
+        _tissue(scene, mesh),
+        _contact(scene),
+        _friction(scene),
+        _electricity(scene),
+        _time(scene),
+        _forms(scene),
+    )
+    return Plan(
+        name=scene.name,
+        element=element,
+        nodes=len(mesh.points),
+        cells=len(mesh.cells),
+        unknowns=2 * (len(mesh.points) - len(bone)) + 2,
+        pad_nodes=int(np.setdiff1d(pad, bone).size),
+        steps=scene.total_steps,
+        terms=terms,
+        solver=_solver(scene, terms),
+        warning=unresolved(scene, mesh),
+    )
+
+
+def _tissue(scene: Scene, mesh: Mesh) -> Term:
+    laws = ", ".join(sorted({type(law).__name__ for law in scene.finger.materials.values()}))
+    moduli = [split(law).shear_modulus for law in scene.finger.materials.values()]
+    # a modulus in kPa or Pa is seen here
+    soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli), max(moduli)))
+    stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
+    share = rigid_share(scene, mesh)
+    if share is not None and share < RIGID_BELOW:
+        return Term(
+            "tissue", False, f"hovering: deforming would change the attraction by less than {share:.1e}"
+        )
+    return Term(
+        "tissue",
+        True,
+        f"{laws}, plane strain, {stiffness}"
+        + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
+    )
+
+
+def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
+    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None where it
+    must deform.
+
+    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln p)/dg, of
+    the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the smallest gap.
+    """
+    hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
+    if (
+        not hovers
+        or not all(isinstance(motion, (Hover, VoltageRamp)) for motion in scene.motion)
+        or scene.forms
+    ):
+        return None
+    gap = min(motion.gap for motion in hovers)
+    if (
+        gap == 0.0
+        or not isinstance(scene.motion[0], Hover)
+        or scene.law is None
+        or scene.finger.electrical is None
+    ):
+        return None
+    from evfem.electrostatics.laws import Layers
+
+    layers = Layers.of(scene.ground.insulator)
+    traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
+    softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
+    depth = float(np.ptp(mesh.points[:, 1]))
+    return traction * depth / softest * 2.0 / gap
+
+
+def largest_voltage(scene: Scene) -> float:
+    """Largest magnitude of the voltage anywhere in the scene (V)."""
+    own: Any = scene.voltage
+    if isinstance(own, VoltageProfile):
+        own = own.voltage
+    elif isinstance(own, FollowForce):
+        own = own.largest_voltage
+    ramps = [abs(motion.voltage) for motion in scene.motion if isinstance(motion, VoltageRamp)]
+    return float(max([np.abs(own).max(), *ramps]))
+
+
+def _contact(scene: Scene) -> Term:
+    shape = "a flat surface" if scene.ground.is_flat else "a textured surface: its slope and curvature enter"
+    return Term("contact", True, shape)
+
+
+def _friction(scene: Scene) -> Term:
+    return Term(
+        "friction",
+        bool(scene.ground.has_friction),
+        "Coulomb" if scene.ground.has_friction else "friction coefficient is 0 everywhere",
+    )
+
+
+def _electricity(scene: Scene) -> Term:
+    if scene.law is None or largest_voltage(scene) == 0.0:
+        return Term("electricity", False, "no law or no voltage")
+    air = "with the air layer" if scene.air_layer else "only touching nodes"
+    return Term(
+        "electricity",
+        True,
+        f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling",
+    )
+
+
+def _time(scene: Scene) -> Term:
+    dynamics = scene.solver.dynamics
+    return Term(
+        "time",
+        dynamics != "quasistatic",
+        "quasi-static" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
+    )
+
+
+def _forms(scene: Scene) -> Term:
+    names = ", ".join(f"{term.form.name} on {term.on.name}" for term in scene.forms)
+    return Term("user forms", bool(scene.forms), names or "none")
+
+
+def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
+    needed: dict[str, Any] = {term.name: term.needed for term in terms}
+    if not needed["tissue"]:
+        return ("the attraction is summed over the rigid outline",)
+    backend = (
+        "PARDISO (symmetric, Schur complement)"
+        if find_spec("pypardiso")
+        else "SuperLU (install evfem[fast] for PARDISO)"
+    )
+    kernels = "numba" if find_spec("numba") else "numpy (install evfem[fast] for numba)"
+    lines = [
+        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {kernels}",
+        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
+    ]
+    unsymmetric = [name for name in ("friction", "electricity") if needed[name]]
+    if unsymmetric:
+        lines.append(
+            f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
+            "so the tissue's matrix stays symmetric"
+        )
+    return (
+        *lines,
+        f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",
+    )

@@ -1,0 +1,57 @@
+"""Whether the pad's nodes are close enough together to feel a profile, and the profile smooth enough."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Slide
+from evfem.scene.scene import Scene
+
+#: share of a profile's height that may lie between two neighbouring nodes and be missed by both
+MISSED = 0.2
+#: share of a profile's slope (root mean square) that may be too fine for the nodes
+ROUGH = 0.5
+#: samples of the profile per node spacing, and at most
+PER_SPACING, MOST = 8, 200_000
+
+
+def unresolved(scene: Scene, mesh: Mesh) -> str | None:
+    """A sentence if the surface is sharper or rougher than the node spacing of the pad, else None.
+
+    Compared are the profile's height in the middle between two nodes with the mean of its heights below
+    them, and its slope there with that from node to node, all along the way. Noise of a scan hardly shows in
+    the heights, but contact acts along the slope: nodes that follow it stick and slip one by one.
+    """
+    surface: Any = scene.ground
+    if surface.is_flat or not len(mesh.edges_of("pad")):
+        return None
+    ends = mesh.points[mesh.edges_of("pad")[:, :2]]
+    spacing = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T))) / mesh.order
+    x = _way(scene, mesh, spacing / PER_SPACING)
+    before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
+    missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
+    if missed > MISSED * whole:
+        return (
+            f"the surface is sharper than the node spacing of the pad ({spacing:.2g} mm): up to {missed:.2g} "
+            f"of its {whole:.2g} mm of height lie between two nodes; use a finer mesh or a smoother profile"
+        )
+    slope = surface.slope(x)
+    fine, all_of_it = (float(np.sqrt(np.mean(s**2))) for s in (slope - (after - before) / spacing, slope))
+    if fine > ROUGH * all_of_it:
+        return (
+            f"the surface is rougher than the node spacing of the pad ({spacing:.2g} mm): "
+            f"{fine / all_of_it:.0%} of its slope is finer than that, as noise is; smooth the profile, "
+            "or expect small steps and a long run"
+        )
+    return None
+
+
+def _way(scene: Scene, mesh: Mesh, step: float) -> Any:
+    """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
+    position = np.cumsum([0.0, *(motion.distance for motion in scene.motion if isinstance(motion, Slide))])
+    pad = mesh.points[mesh.node_sets["pad"], 0]
+    first, last = pad.min() + position.min(), pad.max() + position.max()
+    return np.linspace(first, last, int(np.clip((last - first) / step, 2, MOST)))

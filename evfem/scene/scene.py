@@ -1,0 +1,289 @@
+"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing computed.
+
+Units mm, N, MPa, V, s; forces of the plane model are per mm of depth (N/mm). The bone translates by
+(`position`, -(`indentation` + g0)), g0 being the smallest vertical gap of the undeformed outline at the
+start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol, runtime_checkable
+
+from evfem.common.checks import choice, count, real, set_frozen
+from evfem.common.digest import digest
+from evfem.common.views import called, changed, short, table
+from evfem.contact.own import completed
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.errors import InputError
+from evfem.protocols import CompleteSurface, ForceLaw, Surface
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.terms import Boundary, Form, Region, Term
+from evfem.solver.strategy import Strategy
+
+ELEMENTS = ("q1", "q1_fbar", "q2", "q2p1", "p2")
+DYNAMICS = ("quasistatic", "viscous", "inertial")
+CONTACTS = ("exact", "penalty")
+DIRECTIONS = ("vertical", "normal")
+COUPLINGS = ("monolithic", "staggered", "staggered_once")
+
+
+@runtime_checkable
+class Finger(Protocol):
+    """What a scene needs of a finger: `FingerPad` and `MeshedFinger` have it."""
+
+    @property
+    def materials(self) -> Mapping[str, Any]:
+        """Material law of each region."""
+
+    @property
+    def viscosity(self) -> float:
+        """Relaxation time of Kelvin-Voigt tissue (s)."""
+
+    @property
+    def electrical(self) -> Any:
+        """Thickness (mm, or None for the mesh's own) and permittivity of the stratum corneum."""
+
+    def mesh(self, order: int) -> Any:
+        """The mesh with elements of that order."""
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How a scene is solved; the defaults are the recommended ones.
+
+    `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free residual over
+    max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go with `contact="penalty"`
+    alone. `strategy` says how hard steps are tried.
+    """
+
+    element: str | None = None
+    dynamics: str = "quasistatic"
+    contact: str = "exact"
+    penalty_normal: float | None = None
+    penalty_tangential: float | None = None
+    tolerance: float = 1e-8
+    threads: int = 1
+    strategy: Strategy = field(default_factory=Strategy)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.strategy, Strategy):
+            raise InputError("strategy", self.strategy, "a Strategy")
+        if self.element is not None:
+            choice("element", self.element, ELEMENTS)
+        choice("dynamics", self.dynamics, DYNAMICS)
+        choice("contact", self.contact, CONTACTS)
+        for key in ("penalty_normal", "penalty_tangential"):
+            value = getattr(self, key)
+            if value is None:
+                continue
+            if self.contact != "penalty":
+                raise InputError(key, value, 'only with contact = "penalty"')
+            set_frozen(self, **{key: real(key, value, "a penalty in N/mm3, larger than 0", lambda p: p > 0)})
+        if self.contact == "penalty" and self.penalty_normal is None:
+            allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
+            raise InputError("penalty_normal", "nothing", allowed)
+        allowed = "a relative residual from 1e-13 to 1e-3"
+        tolerance = real("tolerance", self.tolerance, allowed, lambda t: 1e-13 <= t <= 1e-3)
+        set_frozen(self, tolerance=tolerance, threads=count("threads", self.threads, 1024))
+
+    def element_on(self, corners: int) -> str:
+        """The element used on cells with that many corners (3 or 4).
+
+        >>> Solver().element_on(4), Solver().element_on(3), Solver(element="q1").element_on(4)
+        ('q2p1', 'p2', 'q1')
+        >>> Solver(element="q1").element_on(3)
+        Traceback (most recent call last):
+        evfem.errors.InputError: solver.element: given q1 on a mesh of triangles; allowed: p2
+        """
+        names = ("p2",) if corners == 3 else ("q1", "q1_fbar", "q2", "q2p1")
+        if self.element is None:
+            return "p2" if corners == 3 else "q2p1"
+        if self.element not in names:
+            cells = "triangles" if corners == 3 else "quads"
+            raise InputError("solver.element", f"{self.element} on a mesh of {cells}", " | ".join(names))
+        return self.element
+
+
+@dataclass(frozen=True)
+class Output:
+    """Fields are kept of every `every`-th step, and of the last one."""
+
+    every: int = 1
+
+    def __post_init__(self) -> None:
+        set_frozen(self, every=count("every", self.every))
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A finger, a surface, an electrostatic law with a voltage, and what happens.
+
+    `voltage` in V: a number, acting in full from the first step, or a `VoltageProfile` over the position
+    of the bone. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the surface.
+    `air_layer` False: only touching nodes carry electrostatic force. Raises InputError for anything that
+    does not fit together.
+    """
+
+    finger: Finger
+    surface: Surface
+    law: ForceLaw | None = None
+    voltage: float | VoltageProfile | FollowForce = 0.0
+    motion: Sequence[Motion] = ()
+    air_layer: bool = field(default=True, kw_only=True)
+    direction: str = field(default="vertical", kw_only=True)
+    coupling: str = field(default="monolithic", kw_only=True)
+    solver: Solver = field(default=Solver(), kw_only=True)
+    name: str = field(default="scene", kw_only=True, compare=False)
+    forms: tuple[Term, ...] = field(default=(), kw_only=True)
+    output: Output = field(default=Output(), kw_only=True)
+
+    def __post_init__(self) -> None:
+        _check_parts(self)
+        set_frozen(self, motion=_motions(self.motion), forms=tuple(self.forms))
+        _check_electrostatics(self)
+        _check_motion(self)
+        _check_dynamics(self)
+
+    def __repr__(self) -> str:
+        """Finger, surface and attraction; what happens; and what is not as usual."""
+        pull = "no attraction" if self.law is None else f"{short(self.law)} at {_volts(self.voltage)}"
+        lines = [f"Scene {self.name!r}: {short(self.finger)} on {short(self.surface)}, {pull}"]
+        lines.append("  " + ", ".join(called(type(m).__name__, changed(m)) for m in self.motion[:6]))
+        lines[-1] += f", ... ({len(self.motion)} motions)" if len(self.motion) > 6 else ""
+        own = [f"{name}={short(value)}" for name, value in self._unusual().items()]
+        return "\n".join([*lines, *(["  " + ", ".join(own)] if own else [])])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same as a small table."""
+        rows = [("finger", short(self.finger)), ("surface", short(self.surface))]
+        if self.law is not None:
+            rows.append(("attraction", f"{short(self.law)} at {_volts(self.voltage)}"))
+        rows += [(f"motion {i}", called(type(m).__name__, changed(m))) for i, m in enumerate(self.motion[:6])]
+        rows += [(name, short(value)) for name, value in self._unusual().items()]
+        return table(f"Scene {self.name}, {self.total_steps} steps", rows)
+
+    def _unusual(self) -> dict[str, Any]:
+        told = ("finger", "surface", "law", "voltage", "motion", "name")
+        return {key: value for key, value in changed(self).items() if key not in told}
+
+    @property
+    def ground(self) -> CompleteSurface:
+        """The surface with all that contact asks of it, derived where it is the user's own."""
+        return completed(self.surface)
+
+    @property
+    def total_steps(self) -> int:
+        """Number of requested steps, which is the number of rows of the history."""
+        return sum(motion.steps for motion in self.motion)
+
+    def with_term(self, form: Form, on: Region | Boundary) -> Scene:
+        """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
+        if not isinstance(form, Form):
+            raise InputError("form", form, "a function marked with @evfem.form")
+        if not isinstance(on, (Region, Boundary)):
+            raise InputError("on", on, "evfem.Region(name) or evfem.Boundary(name)")
+        return replace(self, forms=(*self.forms, Term(form, on)))
+
+    def digest(self) -> str:
+        """SHA-256 over everything in the scene but its name, equal in every process."""
+        return digest(self)
+
+
+def _volts(voltage: object) -> str:
+    return f"{voltage:g} V" if isinstance(voltage, float) else type(voltage).__name__
+
+
+def _check_parts(scene: Scene) -> None:
+    if not isinstance(scene.finger, Finger):
+        raise InputError("finger", scene.finger, "a FingerPad or a MeshedFinger")
+    real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
+    completed(scene.surface)
+    if not isinstance(scene.solver, Solver):
+        raise InputError("solver", scene.solver, "a Solver")
+    if not isinstance(scene.output, Output):
+        raise InputError("output", scene.output, "an Output")
+    if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
+        raise InputError("name", scene.name, "a name that can be part of a file name")
+    if not all(isinstance(term, Term) for term in scene.forms):
+        raise InputError("forms", scene.forms, "terms as made by Scene.with_term")
+
+
+def _motions(motions: Motion | Iterable[Motion]) -> tuple[Motion, ...]:
+    listed = (motions,) if isinstance(motions, Motion) else tuple(motions)
+    if not listed:
+        raise InputError("motion", "nothing", "at least one of Press, Slide, Hover, VoltageRamp")
+    for i, motion in enumerate(listed):
+        if not isinstance(motion, Motion):
+            raise InputError(f"motion[{i}]", motion, "Press, Slide, Hover or VoltageRamp")
+    return listed
+
+
+def _check_electrostatics(scene: Scene) -> None:
+    choice("electrostatics.direction", scene.direction, DIRECTIONS)
+    choice("electrostatics.coupling", scene.coupling, COUPLINGS)
+    if not isinstance(scene.air_layer, bool):
+        raise InputError("electrostatics.air_layer", scene.air_layer, "true or false")
+    if not isinstance(scene.voltage, (VoltageProfile, FollowForce)):
+        allowed = "a voltage in V between -1e6 and 1e6"
+        voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
+        set_frozen(scene, voltage=voltage)
+    if scene.law is None:
+        if scene.voltage != 0.0:
+            allowed = "StrongTroxel(), Kaczmarek() or a law of your own"
+            raise InputError("electrostatics.law", "a voltage without a law", allowed)
+    elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
+        allowed = "StrongTroxel(), Kaczmarek() or an object with a method traction(gap, voltage, layers)"
+        raise InputError("electrostatics.law", scene.law, allowed)
+    elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
+        allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
+        raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
+    elif scene.ground.insulator is None:
+        allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
+        raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _check_motion(scene: Scene) -> None:
+    pressed = False
+    for i, motion in enumerate(scene.motion):
+        key = f"motion[{i}]"
+        pressed = (pressed or isinstance(motion, Press)) and not isinstance(motion, Hover)
+        if isinstance(motion, VoltageRamp) and scene.law is None:
+            raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
+        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, (VoltageProfile, FollowForce)):
+            raise InputError(key, "a voltage ramp beside a voltage profile", "one of the two")
+        if isinstance(motion, (Slide, VoltageRamp)) and motion.hold == "force" and not pressed:
+            raise InputError(
+                f"{key}.hold", "force before any press", "a press first, to have a force to hold"
+            )
+        if isinstance(motion, Press) and motion.force == 0.0 and scene.law is None:
+            raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
+
+
+def _check_dynamics(scene: Scene) -> None:
+    solver = scene.solver
+    if solver.contact == "penalty" and scene.ground.has_friction and solver.penalty_tangential is None:
+        allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
+        raise InputError("solver.penalty_tangential", "nothing", allowed)
+    if solver.dynamics == "quasistatic":
+        return
+    for i, motion in enumerate(scene.motion):
+        if isinstance(motion, Slide) and motion.speed is None:
+            allowed = f"a speed in mm/s, needed with dynamics = {solver.dynamics}"
+            raise InputError(f"motion[{i}].speed", "nothing", allowed)
+    own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
+    if solver.dynamics == "viscous" and not max([scene.finger.viscosity, *own]) > 0.0:
+        allowed = "a relaxation time in s, larger than 0, with dynamics = viscous"
+        raise InputError("finger.viscosity", 0.0, allowed)
+
+
+def default_scene() -> Scene:
+    """Table 2's finger (medium) pressed to 0.05 N/mm and slid 5 mm over a display at 1000 V."""
+    from evfem.contact.surfaces import Display
+    from evfem.electrostatics.laws import Kaczmarek, Layer
+    from evfem.finger.fingerpad import FingerPad
+
+    display = Display(insulator=Layer(thickness=0.09, eps_r=3.35), friction=0.3)
+    motion = (Press(force=0.05), Slide(distance=5.0, steps=100))
+    return Scene(FingerPad(), display, law=Kaczmarek(), voltage=1000.0, motion=motion, name="default")

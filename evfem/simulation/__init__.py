@@ -1,0 +1,1 @@
+"""Running a scene: model, run, works and energies, results, checkpoints, rendering."""

@@ -1,0 +1,103 @@
+"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
+
+Beside the state a run carries over from step to step: the contact candidates, the part of a step that
+worked last, the sums of works, and a factorisation made some steps ago. Of the last one the checkpoint keeps
+where it was made; a resumed run makes it there again, and the iterations that follow are the same to the last
+bit (with one thread, on the same machine and backend).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from evfem.errors import InputError
+from evfem.simulation.result import Saved
+from evfem.solver.equilibrium import Equilibrium
+from evfem.solver.state import Linearised, State
+
+#: statuses of a pad node are 0 to this
+LAST_STATUS = 3
+
+
+def state_arrays(state: State) -> dict[str, Any]:
+    """Every part of a state, by name."""
+    return {spec.name: np.asarray(getattr(state, spec.name)) for spec in fields(State)}
+
+
+def carried_arrays(equilibrium: Equilibrium) -> dict[str, Any]:
+    """What an equilibrium solver takes with it to the next step; of the same shapes with and without a
+    factorisation.
+    """
+    at, dynamics = equilibrium.linear.carried, equilibrium.body.dynamics
+    nowhere = np.zeros_like(equilibrium.points)
+    return {
+        "candidates": equilibrium.linear.candidates,
+        "factorised": np.array(at is not None),
+        "factor_u": nowhere if at is None else at.u,
+        "factor_begin": nowhere if at is None else at.begin,
+        "factor_voltage": np.array(0.0 if at is None else at.voltage),
+        "factor_duration": np.array(0.0 if at is None else at.duration),
+        "factor_frozen": np.array(False if at is None else at.frozen),
+        "factor_touching": np.zeros(equilibrium.pad.nodes.size, dtype=bool) if at is None else at.touching,
+        "duration": np.array(0.0 if dynamics is None else dynamics.step),
+    }
+
+
+def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
+    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps that has just
+    been set up.
+
+    Raises InputError for what is missing, of another shape or kind, not finite, or out of range.
+    """
+    if len(saved.rows) > most_rows:
+        allowed = f"at most the {most_rows} steps of the scene"
+        raise InputError("checkpoint", f"{len(saved.rows)} steps", allowed)
+    for name, expected in fresh.items():
+        given, fits = saved.arrays.get(name), np.asarray(expected)
+        if given is None or given.dtype.kind != fits.dtype.kind:
+            raise _unusable(name)
+        if given.ndim != fits.ndim or (name != "candidates" and given.shape != fits.shape):
+            raise _unusable(name)
+        if not np.isfinite(given).all():
+            raise _unusable(name)
+    arrays = {name: saved.arrays[name] for name in fresh}
+    pad = arrays["status"].size
+    for name, most in (("candidates", pad - 1), ("status", LAST_STATUS)):
+        if arrays[name].size and not 0 <= arrays[name].min() <= arrays[name].max() <= most:
+            raise _unusable(name)
+    if (np.diff(arrays["candidates"]) <= 0).any():
+        raise _unusable("candidates")
+    if not 0.0 < arrays["part"] <= 1.0:
+        raise _unusable("part")
+    return arrays
+
+
+def _unusable(name: str) -> InputError:
+    return InputError("checkpoint", f"no usable {name}", "a checkpoint of the same scene and version")
+
+
+def state_of(arrays: Mapping[str, np.ndarray]) -> State:
+    """The state in the arrays of a checkpoint."""
+    parts: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State)}
+    return State(**parts | {"voltage": float(arrays["voltage"])})
+
+
+def carry_on(equilibrium: Equilibrium, state: State, arrays: Mapping[str, np.ndarray]) -> None:
+    """Put an equilibrium solver where it was after the step that led to `state`."""
+    equilibrium.linear.candidates = arrays["candidates"].astype(np.int64)
+    if arrays["factorised"]:
+        at = Linearised(
+            u=arrays["factor_u"],
+            voltage=float(arrays["factor_voltage"]),
+            touching=arrays["factor_touching"],
+            frozen=bool(arrays["factor_frozen"]),
+            begin=arrays["factor_begin"],
+            duration=float(arrays["factor_duration"]),
+        )
+        equilibrium.linear.restore(state, at)
+    if equilibrium.body.dynamics is not None:
+        equilibrium.body.dynamics.step = float(arrays["duration"])

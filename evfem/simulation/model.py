@@ -1,0 +1,127 @@
+"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction, equilibrium
+solver.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact import pad as outline
+from evfem.contact.attraction import Attraction
+from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.signals import FollowForce
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.scene.plan import plan_on, scene_mesh
+from evfem.scene.scene import Scene
+from evfem.solver.equilibrium import Equilibrium, RigidOutline
+from evfem.solver.state import Limits
+from evfem.tissue.body import Body
+from evfem.tissue.dynamics import make_dynamics
+from evfem.tissue.forms import make_term
+from evfem.tissue.space import make_space
+from evfem.tissue.weakform import check_laws
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical
+    gap at the start.
+    """
+
+    scene: Scene
+    mesh: Mesh
+    body: Body
+    pad: outline.Pad
+    surface: Any
+    attraction: Attraction | None
+    equilibrium: Equilibrium
+    first_gap: float
+
+    def bone(self, position: float, indentation: float) -> Floats:
+        """Translation of the bone (2,) in mm."""
+        return np.array([position, -(indentation + self.first_gap)])
+
+    def indentation(self, bone: Floats) -> float:
+        """Bone travel beyond first touch in mm, negative when hovering."""
+        return float(-bone[1] - self.first_gap)
+
+
+def make_model(scene: Scene) -> Model:
+    """Build the parts of a scene; raises `InputError` where mesh, names and scene do not fit."""
+    mesh, element = scene_mesh(scene)
+    check_laws(mesh, scene.finger.materials)
+    needed = plan_on(scene, mesh, element)
+    if needed.warning is not None:
+        warnings.warn(needed.warning, stacklevel=2)
+    space = make_space(mesh, element)
+    pad = outline.make_pad(mesh)
+    surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
+    attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
+    terms = [
+        make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary")
+        for term in scene.forms
+    ]
+    solver, laws = scene.solver, scene.finger.materials
+    dynamics = None
+    if needed.has("time"):
+        dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
+    body = Body(space, laws, terms, dynamics)
+    solve = Equilibrium if needed.has("tissue") else RigidOutline
+    equilibrium = solve(
+        body, pad, surface, attraction, Limits(solver.tolerance, solver.strategy, solver.threads)
+    )
+    if solver.contact == "penalty":
+        normal = float(solver.penalty_normal or 0.0)
+        equilibrium.interface.penalties = (normal, solver.penalty_tangential or normal)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
+
+
+def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
+    """The surface with its height set (first touch where the scene leaves it open), and g0 in mm."""
+    x, y = outline_points.T
+    gap = float(np.min(y - surface.height(x)))
+    if surface.y is None:
+        return surface.shifted(gap), 0.0
+    g0 = gap - surface.y
+    if g0 < -1e-12 * np.ptp(outline_points, axis=0).max():
+        raise InputError(
+            "surface.y", surface.y, f"at most {gap:.9g} mm, where the surface touches the undeformed outline"
+        )
+    return surface, max(g0, 0.0)
+
+
+def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) -> Attraction:
+    """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
+    electrical = scene.finger.electrical
+    thickness = None if electrical is None else electrical.stratum_corneum_thickness
+    if thickness is None:
+        if electrical is None or "stratum_corneum" not in mesh.region_names:
+            allowed = (
+                "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+            )
+            raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
+        from evfem.mesh.mesh import layer_thickness
+
+        thickness = layer_thickness(mesh, "stratum_corneum", pad.nodes)
+    if isinstance(scene.voltage, FollowForce):
+        _check_quadratic(scene)
+    skin = Layer(np.broadcast_to(thickness, pad.nodes.shape).astype(float), electrical.stratum_corneum_eps_r)
+    layers = Layers.of(skin, surface.insulator)
+    return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer)
+
+
+def _check_quadratic(scene: Scene) -> None:
+    """The squared voltage can be an unknown only of laws that are proportional to it."""
+    layers = Layers.of(scene.ground.insulator)
+    assert scene.law is not None
+    once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
+    if not np.isclose(twice, 4.0 * once, rtol=1e-9):
+        raise InputError(
+            "electrostatics.law", scene.law, "a law proportional to the squared voltage, to follow a force"
+        )

@@ -1,0 +1,288 @@
+"""From sliding over a real surface to a display's voltage, and back to what the finger then feels.
+
+A reference is recorded, its apparent friction F_t / F_n becomes a voltage over the position by (17)-(20b),
+and the display replays it. The closed forms leave out the air layer, take the contact area from a power law
+and the load as constant; `exact` asks the coupled model itself for the voltage instead. Forces on the bone,
+N/mm; mm, V, s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from evfem.contact.signorini import OPEN, STICK
+from evfem.electrostatics.encoding import Encoding, share_not_renderable
+from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile, carrier_amplitude
+from evfem.errors import InputError
+from evfem.protocols import ForceLaw, Observer, Surface
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Frame, Result, Row
+from evfem.simulation.run import simulate
+from evfem.tensor import Array
+
+#: friction that is lower than the display's own by less than this share of it is solver noise
+NOISE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A scene, its result, and the position (mm) of the first step in which no touching node sticks.
+
+    `full_slip` is None if some node sticks in every step of the slides.
+    """
+
+    scene: Scene
+    result: Result
+    full_slip: float | None
+
+
+def record(scene: Scene, observers: Sequence[Observer] = ()) -> Recording:
+    """Simulate `scene` and watch for full slip; `observers` as in `simulate`."""
+    watch = _SlipWatch()
+    result = simulate(scene, observers=(*observers, watch))
+    return Recording(scene, result, watch.position)
+
+
+class _SlipWatch:
+    """Observer that remembers where every touching node slips for the first time in a slide."""
+
+    position: float | None = None
+
+    def step(self, row: Row, frame: Frame | None, checkpoint: Callable[[], dict[str, Any]]) -> None:
+        if self.position is None and row["motion"] == "slide":
+            status = checkpoint()["status"]
+            if not np.any(status == STICK) and np.any(status != OPEN):
+                self.position = float(row["position"])
+
+
+@dataclass(frozen=True, eq=False)
+class ApparentFriction:
+    """Forces on the bone over its position: arrays (n,) in mm and N/mm, positions increasing.
+
+    >>> felt = ApparentFriction([0.0, 1.0, 2.0], [0.05, 0.05, 0.04], [0.0, 0.005, 0.008])
+    >>> felt.friction.round(9).tolist(), round(felt.minimum(after=0.5), 9)
+    ([0.0, 0.1, 0.2], 0.1)
+    """
+
+    position: Array
+    normal_force: Array
+    tangential_force: Array
+
+    def __post_init__(self) -> None:
+        for name in ("position", "normal_force", "tangential_force"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
+        if not np.all(self.normal_force > 0.0):
+            lowest = float(self.normal_force.min())
+            raise InputError("normal_force", lowest, "an applied force above zero all along the slide")
+
+    @property
+    def friction(self) -> Array:
+        """mu = F_t / F_n of each position, equation (12); on texture it may be negative."""
+        return self.tangential_force / self.normal_force
+
+    def minimum(self, after: float) -> float:
+        """Smallest apparent friction from the position `after` (mm) on."""
+        there = self.position >= after
+        if not there.any():
+            raise InputError("after", after, f"a position up to {self.position[-1]:g} mm")
+        return float(self.friction[there].min())
+
+
+def apparent_friction(result: Result) -> ApparentFriction:
+    """Applied forces over the slide of `result`, the state just before its first step included.
+
+    Raises InputError unless all slides go towards +x and follow each other.
+    """
+    rows = _slide_rows(result)
+    first = rows[0]
+    if first > 0:
+        rows = np.concatenate([[first - 1], rows])
+    x = result.position[rows]
+    if np.any(np.diff(x) <= 0.0):
+        raise InputError("slide", "positions that do not grow from step to step", "a slide towards +x")
+    return ApparentFriction(x, result.applied_force[rows], result.applied_tangential_force[rows])
+
+
+def _slide_rows(result: Result) -> Array:
+    rows = np.flatnonzero(np.array(result.motion) == "slide")
+    if rows.size == 0 or np.any(np.diff(rows) != 1):
+        raise InputError("slide", f"{rows.size} rows of slides", "one slide, or several in a row")
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """An effective voltage over the position, and what is known of it before anything is simulated.
+
+    `share_not_renderable`: share of the path on which the wish is below the display's own friction; while
+    the finger still sticks at the start, that is no loss. Voltages in V: `largest`, `rms` over the path,
+    `carrier` (amplitude of a sinusoidal carrier at the largest). `error_of_display`: relative L2 error of
+    the friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change it makes,
+    relative to the wish; `share_limited` the share of the path on which it acts.
+    """
+
+    profile: VoltageProfile
+    share_not_renderable: float
+    largest: float
+    rms: float
+    carrier: float
+    error_of_display: float
+    error_of_amplifier: float = 0.0
+    share_limited: float = 0.0
+
+
+def voltage_for(
+    reference: ApparentFriction,
+    display: Encoding,
+    *,
+    depth: float = 1.0,
+    amplifier: Amplifier | None = None,
+    speed: float | None = None,
+) -> Signal:
+    r"""The voltage that makes a display feel like `reference` by the closed forms.
+
+    .. math:: U = \sqrt{F_e / (p_1 k F_n^m)}, \quad F_e = (\mu_{rs} / \mu_{hd} - 1) F_n \ge 0
+
+    with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law
+    (m = 1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the
+    area law needs the force of `depth` mm. The voltage is 0 where the wish is below the display's own
+    friction. `amplifier` limits the profile (its slew needs `speed` in mm/s).
+
+    >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
+    >>> from evfem.electrostatics.encoding import AreaLaw
+    >>> layers = Layers.of(Layer(0.20, 1650.0), Layer(0.09, 3.35))
+    >>> display = Encoding(Kaczmarek(), layers, AreaLaw(112.0), friction=0.5)
+    >>> felt = ApparentFriction([0.0, 2.5, 10.0], [0.05, 0.05, 0.05], [0.025, 0.03, 0.03])
+    >>> signal = voltage_for(felt, display)
+    >>> round(signal.largest, 2), signal.share_not_renderable
+    (1776.73, 0.0)
+    >>> limited = voltage_for(felt, display, amplifier=Amplifier(voltage_max=1000.0))
+    >>> limited.largest, round(limited.share_limited, 3), round(limited.error_of_amplifier, 3)
+    (1000.0, 0.859, 0.098)
+    """
+    x = reference.position
+    force = depth * reference.normal_force
+    voltage = display.voltage_for_friction(np.maximum(reference.friction, 0.0), force)
+    wish = VoltageProfile(x, np.broadcast_to(voltage, x.shape))
+    profile = wish if amplifier is None else amplifier.limit(wish, speed)
+    felt, limited = (display.tangential_force(force, signal(x)) / depth for signal in (wish, profile))
+    size = float(np.linalg.norm(reference.tangential_force)) or 1.0
+    largest = float(np.max(profile.voltage))
+    return Signal(
+        profile=profile,
+        share_not_renderable=share_not_renderable(x, reference.friction, display.friction * (1.0 - NOISE)),
+        largest=largest,
+        rms=profile.rms(float(x[0]), float(x[-1])),
+        carrier=carrier_amplitude(largest),
+        error_of_display=float(np.linalg.norm(felt - reference.tangential_force)) / size,
+        error_of_amplifier=float(np.linalg.norm(limited - felt)) / size,
+        share_limited=_share_apart(wish, profile),
+    )
+
+
+def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
+    """Share of the path on which two profiles differ; pieces between rows are judged in their middle."""
+    x = np.unique(np.concatenate([one.position, other.position]))
+    middle = 0.5 * (x[:-1] + x[1:])
+    apart = np.abs(one(middle) - other(middle)) > 1e-9 * np.max(np.abs(one.voltage), initial=1.0)
+    return float(np.sum(np.diff(x)[apart]) / (x[-1] - x[0]))
+
+
+def replay(
+    reference: Recording, display: Surface, law: ForceLaw, voltage: VoltageProfile | FollowForce
+) -> Recording:
+    """The reference's finger, motion and solver on a display under a voltage.
+
+    As in the paper the finger is pressed to the load that the reference had at the end of its press, and
+    slid in the same steps.
+    """
+    motion = list(reference.scene.motion)
+    kinds = [isinstance(part, Slide) for part in motion]
+    first = kinds.index(True) if any(kinds) else 0
+    if first and isinstance(motion[first - 1], Press):
+        last_row = int(_slide_rows(reference.result)[0]) - 1
+        load = float(reference.result.applied_force[last_row])
+        motion[first - 1] = Press(force=load, steps=motion[first - 1].steps)
+    scene = replace(reference.scene, surface=display, law=law, voltage=voltage, motion=motion)
+    return record(scene)
+
+
+def exact(
+    reference: Recording, display: Surface, law: ForceLaw, largest_voltage: float = 10_000.0
+) -> Recording:
+    """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
+
+    In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as
+    its equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
+    attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
+    was. The voltage found is in `result.voltage`; `Comparison.unmet` says where
+    the wish was out of reach.
+    """
+    felt = apparent_friction(reference.result)
+    wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
+    return replay(reference, display, law, wish)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """How well the friction force of a rendering follows its reference over the whole slide.
+
+    `position` (n,) mm, `error` (n,) N/mm = rendered - reference; `pearson` is nan where a force is constant.
+    `voltage_difference` (V) is the largest one between the two runs.
+
+    >>> found = Comparison(np.arange(3.0), np.array([1e-3, 0.0, 1e-9]), 0.99, 0.01, 0.0)
+    >>> found.largest_error, found.unmet(1e-6).tolist()
+    (0.001, [True, False, False])
+    """
+
+    position: Array
+    error: Array
+    pearson: float
+    relative_l2: float
+    voltage_difference: float
+
+    @property
+    def largest_error(self) -> float:
+        """Largest deviation of the friction force in N/mm."""
+        return float(np.max(np.abs(self.error)))
+
+    def unmet(self, tolerance: float) -> Array:
+        """Where the wish was missed by more than `tolerance` (N/mm), (n,) bool."""
+        return np.abs(self.error) > tolerance
+
+
+def compare(reference: Result, rendered: Result) -> Comparison:
+    """Pearson's r and relative L2 error ||F - F_ref|| / ||F_ref|| of `applied_tangential_force`.
+
+    At equal positions, over all steps of the slide from its first one. Raises InputError if the slides
+    differ.
+    """
+    rows, others = _slide_rows(reference), _slide_rows(rendered)
+    x, y = reference.position[rows], rendered.position[others]
+    if x.shape != y.shape or not np.allclose(x, y, rtol=0.0, atol=1e-9):
+        raise InputError("rendered", "a slide through other positions", "the same slide as the reference")
+    wanted, felt = (r.applied_tangential_force[i] for r, i in ((reference, rows), (rendered, others)))
+    voltages = rendered.voltage[others] - reference.voltage[rows]
+    return Comparison(
+        position=x,
+        error=felt - wanted,
+        pearson=pearson(wanted, felt),
+        relative_l2=float(np.linalg.norm(felt - wanted) / np.linalg.norm(wanted)),
+        voltage_difference=float(np.max(np.abs(voltages))),
+    )
+
+
+def pearson(one: Array, other: Array) -> float:
+    """Pearson's correlation coefficient of two series; nan if one of them is constant.
+
+    >>> round(pearson(np.array([1.0, 2.0, 3.0]), np.array([2.0, 5.0, 6.0])), 4)
+    0.9608
+    """
+    a, b = one - np.mean(one), other - np.mean(other)
+    size = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return float(np.clip(a @ b / size, -1.0, 1.0)) if size > 0.0 else float("nan")

@@ -1,0 +1,287 @@
+"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged step
+out.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from evfem.common import notices
+from evfem.common.notices import LOG
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.errors import NotConverged, StopRun
+from evfem.protocols import Observer
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene
+from evfem.simulation.checkpoint import carried_arrays, carry_on, state_arrays, state_of, usable
+from evfem.simulation.ledger import SUMS, Ledger, frame_of
+from evfem.simulation.model import Model, make_model
+from evfem.simulation.result import Frame, Result, Saved, provenance
+from evfem.solver.state import State, StepFailed, Target
+from evfem.solver.stepping import Path, Stepper
+
+ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
+
+
+@dataclass(frozen=True)
+class Request:
+    """One requested step: its number in the run, its motion, and the path from the state before to its
+    exact target.
+    """
+
+    step: int
+    motion_index: int
+    kind: str
+    path: Path
+    duration: float
+
+
+def simulate(
+    scene: Scene, *, progress: bool = False, observers: Sequence[Observer] = (), resume: Saved | None = None
+) -> Result:
+    """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how
+    they came about.
+
+    `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)`
+    after every converged step (`frame` is None on steps without fields, `checkpoint()` gives the arrays to
+    resume from) and `finished(result)`, see `evfem.protocols`. One that raises `StopRun` in `step` ends the
+    run after that step: the result so far, with the fields of its last step, is returned, and has the reason
+    in its provenance under `stopped`. `resume` continues from such arrays and rows, to the same numbers as
+    without the interruption; the result then has all rows, but fields only of the steps since. Raises
+    `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
+    """
+    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
+    with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
+        return _simulate(scene, progress, observers, resume)
+
+
+def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resume: Saved | None) -> Result:
+    total = scene.total_steps
+    # shown at once, for making the model takes seconds; no trace of it where the scene is refused
+    bar = notices.bar(total, "step", len(resume.rows) if resume else 0, progress)
+    bar.leave = False
+    reasons: list[str] = []
+    try:
+        run = Run(scene, resume)
+        _tell(observers, "started", run.model.mesh, scene, total)
+        bar.leave = True
+        for request in run.requests():
+            frame = run.advance(request)
+            reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+            bar.update(1)
+            LOG.debug("step %d of %d", len(run.rows), total)
+            if reasons:
+                run.keep_last_frame()
+                break
+    finally:
+        bar.close()
+    result = run.result()
+    if reasons:
+        result.provenance["stopped"] = "; ".join(reasons)
+    _tell(observers, "finished", result)
+    return result
+
+
+class Run:
+    """A scene on its way: the model, the present state, the rows and frames so far."""
+
+    def __init__(self, scene: Scene, resume: Saved | None) -> None:
+        self.scene = scene
+        self.model: Model = make_model(scene)
+        self.ledger = Ledger(self.model)
+        self.stepper = Stepper(self.model.equilibrium, scene.coupling)
+        self.rows: list[dict[str, Any]] = []
+        self.frames: list[Frame] = []
+        self.time = 0.0
+        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0))
+        if resume is not None:
+            self._restore(resume)
+
+    def voltage_at(self, position: float) -> float:
+        """The scene's own voltage when the bone is at `position` (mm)."""
+        voltage = self.scene.voltage
+        if isinstance(voltage, FollowForce):
+            return 0.0
+        return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
+
+    # -- from motions to targets
+    # -------------------------------------------------------------------------------------
+
+    def requests(self) -> Iterator[Request]:
+        """The steps still to do; paths start from the state at the time they are asked for."""
+        done, step = len(self.rows), 0
+        for index, motion in enumerate(self.scene.motion):
+            first = step
+            step += motion.steps
+            if step <= done:
+                continue
+            start = self._start_of(first)
+            for k in range(max(done - first, 0) + 1, motion.steps + 1):
+                begin, end = (self._target(motion, start, j / motion.steps) for j in (k - 1, k))
+                if first + k == 1 and not isinstance(self.scene.voltage, VoltageProfile):
+                    # the voltage acts in full; only a first step that must be cut raises it on the way
+                    begin = replace(begin, voltage=0.0)
+                seconds = _duration(motion, start)
+                yield Request(first + k, index, motion.kind, self._path(begin, end, seconds), seconds)
+
+    def _start_of(self, rows_before: int) -> dict[str, float]:
+        """Bone position, indentation, force and voltage at which a motion starts."""
+        if rows_before == 0:
+            return {
+                "position": 0.0,
+                "indentation": 0.0,
+                "applied_force": 0.0,
+                "voltage": self.voltage_at(0.0),
+            }
+        row = self.rows[rows_before - 1]
+        return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+
+    def _target(self, motion: Motion, start: dict[str, float], share: float) -> Target:
+        """The target at `share` (0 to 1) of a motion."""
+
+        def towards(name: str, end: float) -> float:
+            return end if share == 1.0 else start[name] + share * (end - start[name])
+
+        position, indentation, force = start["position"], start["indentation"], None
+        voltage = start["voltage"]
+        if isinstance(motion, Press) and motion.force is not None:
+            force = towards("applied_force", motion.force)
+        elif isinstance(motion, Press) and motion.indentation is not None:
+            indentation = towards("indentation", motion.indentation)
+        elif isinstance(motion, Hover):
+            indentation = towards("indentation", -motion.gap)
+        elif isinstance(motion, Slide):
+            position = towards("position", start["position"] + motion.distance)
+            force = start["applied_force"] if motion.hold == "force" else None
+        elif isinstance(motion, VoltageRamp):
+            voltage = towards("voltage", motion.voltage)
+            force = start["applied_force"] if motion.hold == "force" else None
+        if isinstance(self.scene.voltage, VoltageProfile):
+            voltage = self.voltage_at(position)
+        wish = None
+        if isinstance(self.scene.voltage, FollowForce) and isinstance(motion, Slide):
+            wish, voltage = float(self.scene.voltage(position)), self.scene.voltage.largest_voltage
+        return Target(self.model.bone(position, indentation), force, voltage, tangential_force=wish)
+
+    def _path(self, start: Target, end: Target, seconds: float) -> Path:
+        """Straight from one target to the next; a voltage profile is followed on the way."""
+
+        def target(done: float, share: float) -> Target:
+            duration = (share - done) * seconds
+            if share == 1.0:
+                return replace(end, duration=duration)
+            bone = start.bone + share * (end.bone - start.bone)
+            force = None
+            if start.force is not None and end.force is not None:
+                force = start.force + share * (end.force - start.force)
+            voltage = start.voltage + share * (end.voltage - start.voltage)
+            if isinstance(self.scene.voltage, VoltageProfile):
+                voltage = self.voltage_at(float(bone[0]))
+            wish = None
+            if isinstance(self.scene.voltage, FollowForce) and end.tangential_force is not None:
+                wish, voltage = float(self.scene.voltage(float(bone[0]))), end.voltage
+            return Target(bone, force, voltage, duration, wish)
+
+        return target
+
+    # -- one requested step
+    # -----------------------------------------------------------------------------------------------
+
+    def advance(self, request: Request) -> Frame | None:
+        """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
+        begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
+        try:
+            self.state, parts = self.stepper.follow(self.state, request.path, self.ledger.accept)
+        except StepFailed as error:
+            advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
+            raise NotConverged(request.step, error.residuals, advice, self.result()) from error
+        self.time += request.duration
+        row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
+        row["substeps"] = parts
+        row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
+        row["seconds"] = clock.perf_counter() - begin
+        self.rows.append(row)
+        if request.step % self.scene.output.every and request.step != self.scene.total_steps:
+            return None
+        self.frames.append(frame_of(self.model, self.state, row))
+        return self.frames[-1]
+
+    def keep_last_frame(self) -> None:
+        """The fields of the last step, wanted or not."""
+        if not self.frames or self.frames[-1].step != self.rows[-1]["step"]:
+            self.frames.append(frame_of(self.model, self.state, self.rows[-1]))
+
+    def result(self) -> Result:
+        """Everything up to the last converged step."""
+        record = self.model.equilibrium.record
+        solver = {
+            "element": self.model.body.space.element,
+            "unknowns": self.model.body.size,
+            "iterations": record.iterations,
+            "factorisations": record.factorisations,
+            "contact_solves": record.contact_solves,
+            "cuts": self.stepper.cuts,
+            "candidates": int(self.model.equilibrium.linear.candidates.size),
+            "backend": record.backend,
+        }
+        return Result.from_rows(
+            self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
+        )
+
+    # -- checkpoints
+    # --------------------------------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """Arrays from which the run can go on after its last converged step."""
+        return {
+            **state_arrays(self.state),
+            **carried_arrays(self.model.equilibrium),
+            "part": np.array(self.stepper.part),
+            "time": np.array(self.time),
+            "sums": np.array([self.ledger.sums[name] for name in SUMS]),
+        }
+
+    def _restore(self, saved: Saved) -> None:
+        arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
+        self.state = state_of(arrays)
+        carry_on(self.model.equilibrium, self.state, arrays)
+        self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])
+        self.ledger.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+        self.rows = list(saved.rows)
+
+
+def _duration(motion: Motion, start: dict[str, float]) -> float:
+    """Seconds that one step of a motion takes: 0 without a speed."""
+    speed = getattr(motion, "speed", None)
+    if speed is None:
+        return 0.0
+    if isinstance(motion, Slide):
+        return abs(motion.distance) / motion.steps / speed
+    end = (
+        motion.indentation
+        if isinstance(motion, Press) and motion.indentation is not None
+        else start["indentation"]
+    )
+    return abs(end - start["indentation"]) / motion.steps / speed
+
+
+def _tell(observers: Sequence[Observer], event: str, *arguments: Any) -> list[str]:
+    """Tell every observer; the reasons of those who want the run to end."""
+    reasons = []
+    for observer in observers:
+        method: Callable[..., None] | None = getattr(observer, event, None)
+        if method is None:
+            continue
+        try:
+            method(*arguments)
+        except StopRun as stop:
+            if event != "step":
+                raise
+            reasons.append(str(stop) or type(observer).__name__)
+    return reasons

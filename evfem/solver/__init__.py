@@ -1,0 +1,1 @@
+"""Equilibrium steps: state, factorisation, linearisation, iteration, adaptive parts."""

@@ -1,0 +1,236 @@
+r"""Sparse factorisation of the tissue's tangent with exact condensation onto a few unknowns.
+
+The symmetric tangent is split into interior unknowns i and kept unknowns c (contact candidates and the bone's
+two translations):
+
+.. math:: S = K_{cc} - K_{ci} K_{ii}^{-1} K_{ic}, \qquad g = b_c - K_{ci} K_{ii}^{-1} b_i, \qquad
+          S x_c = g, \qquad K_{ii} x_i = b_i - K_{ic} x_c .
+
+Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to the small
+dense S by the caller. `Pardiso` (from evfem[fast]) returns S with its factorisation and solves in two halves.
+`SuperLU` eliminates the kept unknowns last, so that S is the product of the trailing blocks of L and U. Only
+i must be positive definite: the bone may be free to move.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sparse
+
+from evfem.common.arrays import Floats, Ints
+from evfem.tissue.body import Pattern
+
+#: environment variable that tells pypardiso where the library is
+PLACE = "PYPARDISO_MKL_RT"
+#: place of PARDISO's count of perturbed pivots among its parameters
+PERTURBED = 13
+
+
+class Singular(ArithmeticError):
+    """The matrix of the interior unknowns cannot be factorised."""
+
+
+class Condensation(Protocol):
+    """A factorised matrix: its Schur complement on the kept unknowns, and solves in two halves."""
+
+    schur: Floats
+
+    def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
+
+    def backward(self, state: Floats, kept: Floats) -> Floats:
+        """Solution (n,) once the kept unknowns (m,) are known."""
+
+
+@cache
+def pardiso_library() -> Any:
+    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for it."""
+    if PLACE not in os.environ and (place := mkl_library()) is not None:
+        os.environ[PLACE] = place
+    from pypardiso.pardiso_wrapper import PyPardisoSolver
+
+    return PyPardisoSolver(mtype=2)
+
+
+def mkl_library() -> str | None:
+    """Where the package `mkl` has put its runtime library, or None."""
+    try:
+        files = metadata.files("mkl") or []
+    except metadata.PackageNotFoundError:
+        return None
+    found = (str(file.locate()) for file in files if "mkl_rt" in file.name and ".lib" not in file.name)
+    return next((place for place in found if Path(place).exists()), None)
+
+
+def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
+    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves S
+    singular.
+    """
+    return float(np.abs(upper[pattern.diagonal[kept]]).max())
+
+
+class Pardiso:
+    """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many
+    factorisations.
+    """
+
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
+        self.pattern, self.kept = pattern, kept
+        library = pardiso_library()
+        library.libmkl.MKL_Set_Num_Threads(threads)
+        self._call_pardiso = library._mkl_pardiso
+        self._mark = np.zeros(pattern.size, dtype=np.int32)
+        # PARDISO numbers the Schur complement in ascending order of the unknowns
+        self._order = np.argsort(kept)
+        self.schur = np.zeros((kept.size, kept.size))
+        self._values = np.zeros(pattern.indices.size)
+        self._start(2)
+
+    def _start(self, mtype: int) -> None:
+        self.mtype = mtype
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._iparm = np.zeros(64, dtype=np.int32)
+        # user values; METIS; no refinement; pivots below 1e-13 are perturbed (and counted); C indices; dense
+        # Schur complement kept for solves
+        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 34: 1, 35: 2}.items():
+            self._iparm[index] = value
+        self._mark[:] = 0
+        self._mark[self.kept] = 1
+        self._analysed = False
+
+    def _call(self, phase: int, b: Floats, x: Floats) -> int:
+        def number(value: int) -> Any:
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def integers(array: Any) -> Any:
+            return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
+
+        def values(array: Any) -> Any:
+            return array.ctypes.data_as(ctypes.c_void_p)
+
+        error = ctypes.c_int32(0)
+        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        kind = (number(1), number(1), number(self.mtype), number(phase), number(self.pattern.size))
+        matrix = (values(self._values), integers(self.pattern.indptr), integers(self.pattern.indices))
+        control = (integers(self._mark), number(1), integers(self._iparm), number(0))
+        self._call_pardiso(handle, *kind, *matrix, *control, values(b), values(x), ctypes.byref(error))
+        return error.value
+
+    def factorise(self, upper: Floats) -> None:
+        """Factorise new values of the pattern; raises `Singular` if even the indefinite factorisation
+        fails.
+        """
+        shift = shift_of_kept(self.pattern, self.kept, upper)
+        self._values = upper.copy()
+        self._values[self.pattern.diagonal[self.kept]] += shift
+        for mtype in (self.mtype, -2):
+            if mtype != self.mtype:
+                self.close()
+                self._start(mtype)
+            S, b = np.zeros_like(self.schur), np.zeros(self.pattern.size)
+            error = 0 if self._analysed else self._call(11, b, S)
+            error = error or self._call(22, b, S)
+            self._analysed = error == 0
+            if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all():
+                self.schur = np.empty_like(S)
+                self.schur[np.ix_(self._order, self._order)] = S
+                self.schur[np.diag_indices_from(S)] -= shift
+                return
+        raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
+
+    def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        y = np.zeros_like(b)
+        self._call(331, np.ascontiguousarray(b), y)
+        g = y[self.kept].copy()
+        if self.mtype == -2:
+            z = np.zeros_like(b)
+            self._call(332, y, z)
+            y = z
+        return y, g
+
+    def backward(self, state: Floats, kept: Floats) -> Floats:
+        state[self.kept] = kept
+        x = np.zeros_like(state)
+        self._call(333, state, x)
+        return x
+
+    def close(self) -> None:
+        """Give the library's memory back."""
+        if self._handle.any():
+            self._call(-1, np.zeros(1), np.zeros(1))
+            self._handle[:] = 0
+
+    def __del__(self) -> None:
+        if hasattr(self, "_handle") and not sys.is_finalizing():
+            self.close()
+
+
+class SuperLU:
+    """Condensation by scipy's SuperLU: kept unknowns are eliminated last, S = L_cc U_cc."""
+
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
+        self.pattern, self.kept = pattern, kept
+        self._interior = np.setdiff1d(np.arange(pattern.size), kept)
+        self._ordering: Ints | None = None
+        self.schur = np.zeros((kept.size, kept.size))
+
+    def factorise(self, upper: Floats) -> None:
+        """Factorise new values of the pattern; raises `Singular` if that fails."""
+        from scipy.sparse.linalg import splu
+
+        options = {"SymmetricMode": True, "Equil": False}
+        A = self.pattern.full(upper)
+        shift = shift_of_kept(self.pattern, self.kept, upper)
+        A = A + sparse.csr_matrix((np.full(self.kept.size, shift), (self.kept, self.kept)), shape=A.shape)
+        try:
+            if self._ordering is None:
+                inner = A[self._interior][:, self._interior].tocsc()
+                first = splu(inner, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+                self._ordering = np.concatenate([self._interior[np.argsort(first.perm_c)], self.kept])
+            order = self._ordering
+            self._lu = splu(
+                A[order][:, order].tocsc(), permc_spec="NATURAL", diag_pivot_thresh=0.0, options=options
+            )
+        except RuntimeError as error:
+            raise Singular(str(error)) from error
+        # elimination starts where SuperLU's own post-ordering says; the kept unknowns stay last, in their
+        # order, and no kept row serves as a pivot of the interior
+        m = self.kept.size
+        last = np.arange(self.pattern.size - m, self.pattern.size)
+        if not (np.array_equal(self._lu.perm_c[-m:], last) and np.array_equal(self._lu.perm_r[-m:], last)):
+            raise Singular("SuperLU moved the kept unknowns")
+        lower, higher = self._lu.L[-m:, -m:].toarray(), self._lu.U[-m:, -m:].toarray()
+        self._shifted = lower @ higher
+        self.schur = self._shifted - shift * np.eye(m)
+
+    def _solve(self, b: Floats) -> Floats:
+        assert self._ordering is not None
+        x = np.empty_like(b)
+        x[self._ordering] = self._lu.solve(b[self._ordering])
+        return x
+
+    def forward(self, b: Floats) -> tuple[Floats, Floats]:
+        x = self._solve(b)
+        return x, self._shifted @ x[self.kept]
+
+    def backward(self, state: Floats, kept: Floats) -> Floats:
+        b = np.zeros_like(state)
+        b[self.kept] = self._shifted @ (kept - state[self.kept])
+        return state + self._solve(b)
+
+
+def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
+    """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
+    try:
+        pardiso_library()
+    except ImportError:
+        return SuperLU(pattern, kept, threads)
+    return Pardiso(pattern, kept, threads)

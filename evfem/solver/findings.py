@@ -1,0 +1,39 @@
+"""How an iterate looks that is no equilibrium, in one line: what a person needs to see why a step failed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact.signorini import OPEN, STICK
+from evfem.solver.state import Balance, State
+from evfem.tissue.body import Body
+
+#: so many of the largest out-of-balance forces are named
+NAMED = 3
+
+
+def findings(body: Body, state: State, balance: Balance) -> str:
+    """The largest out-of-balance forces and where they sit (current positions), the state of contact, and the
+    smallest volume ratio of a cell.
+    """
+    nodal = np.hypot(*_free(body, balance.forces).T)
+    worst = np.argsort(nodal)[::-1][:NAMED]
+    places = (body.space.mesh.points + state.u)[worst]
+    forces = ", ".join(
+        f"{nodal[node]:.1e} N/mm at ({x:.4g}, {y:.4g})" for node, (x, y) in zip(worst, places, strict=True)
+    )
+    opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
+    slipping = state.status.size - opened - sticking
+    smallest = body.tissue.smallest_J(state.u)
+    return (
+        f"out of balance: {forces}; contact: {opened} nodes open, {sticking} stick, {slipping} slip; "
+        f"smallest J of a cell: {smallest:.2g}"
+    )
+
+
+def _free(body: Body, reduced: Floats) -> Floats:
+    """Nodal forces (N, 2), without those of the bone, which its motion balances."""
+    kept = reduced.copy()
+    kept[body.bone] = 0.0
+    return np.nan_to_num(body.expand(kept), nan=np.inf)

@@ -1,0 +1,180 @@
+"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys their
+laws.
+
+Contact forces of a state are along the profile's normal and tangent at the node's x. Slip is counted along
+the profile from the last accepted x, or from the jump of friction that holds the node (`Pins`). With
+penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t
+A) = 0 instead of g = 0 and s = 0.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact import pad as outline
+from evfem.contact.condensed import Candidates
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.solver.state import SMALLEST_FORCE, State
+
+#: how far inside the rougher side a node is pinned (mm): far above rounding, far below any mesh
+HAIR = 1e-9
+#: so many changes of side in one step show that neither side is consistent
+CHANGES = 3
+
+
+class Pins:
+    """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
+
+    A node slides up to a jump to higher friction and stays there, its shear force growing from the lower to
+    the higher limit, before it slides on. Taken at the node's own x the coefficient then has no consistent
+    value on either side: the iterations put the node before the jump, behind it, before it again. Such a node
+    is pinned to the jump, a hair inside the rougher side, where it sticks with the higher coefficient. It is
+    released when its shear force falls below the lower limit.
+    """
+
+    def __init__(self, jumps: Floats, size: int) -> None:
+        """`jumps` (J, 3): position, coefficient before and behind."""
+        self.jumps, self.size = jumps, size
+        self.begin(np.zeros(size))
+
+    def begin(self, x: Floats) -> None:
+        """Forget everything: a new step starts with the nodes at x."""
+        self.x = np.full(self.size, np.nan)
+        self.lower = np.zeros(self.size)
+        if len(self.jumps):
+            self._side = np.searchsorted(self.jumps[:, 0], x, side="right")
+            self._changes = np.zeros(self.size, dtype=np.int64)
+            self._released = np.zeros(self.size, dtype=bool)
+
+    @property
+    def held(self) -> Any:
+        """Which nodes are pinned (P,) bool."""
+        return np.isfinite(self.x)
+
+    def watch(self, x: Floats, touching: Any) -> None:
+        """Look at the next iterate: count changes of side, and pin what keeps changing."""
+        if not len(self.jumps):
+            return
+        side = np.searchsorted(self.jumps[:, 0], x, side="right")
+        moved = touching & (side != self._side) & ~self._released
+        self._changes += moved
+        new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
+        place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
+        self.x[new] = place + np.where(behind > before, HAIR, -HAIR)
+        self.lower[new] = np.minimum(before, behind)
+        self._side = side
+
+    def release(self, normal: Floats, shear: Floats, weak: float) -> bool:
+        """Let go of nodes whose shear force is below the lower limit; says whether there were any."""
+        loose = self.held & (np.abs(shear) < self.lower * normal - weak)
+        self.x[loose] = np.nan
+        if loose.any():
+            self._released |= loose
+        return bool(loose.any())
+
+
+class Interface:
+    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
+
+    def __init__(self, pad: outline.Pad, points: Floats, surface: Any, tolerance: float) -> None:
+        self.pad, self.surface, self.tolerance = pad, surface, tolerance
+        self.points = points[pad.nodes]
+        self.penalties: tuple[float, float] | None = None
+        self.pins = Pins(surface.friction_jumps, pad.nodes.size)
+        ends = self.points[pad.edges[:, :2]]
+        self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
+
+    def positions(self, u: Floats) -> Floats:
+        """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
+        return self.points + u[self.pad.nodes]
+
+    def resting(self, state: State) -> Floats:
+        """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface: below a thin
+        insulator the rounding of their gaps would be a force.
+        """
+        position = self.positions(state.u)
+        touching = state.status != OPEN
+        position[touching, 1] -= outline.frame(self.surface, position).gap[touching]
+        return position
+
+    def contact_forces(self, state: State) -> Floats:
+        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
+        frame = outline.frame(self.surface, self.positions(state.u))
+        normal, shear = state.contact_force.T
+        slope, stretch = frame.slope, frame.stretch
+        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+
+    def describe(self, old: State, state: State, c: Ints, fall: Floats, closing: Floats) -> Candidates:
+        """What the contact problem has to know of the candidates c; `fall` (P,) of the attraction, and what
+        it gains when a node closes (P,).
+        """
+        position = self.positions(state.u)[c]
+        frame = outline.frame(self.surface, position)
+        softness = self._softness(old)[c]
+        origin = self._origin(old)[c]
+        slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
+        friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
+        rise = np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape)
+        return Candidates(
+            frame,
+            slip,
+            state.contact_force[c],
+            state.status[c],
+            friction,
+            softness,
+            fall[c],
+            closing[c],
+            rise,
+        )
+
+    def _origin(self, old: State) -> Floats:
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
+        return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
+
+    def _softness(self, old: State) -> Floats:
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
+        exact.
+        """
+        if self.penalties is None:
+            return np.zeros_like(old.contact_force)
+        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
+        return 1.0 / np.outer(length, self.penalties)
+
+    def _friction(self, x: Floats) -> Floats:
+        return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
+
+    def deepest(self, state: State) -> float | None:
+        """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
+        gap = outline.frame(self.surface, self.positions(state.u)).gap
+        sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
+        return float(gap[sunk].max()) if sunk.any() else None
+
+    def obeyed(self, old: State, state: State) -> bool:
+        """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
+        position = self.positions(state.u)
+        frame = outline.frame(self.surface, position)
+        short = self.tolerance * self.length
+        active = state.status != OPEN
+        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
+        if self.pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
+            return False
+        normal, shear = state.contact_force[active].T
+        slip = (frame.stretch * (position[:, 0] - self._origin(old)))[active]
+        softness = self._softness(old)[active]
+        slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
+        x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
+        limit = self._friction(x) * normal
+        status = state.status[active]
+        sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
+        sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
+        slips = (
+            (status == STICK)
+            | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
+            | (limit == 0.0)
+        )
+        gap = frame.normal_gap[active] + softness[:, 0] * normal
+        closed = (np.abs(gap) <= short) & (normal >= -weak)
+        return bool((closed & sticks & slips).all())

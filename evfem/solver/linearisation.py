@@ -1,0 +1,191 @@
+"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for how long that
+serves.
+
+A factorisation is kept across iterations and steps. It is made again when the contact candidates change, when
+the residual stalls, when the time step is another one, or when more iterations than the
+strategy's `patience` would be left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact import pad as outline
+from evfem.contact.attraction import Attraction
+from evfem.contact.condensed import Condensed
+from evfem.contact.signorini import OPEN, STICK
+from evfem.solver.condensation import Singular, make_condensation
+from evfem.solver.interface import Interface
+from evfem.solver.state import Limits, Linearised, Record, State, StepFailed
+from evfem.tissue.body import Body
+
+#: candidates are chosen so many times more than needed, as every new choice costs an analysis of the matrix
+SPARE = 1.5
+#: an attraction that falls with the gap by more than this share of the tissue's shear modulus over its height
+#: makes its node a candidate
+SOFT = 0.02
+#: changes of tributary lengths that stiffen no node by more than this share are left to the iterations
+FAINT = 0.01
+
+
+class Linearisation:
+    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in them."""
+
+    def __init__(
+        self,
+        body: Body,
+        interface: Interface,
+        attraction: Attraction | None,
+        limits: Limits,
+    ) -> None:
+        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.pad = interface.pad
+        self.record = Record()
+        self.candidates: Ints = np.zeros(0, dtype=np.int64)
+        depth = float(np.ptp(body.space.mesh.points[:, 1]))
+        self.soft = SOFT * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
+        self.factor: Any = None
+        self.condensed: Any = None
+        self.stiffest = 0.0
+        self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
+        self.frozen = False
+        self._made: Linearised | None = None
+        self._outdated = False
+
+    def begin(self, old: State, frozen: bool) -> None:
+        """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
+        self.touching, self.frozen = old.status != OPEN, frozen
+
+    def start_clock(self, old: State, duration: float) -> None:
+        """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
+        dynamics = self.body.dynamics
+        if dynamics is None:
+            return
+        if self._made is not None:
+            self._outdated = not 0.67 * self._made.duration <= duration <= 1.5 * self._made.duration
+        dynamics.begin(old.u, old.velocity, duration)
+
+    def choose_candidates(self, state: State, reach: float) -> None:
+        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the
+        present set does not do.
+        """
+        position = self.interface.positions(state.u)
+        gap = np.where(self.pad.free, outline.frame(self.interface.surface, position).gap, np.inf)
+        steep = self.fall(state) > self.soft * self.pad.length(position[:, 0])
+        needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
+        if not needed.any():
+            needed[np.argmin(gap)] = True
+        if needed[self.candidates].sum() == needed.sum():
+            return
+        enough = np.sort(gap)[min(int(SPARE * needed.sum()), int(self.pad.free.sum()) - 1)]
+        wider = self.pad.free & ((gap <= max(enough, 4.0 * self.interface.length)) | needed)
+        self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
+        self.factor = None
+
+    # -- factorisation
+
+    def forget(self) -> None:
+        """Drop the factorisation, so that the next iteration starts from a fresh one."""
+        self.factor = None
+
+    def renew(self, state: State, history: list[float]) -> bool:
+        """Factorise at the present state where there is no factorisation, the old one stalls, or a new
+        one saves iterations; says whether it did.
+        """
+        if self.factor is not None and not self._outdated and not self._stale(history):
+            return False
+        self.factorise(state)
+        return True
+
+    def factorise(self, state: State) -> None:
+        """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
+        self._outdated = False
+        if self.factor is None:
+            unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
+            kept = np.concatenate([unknowns, self.body.bone])
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
+            self.record.backend = type(self.factor).__name__
+        upper = self.body.tangent(state.u)
+        try:
+            self.factor.factorise(upper)
+        except Singular as error:
+            raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
+        self.condensed = Condensed.make(self.factor.schur, self._coupling(state))
+        self.stiffest = float(upper[self.body.pattern.diagonal].max())
+        dynamics = self.body.dynamics
+        begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
+        self._made = Linearised(state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        self.record.factorisations += 1
+
+    def made_at(self, state: State) -> bool:
+        """Whether the factorisation is that of `state`."""
+        return self._made is not None and self._made.u is state.u
+
+    @property
+    def carried(self) -> Linearised | None:
+        """Where the factorisation was made that the next step may use, if there is one."""
+        return None if self.factor is None else self._made
+
+    def restore(self, state: State, at: Linearised) -> None:
+        """Make the factorisation again that a run which goes on from `state` had made at `at`."""
+        self.touching, self.frozen = at.touching, at.frozen
+        if self.body.dynamics is not None:
+            self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
+        self.factorise(replace(state, u=at.u, voltage=at.voltage))
+
+    def _stale(self, history: list[float]) -> bool:
+        if len(history) < 2:
+            return False
+        before, now = history[-2:]
+        if now > 0.1 or now > 0.5 * before:
+            return True
+        tolerance = self.limits.tolerance
+        if now <= tolerance:
+            return False
+        return bool(np.log(tolerance / now) / np.log(now / before) > self.limits.strategy.patience)
+
+    # -- the attraction's part
+
+    def fall(self, state: State) -> Floats:
+        """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""
+        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+            return np.zeros(self.pad.nodes.size)
+        return self.attraction.fall(self.interface.resting(state), state.voltage, self.touching)
+
+    def closing(self, state: State) -> Floats:
+        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+            return np.zeros(self.pad.nodes.size)
+        everywhere = replace(state, status=np.full_like(state.status, STICK))
+        now, closed = (
+            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching)[:, 1]
+            for s in (state, everywhere)
+        )
+        return np.maximum(now - closed, 0.0)
+
+    def _coupling(self, state: State) -> Floats | None:
+        """The attraction's stiffness on the candidates but for its fall with a node's own gap, which belongs
+        to the contact problem: what is left are changes of tributary lengths. None without attraction, or
+        where they are faint: a symmetric compliance takes a third of the time.
+        """
+        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+            return None
+        position, c = self.interface.resting(state), self.candidates
+        whole = self.attraction.stiffness(position, state.voltage, self.touching)
+        unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
+        rows = whole[unknowns]
+        inner = np.asarray(rows[:, unknowns].toarray())
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes no length
+        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
+        index = np.arange(unknowns.size)
+        inner[index, 2 * (index // 2)] += beyond
+        normal = outline.normals(outline.frame(self.interface.surface, position[c]))
+        own = self.fall(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        blocks = inner.reshape(c.size, 2, c.size, 2)
+        blocks[np.arange(c.size), :, np.arange(c.size)] -= own
+        stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-2]
+        return inner if stiffened.max() > FAINT else None

@@ -1,0 +1,1 @@
+"""Many scenes: samples, plan files, folders, processes."""

@@ -1,0 +1,311 @@
+"""What a sweep varies: grids and samples of dotted keys of a scene file; from TOML or from Python.
+
+A point of a sweep is a whole scene, as the text of a scene file: the base scene with some keys replaced. A
+dotted key names them as they stand in the file, entries of lists by their number: `surface.friction`,
+`finger.electrical.stratum_corneum_eps_r`, `motion.0.force`. Only the scene reader (`evfem.scene.file`) judges
+the values.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+from pydantic import Field as Key
+
+from evfem.common.checks import set_frozen
+from evfem.errors import InputError
+from evfem.scene.file import VERSION, dump, read_text, tables_of
+from evfem.scene.keys import SceneTable, Table, at, parse, shown, unknown
+from evfem.scene.scene import Scene
+from evfem.simulation.result import COLUMNS
+from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
+
+#: most points of a sweep
+MOST_POINTS = 100_000
+STATISTICS = ("last", "mean", "min", "max")
+OUTPUTS = (
+    "applied_force.last",
+    "normal_force.last",
+    "tangential_force.last",
+    "electrostatic_force.last",
+    "contact_width.last",
+)
+#: columns of the table that every sweep has, before and after its own
+FIRST, LAST = ("point",), ("status", "seconds", "message")
+TABLES = tuple(name for name in SceneTable.model_fields if name != "version")
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Point:
+    """One scene of a sweep: the names of its rows, its parameters, and its text as a scene file."""
+
+    index: int
+    labels: dict[str, str]
+    parameters: dict[str, Any]
+    text: str
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A scene and what is varied in it: every combination of the grid, each with every sample.
+
+    `scene` is a `Scene` that a file can hold, or the tables of a scene file, in which paths are relative to
+    `folder`. An entry of `grid` is a dotted key with a list of its values, or a name of your own with rows
+    {row: {key: value, ...}} of keys that change together. `outputs` are `COLUMN.STATISTIC`: a column of the
+    history and last, mean, min or max over its steps, `COLUMN.STATISTIC.N` over those of motion N alone.
+
+    >>> from evfem.scene.scene import default_scene
+    >>> sweep = Sweep(default_scene(), grid={"surface.friction": [0.2, 0.3], "motion.0.force": [0.1, 0.2]})
+    >>> len(sweep.points()), sweep.points()[1].parameters
+    (4, {'surface.friction': 0.2, 'motion.0.force': 0.2})
+    """
+
+    scene: Scene | Mapping[str, Any]
+    grid: Mapping[str, Sequence[Any] | Mapping[str, Row]] = field(default_factory=dict)
+    samples: Samples | None = None
+    outputs: Sequence[str] = OUTPUTS
+    name: str = "sweep"
+    folder: Path = Path()
+
+    def __post_init__(self) -> None:
+        grid = {name: _entry(name, entry) for name, entry in self.grid.items()}
+        set_frozen(self, grid=grid, outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
+        motions = len(self.tables.get("motion", ()))
+        for output in self.outputs:
+            _check_output(output, motions)
+        for key in self.samples.parameters if self.samples else ():
+            _check_key(f"samples.parameters.{key}", key)
+        count = prod(len(axis) for axis in self._axes) * (self.samples.count if self.samples else 1)
+        if not self.grid and self.samples is None:
+            raise InputError("sweep", "nothing that varies", "a grid or samples")
+        if count > MOST_POINTS:
+            raise InputError("sweep", f"{count} points", f"at most {MOST_POINTS} points")
+        columns = [*FIRST, *self.labels, *self.parameters, *self.outputs, *LAST]
+        for i, column in enumerate(columns):
+            if column in columns[:i]:
+                raise InputError(column, "the same column twice", "different names of rows, keys and outputs")
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The base scene as the tables of a scene file."""
+        scene = self.scene
+        return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the grid's entries that are rows of several keys."""
+        return [name for name, entry in self.grid.items() if isinstance(entry, Mapping)]
+
+    @property
+    def parameters(self) -> list[str]:
+        """All keys that vary, those of the grid first."""
+        sampled = [] if self.samples is None else list(self.samples.parameters)
+        return [*(key for axis in self._axes for key in axis[0][1]), *sampled]
+
+    @property
+    def _axes(self) -> list[list[tuple[dict[str, str], Row]]]:
+        return [_axis(name, entry) for name, entry in self.grid.items()]
+
+    def points(self) -> list[Point]:
+        """All points, the samples varying fastest and then the grid's last entry."""
+        return list(self._points())
+
+    def _points(self) -> Iterator[Point]:
+        tables, axes = self.tables, self._axes
+        drawn: dict[str, list[float]] = {}
+        if self.samples is not None:
+            drawn = {key: values.tolist() for key, values in self.samples.draw().items()}
+        samples = [dict(zip(drawn, row, strict=True)) for row in zip(*drawn.values(), strict=True)] or [{}]
+        combinations = product(product(*axes), samples)
+        for index, (chosen, sample) in enumerate(combinations):
+            labels: dict[str, str] = {}
+            parameters: dict[str, Any] = {}
+            for label, row in chosen:
+                labels |= label
+                parameters |= row
+            parameters |= sample
+            scene = deepcopy(tables)
+            for key, value in parameters.items():
+                _put_in(scene, key, value)
+            yield Point(index, labels, parameters, tomli_w.dumps(scene))
+
+
+def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
+    """An entry of the grid, checked and in Python's own types."""
+    entry = entry.tolist() if hasattr(entry, "tolist") else entry  # numpy
+    rows = _axis(name, entry)
+    return {label[name]: row for label, row in rows} if rows[0][0] else [row[name] for _, row in rows]
+
+
+def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
+    """One entry of the grid: (label, keys and values) of each of its rows."""
+    if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
+        given = "nothing" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
+        raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
+    if not isinstance(entry, Mapping):
+        _check_key(f"grid.{name}", name)
+        return [({}, {name: _plain(f"grid.{name}", value)}) for value in entry]
+    rows: list[tuple[dict[str, str], Row]] = []
+    for label, row in entry.items():
+        key = f"grid.{name}.{label}"
+        if not isinstance(row, Mapping) or not row:
+            raise InputError(key, shown(row), "a table {key = value, ...}")
+        if rows and list(row) != list(rows[0][1]):
+            raise InputError(key, ", ".join(row), f"the keys of the first row: {', '.join(rows[0][1])}")
+        for one in row:
+            _check_key(key, one)
+        rows.append(({name: str(label)}, {one: _plain(key, value) for one, value in row.items()}))
+    return rows
+
+
+def _check_key(place: str, key: str) -> None:
+    if key.split(".")[0] not in TABLES or "." not in key:
+        raise InputError(place, shown(key), f"TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}")
+
+
+def _plain(place: str, value: Any) -> Any:
+    """The value in Python's own types, as a scene file can hold it."""
+    value = value.tolist() if hasattr(value, "tolist") else value  # numpy
+    if isinstance(value, (tuple, list)):
+        return [_plain(place, one) for one in value]
+    if not isinstance(value, (bool, int, float, str)):
+        raise InputError(place, value, "numbers, text, true or false, and lists of them")
+    return value
+
+
+def _put_in(tables: dict[str, Any], key: str, value: Any) -> None:
+    """Replace one dotted key of the tables of a scene; tables that are not there are made."""
+    *path, last = key.split(".")
+    here: Any = tables
+    for depth, name in enumerate([*path, last], 1):
+        so_far = ".".join([*path, last][:depth])
+        if isinstance(here, list):
+            if not (name.isdecimal() and int(name) < len(here)):
+                allowed = f"numbers from 0 to {len(here) - 1} for the entries of this list"
+                raise InputError(so_far, "no such entry", allowed)
+            place: Any = int(name)
+        elif isinstance(here, dict):
+            place = name
+        else:
+            raise InputError(so_far, "a key inside a value that is no table", "a key of a table")
+        if depth > len(path):
+            here[place] = value
+        else:
+            here = here.setdefault(place, {}) if isinstance(here, dict) else here[place]
+
+
+def _check_output(output: Any, motions: int) -> None:
+    words = output.split(".") if isinstance(output, str) else []
+    columns = [name for name in COLUMNS if name != "motion"]
+    allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"
+    if not 2 <= len(words) <= 3 or words[1] not in STATISTICS:
+        raise InputError("outputs", shown(output), allowed)
+    if words[0] not in columns:
+        raise unknown(f"outputs: {output}", words[0], columns)
+    if len(words) == 3 and not (words[2].isdecimal() and int(words[2]) < motions):
+        raise InputError("outputs", output, f"motions from 0 to {motions - 1}")
+
+
+class SweepTable(Table):
+    """The whole sweep file."""
+
+    version: int
+    scene: str | dict[str, Any] = Key(description="the path of a scene file, or a table [scene] like one")
+    grid: dict[str, Any] = Key(default={}, description="a table [grid]")
+    samples: dict[str, Any] | None = Key(default=None, description="a table [samples]")
+    outputs: list[str] = Key(default=list(OUTPUTS), description="a list of texts COLUMN.STATISTIC")
+
+
+class SamplesTable(Table):
+    """[samples]."""
+
+    count: int = Key(description="a whole number of samples")
+    seed: int = Key(description="a whole number, not negative")
+    method: str = Key(default=METHODS[0], description=" | ".join(METHODS))
+    parameters: dict[str, Any] = Key(description="a table [samples.parameters] of distributions")
+
+
+class DistributionTable(Table):
+    """One parameter in [samples.parameters]."""
+
+    uniform: list[float] | None = Key(None, min_length=2, max_length=2, description="[low, high]")
+    normal: list[float] | None = Key(None, min_length=2, max_length=2, description="[mean, sd]")
+    between: list[float] | None = Key(None, min_length=2, max_length=2, description="[low, high]")
+
+
+def load(path: str | Path) -> Sweep:
+    """The sweep in a TOML file, named like the file; paths in it are relative to it.
+
+    Raises InputError for whatever cannot be used, StorageError when the disk refuses.
+    """
+    path = Path(path)
+    return loads(read_text("sweep", path), path.parent, path.stem)
+
+
+def loads(text: str, folder: str | Path = ".", name: str = "sweep") -> Sweep:
+    """The sweep in a TOML text; the path of its scene starts at `folder`."""
+    top = parse(SweepTable, tables_of("sweep", text), "")
+    folder, scene = Path(folder), top.scene
+    if isinstance(scene, str):
+        path = folder / scene
+        folder, scene = path.parent, tables_of("scene", read_text("scene", path))
+    samples = None if top.samples is None else _samples(top.samples)
+    return Sweep({"version": VERSION, **scene}, _grid(top.grid), samples, top.outputs, name, folder)
+
+
+def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
+    """The grid with dotted keys, whether the file has them in quotes or as tables in tables."""
+    grid: dict[str, Any] = {}
+    for name, entry in table.items():
+        if name in TABLES:
+            grid |= _flat({name: entry})
+        elif isinstance(entry, dict):
+            grid[name] = {
+                label: dict(_flat(row)) if isinstance(row, dict) else row for label, row in entry.items()
+            }
+        else:
+            grid[name] = entry
+    return grid
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys and values of tables in tables; distributions are values."""
+    for name, value in table.items():
+        if isinstance(value, dict) and not set(value) & set(DistributionTable.model_fields):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _samples(table: Mapping[str, Any]) -> Samples:
+    parsed = parse(SamplesTable, table, "samples")
+    parameters = {}
+    for key, value in _flat(parsed.parameters):
+        place = f"samples.parameters.{key}"
+        if not isinstance(value, dict):
+            raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
+        with at(place):
+            parameters[key] = _distribution(parse(DistributionTable, value, place), place)
+    return Samples(parameters, parsed.count, parsed.seed, parsed.method)
+
+
+def _distribution(table: DistributionTable, place: str) -> Distribution:
+    if (table.uniform is None) == (table.normal is None):
+        given = "neither uniform nor normal" if table.uniform is None else "uniform and normal"
+        raise InputError(place, given, "exactly one of the two")
+    if table.uniform is not None:
+        if table.between is not None:
+            raise InputError(f"{place}.between", "between beside uniform", "between with normal alone")
+        return Uniform(*table.uniform)
+    assert table.normal is not None
+    between = None if table.between is None else (table.between[0], table.between[1])
+    return Normal(table.normal[0], table.normal[1], between)

@@ -1,0 +1,139 @@
+"""What a sweep leaves on disk: a file per point, one table of all, and how they came about.
+
+A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on, or one
+changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
+(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from evfem.common.storage import replacing, write_text
+from evfem.errors import InputError, StorageError
+
+POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
+MANIFEST = ".evfem-sweep"
+FORMAT = "evfem-sweep-point-1"
+POINT_FILE = re.compile(r"[0-9a-f]{64}\.json")
+#: what a killed sweep was writing
+LEFT = re.compile(r"\.([0-9a-f]{64}\.json|sweep\.(csv|json|parquet)|\.evfem-sweep)\.\d+\.tmp")
+STATUS = ("done", "refused", "not_converged", "failed")
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What became of a point: `status` done, refused (by the scene reader), not_converged or failed, the
+    outputs of a point that is done, and the message of one that is not.
+    """
+
+    status: str
+    seconds: float
+    message: str
+    outputs: dict[str, float | None]
+
+    @property
+    def final(self) -> bool:
+        """Whether computing it again would give the same: not so where a process died or the memory ended."""
+        return self.status != "failed"
+
+
+@dataclass(frozen=True)
+class SweepFolder:
+    """A folder of a sweep; `resume` keeps the points that are finished in it."""
+
+    path: Path
+    resume: bool = False
+
+    def open(self) -> None:
+        """Make the folder, or clear what an earlier sweep left in it; files of others are never touched."""
+        ours = (TABLE, PARQUET, PROVENANCE, POINTS)
+        try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            present = [name for name in ours if (self.path / name).exists()]
+            if present and not (self.path / MANIFEST).is_file():
+                given = f"{self.path}, where {present[0]} was not written by a sweep"
+                raise InputError("--out", given, "another folder, for files of others are never touched")
+            write_text(self.path / MANIFEST, "".join(f"{name}\n" for name in ours))
+            (self.path / POINTS).mkdir(exist_ok=True)
+            files = [p for folder in (self.path, self.path / POINTS) for p in folder.iterdir()]
+            for file in files:
+                old = file.name in ours or POINT_FILE.fullmatch(file.name)
+                if LEFT.fullmatch(file.name) or (old and not self.resume and file.name != POINTS):
+                    file.unlink()
+        except OSError as error:
+            if isinstance(error, StorageError):
+                raise
+            raise StorageError(f"cannot use {self.path}: {error.strerror or error}") from error
+
+    def write(self, key: str, answer: Answer) -> None:
+        """Keep a point, in one step."""
+        text = json.dumps({"format": FORMAT, **vars(answer)}, allow_nan=False)
+        write_text(self.path / POINTS / f"{key}.json", text + "\n")
+
+    def read(self, key: str) -> Answer | None:
+        """A point that is finished; None for one that is not, and for one whose file is damaged."""
+        with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+            values = json.loads((self.path / POINTS / f"{key}.json").read_text(encoding="utf-8"))
+            if values.pop("format") == FORMAT and _sound(answer := Answer(**values)) and answer.final:
+                return answer
+        return None
+
+    def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+        """The table of all points so far."""
+        write_text(self.path / TABLE, csv_text(columns, rows))
+        if find_spec("pyarrow") is not None:
+            with replacing(self.path / PARQUET) as temporary:
+                _write_parquet(temporary, columns, rows)
+
+    def write_provenance(self, provenance: Mapping[str, Any]) -> None:
+        """How the table came about."""
+        write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
+
+
+def _sound(answer: Answer) -> bool:
+    numbers = [answer.seconds, *(value for value in answer.outputs.values() if value is not None)]
+    return (
+        answer.status in STATUS
+        and isinstance(answer.message, str)
+        and all(type(number) in (int, float) for number in numbers)
+    )
+
+
+def csv_text(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows as csv with every digit that counts; nothing stands for a number that is not there.
+
+    >>> csv_text(["a", "b", "c"], [{"a": 0.1, "b": None, "c": [[0.0, 0.3]]}])
+    'a,b,c\\n0.1,,"[[0.0, 0.3]]"\\n'
+    """
+    buffer = io.StringIO()
+    writer = csv.writer(buffer, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
+    return buffer.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    return json.dumps(value) if isinstance(value, (list, bool)) else value
+
+
+def _write_parquet(path: Path, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
+    from pyarrow import parquet, table
+
+    values = {name: [row.get(name) for row in rows] for name in columns}
+    for name, column in values.items():
+        kinds = {type(value) for value in column if value is not None}
+        if not (kinds <= {int, float} or len(kinds) == 1) or list in kinds:  # numbers beside tables, say
+            values[name] = [None if value is None else str(_cell(value)) for value in column]
+        elif float in kinds or not kinds:
+            values[name] = [None if value is None else float(value) for value in column]
+    parquet.write_table(table(values), path)

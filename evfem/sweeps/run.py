@@ -1,0 +1,325 @@
+"""Run a sweep: many scenes side by side, each recorded as soon as it is finished, in one table at the end."""
+
+from __future__ import annotations
+
+import math
+import sys
+import time as clock
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import evfem
+from evfem.common import notices
+from evfem.common.digest import digest
+from evfem.common.notices import LOG
+from evfem.errors import InputError, NotConverged
+from evfem.scene.file import loads
+from evfem.simulation.result import versions
+from evfem.simulation.run import simulate
+from evfem.sweeps.file import FIRST, LAST, Sweep, load
+from evfem.sweeps.folder import STATUS, Answer, SweepFolder
+from evfem.sweeps.pools import Open, Pool, open_pool, processes
+
+#: the table is written anew after so many seconds
+EVERY = 5.0
+Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, outputs
+
+
+@dataclass(frozen=True, eq=False)
+class SweepResult:
+    """The table of a sweep: `rows` in the order of the points, with the keys `columns`, and provenance."""
+
+    columns: tuple[str, ...]
+    rows: list[dict[str, Any]]
+    provenance: dict[str, Any]
+
+    def __getitem__(self, column: str) -> Any:
+        """A column (points,): numbers as an array, NaN where there is none, else a list."""
+        if column not in self.columns:
+            raise InputError("column", column, ", ".join(self.columns))
+        values = [row[column] for row in self.rows]
+        if all(value is None or type(value) in (int, float) for value in values):
+            return np.array([math.nan if value is None else value for value in values])
+        return values
+
+    def __repr__(self) -> str:
+        """How many points, and what became of them."""
+        return f"SweepResult({len(self.rows)} points: {told(self.provenance['points'])})"
+
+
+def sweep(
+    plan: Sweep | str | Path,
+    out: str | Path | None = None,
+    *,
+    resume: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: bool = False,
+) -> SweepResult:
+    """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of all.
+
+    The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and a file per
+    point; with `resume` what is finished there is not computed again. `workers` processes (None: one per
+    core; 1: none but this one) or the Dask cluster at the address `scheduler` ("local" starts one) do the
+    work; the numbers are the same. A point that the scene reader refuses, that does not converge or that
+    fails otherwise is a row with its status and message. Raises InputError if no point at all is a valid
+    scene, StorageError when the disk refuses.
+
+    >>> from evfem.sweeps.file import loads as read
+    >>> text = '''
+    ... version = 1
+    ... [scene.finger]
+    ... resolution = "coarse"
+    ... [scene.surface]
+    ... kind = "flat"
+    ... [[scene.motion]]
+    ... kind = "hover"
+    ... gap = 0.5
+    ... [grid]
+    ... motion.0.gap = [0.25, 0.5, -1.0]
+    ... '''
+    >>> result = sweep(read(text), workers=1)
+    >>> result
+    SweepResult(3 points: 2 done, 1 refused)
+    >>> result.rows[2]["message"]
+    'motion[0].gap: given -1.0; allowed: a gap in mm from 0 to 200'
+    """
+    plan = plan if isinstance(plan, Sweep) else load(plan)
+    pool = open_pool(workers, scheduler)
+    run = _Run(plan, None if out is None else SweepFolder(Path(out), resume), progress)
+    try:
+        compute(evaluate, run.waiting(), pool, run.keep)
+    finally:
+        run.close()
+    return run.result()
+
+
+class _Run:
+    """A sweep on its way: its points, the key of each, and the answers so far."""
+
+    def __init__(self, plan: Sweep, folder: SweepFolder | None, progress: bool) -> None:
+        from tqdm.auto import tqdm
+
+        self.plan, self.folder, self.began = plan, folder, clock.perf_counter()
+        self.points = plan.points()
+        self.answers: dict[str, Answer] = {}
+        quiet = not (progress and sys.stderr.isatty())
+        reading = tqdm(self.points, "reading", unit="point", leave=False, delay=2.0, disable=quiet)
+        self.keys = [self._key(point.text) for point in reading]
+        refused = dict(self.answers)
+        if len(refused) == len(set(self.keys)):
+            first = self.answers[self.keys[0]].message
+            raise InputError("sweep", f"no valid point: {first}", "at least one valid scene")
+        if folder is not None:
+            folder.open()
+            for key in set(self.keys) - set(self.answers):
+                if (kept := folder.read(key)) is not None:
+                    self.answers[key] = kept
+        self.reused = len(self.answers) - len(refused)
+        if progress and refused:
+            count = sum(key in refused for key in self.keys)
+            notices.tell(f"{count} of {len(self.keys)} points are no valid scene")
+        self.written = clock.perf_counter()
+        self.bar = _Progress(len(set(self.keys)), self.answers, progress)
+
+    def _key(self, text: str) -> str:
+        """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""
+        try:
+            scene = loads(text, self.plan.folder).digest()
+        except InputError as error:
+            key = digest((text, "refused"))
+            self.answers[key] = Answer("refused", 0.0, str(error), {})
+            return key
+        return digest((scene, self.plan.outputs, evfem.__version__))
+
+    def waiting(self) -> dict[str, Job]:
+        """What is still to be computed; equal points are computed once."""
+        folder, outputs = str(self.plan.folder), tuple(self.plan.outputs)
+        jobs = zip(self.keys, self.points, strict=True)
+        return {key: (point.text, folder, outputs) for key, point in jobs if key not in self.answers}
+
+    def keep(self, key: str, answer: Answer) -> None:
+        """A point is finished: it goes to disk, and every few seconds so does the table."""
+        if self.folder is not None:
+            self.folder.write(key, answer)
+        self.answers[key] = answer
+        self.bar.step(self.answers)
+        if self.folder is not None and clock.perf_counter() - self.written > EVERY:
+            self._write()
+
+    def close(self) -> None:
+        """The table of what is finished, however the sweep ended."""
+        self.bar.close()
+        if self.folder is not None:
+            self._write()
+
+    def _write(self) -> None:
+        assert self.folder is not None
+        result = self.result()
+        self.folder.write_table(result.columns, result.rows)
+        self.folder.write_provenance(result.provenance)
+        self.written = clock.perf_counter()
+
+    def result(self) -> SweepResult:
+        """The table; points that are not finished are left out."""
+        plan = self.plan
+        columns = (*FIRST, *plan.labels, *plan.parameters, *plan.outputs, *LAST)
+        rows = []
+        for point, key in zip(self.points, self.keys, strict=True):
+            answer = self.answers.get(key)
+            if answer is not None:
+                found = {name: answer.outputs.get(name) for name in plan.outputs}
+                state = {"status": answer.status, "seconds": answer.seconds, "message": answer.message}
+                rows.append({"point": point.index, **point.labels, **point.parameters, **found, **state})
+        return SweepResult(columns, rows, self._provenance(rows))
+
+    def _provenance(self, rows: list[dict[str, Any]]) -> dict[str, Any]:
+        plan, samples = self.plan, self.plan.samples
+        counted = Counter(row["status"] for row in rows)
+        drawn = None
+        if samples is not None:
+            told = {name: repr(one) for name, one in samples.parameters.items()}
+            drawn = {"count": samples.count, "seed": samples.seed, "method": samples.method, "of": told}
+        return {
+            "sweep": plan.name,
+            "points": {"requested": len(self.points), **{name: counted[name] for name in STATUS}},
+            "reused": self.reused,
+            "complete": len(rows) == len(self.points),
+            "wall_seconds": clock.perf_counter() - self.began,
+            "versions": dict(versions()),
+            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            "scene": {"tables": plan.tables, "digest": digest(plan.tables)},
+            "grid": plan.grid,
+            "samples": drawn,
+            "outputs": list(plan.outputs),
+            "units": {"length": "mm", "force": "N/mm", "voltage": "V", "energy": "N", "time": "s"},
+        }
+
+
+def evaluate(job: Job) -> Answer:
+    """Run one point; whatever happens to it is in the answer."""
+    began = clock.perf_counter()
+    outputs: dict[str, float | None] = {}
+    status, message = "done", ""
+    try:
+        text, folder, names = job
+        result = simulate(loads(text, folder))
+        outputs = {name: _output(result, name) for name in names}
+    except NotConverged as error:
+        status, message = "not_converged", str(error)
+    except InputError as error:
+        status, message = "refused", str(error)
+    except Exception as error:  # whatever a user's own part raises must not cost the other points
+        status, message = "failed", f"{type(error).__name__}: {error}"
+    return Answer(status, clock.perf_counter() - began, message, outputs)
+
+
+def _output(result: Any, name: str) -> float | None:
+    column, statistic, *motion = name.split(".")
+    values = np.asarray(getattr(result, column), dtype=float)
+    if motion:
+        values = values[result.motion_index == int(motion[0])]
+    found = values[-1] if statistic == "last" else getattr(np, statistic)(values)
+    return float(found) if math.isfinite(found) else None
+
+
+def compute(
+    function: Callable[[Any], Answer],
+    waiting: Mapping[str, Any],
+    pool: Open,
+    keep: Callable[[str, Answer], None],
+) -> None:
+    """Give `function` and every job to a pool, and every answer to `keep` as soon as it is there.
+
+    When a process dies, the jobs it may have died of are tried once more, each alone.
+    """
+    jobs = deque(waiting.items())
+    while jobs:
+        with pool() as opened:
+            suspects = _drain(function, opened, jobs, keep)
+        for key, job in suspects:
+            keep(key, _alone(function, job))
+
+
+def _drain(
+    function: Callable[[Any], Answer],
+    pool: Pool,
+    jobs: deque[tuple[str, Any]],
+    keep: Callable[[str, Answer], None],
+) -> list[tuple[str, Any]]:
+    """Work until nothing is left; returns the jobs in hand if the pool broke."""
+    flying: dict[Future[Answer], tuple[str, Any]] = {}
+    try:
+        while jobs or flying:
+            while jobs and len(flying) < pool.window:
+                future = pool.executor.submit(function, jobs[0][1])
+                flying[future] = jobs.popleft()
+            done, _ = wait(flying, return_when=FIRST_COMPLETED)
+            for future in done:
+                answer = _answer(future)
+                keep(flying.pop(future)[0], answer)
+    except BrokenExecutor:
+        return list(flying.values())
+    return []
+
+
+def _answer(future: Future[Answer]) -> Answer:
+    try:
+        return future.result()
+    except (BrokenExecutor, KeyboardInterrupt):
+        raise
+    except CancelledError as error:
+        raise InputError("scheduler", "a cluster that went away", "resume on another") from error
+    except Exception as error:  # the cluster's own kind, if a worker died again and again
+        return Answer("failed", 0.0, f"{type(error).__name__}: {error}", {})
+
+
+def _alone(function: Callable[[Any], Answer], job: Any) -> Answer:
+    try:
+        with processes(1) as pool:
+            return pool.executor.submit(function, job).result()
+    except BrokenExecutor:
+        return Answer("failed", 0.0, "its process died; perhaps the memory was not enough", {})
+
+
+class _Progress:
+    """A bar in a terminal; elsewhere a line for every tenth of the points."""
+
+    def __init__(self, total: int, answers: Mapping[str, Answer], shown: bool) -> None:
+        self.total, self.shown = total, shown
+        drawable = notices.drawable()
+        self.lines = shown and not drawable
+        done = len(answers)
+        self.bar = notices.bar(total, "point", done, shown and drawable)
+
+    def step(self, answers: Mapping[str, Answer]) -> None:
+        """One more is finished."""
+        done = len(answers)
+        wrong = sum(answer.status != "done" for answer in answers.values())
+        self.bar.set_postfix_str(f"{wrong} without result" if wrong else "", refresh=False)
+        self.bar.update(1)
+        LOG.debug("point %d of %d", done, self.total)
+        if self.lines:
+            notices.milestone("point", done, self.total)
+
+    def close(self) -> None:
+        """No more to come."""
+        self.bar.close()
+
+
+def told(points: Mapping[str, int]) -> str:
+    """What became of the points, in words.
+
+    >>> told({"requested": 3, "done": 2, "refused": 0, "not_converged": 1, "failed": 0})
+    '2 done, 1 not converged'
+    """
+    words = [f"{points[name]} {name.replace('_', ' ')}" for name in STATUS if points[name]]
+    missing = points["requested"] - sum(points[name] for name in STATUS)
+    return ", ".join([*words, *([f"{missing} not computed"] if missing else [])])

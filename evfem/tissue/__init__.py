@@ -1,0 +1,1 @@
+"""The tissue: laws, spaces, weak forms, time, and the body made of them."""

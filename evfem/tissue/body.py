@@ -1,0 +1,109 @@
+"""The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
+
+The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free
+nodes' displacements, bone x, bone y); forces of the bone's nodes add up to the reaction. User forms
+(`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the internal forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+
+from evfem.common.arrays import Floats, Ints
+from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.space import Space
+from evfem.tissue.weakform import Tissue
+
+
+class Pattern:
+    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR matrix
+    of size n.
+    """
+
+    def __init__(self, unknowns: Ints, size: int) -> None:
+        self.size = size
+        rows = np.broadcast_to(unknowns[:, :, None], (*unknowns.shape, unknowns.shape[1])).ravel()
+        columns = np.broadcast_to(unknowns[:, None, :], (*unknowns.shape, unknowns.shape[1])).ravel()
+        self.kept = np.flatnonzero(rows <= columns)
+        keys = rows[self.kept].astype(np.int64) * size + columns[self.kept]
+        diagonal = np.arange(size, dtype=np.int64) * (size + 1)
+        entries, position = np.unique(np.concatenate([keys, diagonal]), return_inverse=True)
+        self.position = position[: keys.size]
+        self.diagonal = position[keys.size :]
+        self.indices = (entries % size).astype(np.int32)
+        self.indptr = np.searchsorted(entries, np.arange(size + 1, dtype=np.int64) * size).astype(np.int32)
+
+    def upper(self, cells: Floats, diagonal: Floats | None = None) -> Floats:
+        """CSR data of the upper triangle from cell matrices, with an optional diagonal (n,) added."""
+        data: Floats = np.bincount(self.position, cells.ravel()[self.kept], self.indices.size).astype(
+            float, copy=False
+        )
+        if diagonal is not None:
+            data[self.diagonal] += diagonal
+        return data
+
+    def full(self, upper: Floats) -> Any:
+        """Both triangles as a scipy CSR matrix."""
+        half = sparse.csr_matrix((upper, self.indices, self.indptr), shape=(self.size, self.size))
+        return (half + half.T - sparse.diags(upper[self.diagonal])).tocsr()
+
+
+class Body:
+    """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
+
+    def __init__(
+        self,
+        space: Space,
+        laws: Mapping[str, Any],
+        terms: Sequence[Any] = (),
+        dynamics: Dynamics | None = None,
+    ) -> None:
+        self.space = space
+        self.tissue = Tissue(space, laws)
+        self.dynamics = dynamics
+        self.terms = tuple(terms) if dynamics is None else (*terms, dynamics)
+        bone = space.mesh.node_sets["bone"]
+        free = np.setdiff1d(np.arange(space.size), bone)
+        self.size = 2 * free.size + 2
+        self.unknowns: Ints = np.empty((space.size, 2), dtype=np.int64)
+        self.unknowns[free] = np.arange(2 * free.size).reshape(-1, 2)
+        self.unknowns[bone] = [self.size - 2, self.size - 1]
+        self.bone: Ints = np.array([self.size - 2, self.size - 1])
+        self.pattern = Pattern(self.unknowns[space.nodes].reshape(len(space.nodes), -1), self.size)
+
+    def reduce(self, nodal: Floats) -> Floats:
+        """Nodal forces (N, 2) to reduced forces (n,): sums over the bone."""
+        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
+
+    def expand(self, reduced: Floats) -> Floats:
+        """Reduced displacements (n,) to nodal ones (N, 2)."""
+        return reduced[self.unknowns]
+
+    def forces(self, u: Floats) -> Floats:
+        """Internal nodal forces (N, 2)."""
+        # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
+        total = self.tissue.forces(u - u[self.space.mesh.node_sets["bone"][0]])
+        for term in self.terms:
+            total = total + term.forces(u)
+        return total
+
+    def tangent(self, u: Floats) -> Floats:
+        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in laws
+        are symmetric).
+        """
+        cells = self.tissue.tangent(u)
+        for term in self.terms:
+            term.add_tangent(u, cells)
+        return self.pattern.upper(cells)
+
+    def velocity(self, u: Floats) -> Floats:
+        """Nodal velocities (N, 2) at the end of a step that ends at u."""
+        return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
+
+    def energy(self, u: Floats) -> float:
+        """Stored energy (N mm per mm of depth) of the tissue."""
+        return self.tissue.energy(u)

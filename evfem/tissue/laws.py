@@ -1,0 +1,268 @@
+"""Hyperelastic laws of the tissue: energy, stress and tangent, pointwise.
+
+Public form: `psi(F)` in MPa (energy per reference volume), `P(F) = dpsi/dF` (3, 3, ...) and
+`tangent(F) = dP/dF` (3, 3, 3, 3, ...) for a deformation gradient F (3, 3, ...).
+
+Split form, for plane strain (F33 = 1) and for elements whose volume change is a field of its own. F is the
+in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law uses the volume change:
+
+    split_energy(F, theta)      W(F, theta), W = psi where theta = ln det F
+    split_stress(F, theta)      S = dW/dF at fixed theta (2, 2, ...), q = dW/dtheta at fixed F (...)
+    split_tangent(F, theta)     A = dS/dF (2, 2, 2, 2, ...), c = dS/dtheta (2, 2, ...), k = dq/dtheta (...)
+    split_sigma_zz(F, theta)    Cauchy stress out of the plane
+
+Where theta = ln det F, S + q F^-T is the in-plane part of P. The arrays of a tangent that do not depend on
+the state are read-only views without memory of their own. Laws that work with the small-strain volume change
+have `volume_measure = "trace"`: there theta stands for tr(F) - 2 (in the plane), and S + q I is the stress.
+All functions accept complex F and theta (for `tensor.complex_step`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from evfem.common.checks import choice, real
+from evfem.errors import InputError
+from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
+from evfem.tissue.moduli import Isotropic, bulk_modulus, check_rates, check_volumetric
+from evfem.tissue.ogden import Ogden
+from evfem.tissue.splitlaw import SplitLaw, split
+
+__all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "from_table", "split"]
+
+EYE = np.eye(2)
+UNIT_TANGENT = np.einsum("ik,jl->ijkl", EYE, EYE)
+SYMMETRIC_TANGENT = UNIT_TANGENT + np.einsum("il,jk->ijkl", EYE, EYE)
+
+
+def _spread(constant: Array, like: Array) -> Array:
+    """A constant tensor at every point of the trailing shape of `like`, as a read-only view."""
+    shaped = constant.reshape(constant.shape + (1,) * like.ndim)
+    return np.broadcast_to(shaped, constant.shape + like.shape)
+
+
+class _InvariantLaw:
+    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln J.
+
+    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and `_slopes`.
+    """
+
+    volume_measure: Literal["log", "trace"] = "log"
+
+    def _energy(self, I1: Array, theta: Array) -> Array:
+        raise NotImplementedError
+
+    def _slopes(self, I1: Array, theta: Array) -> tuple[Array, Array, Array, Array, Array]:
+        """w_I, w_t, w_II, w_It, w_tt."""
+        raise NotImplementedError
+
+    def psi(self, F: Array) -> Array:
+        """Energy per reference volume (...) in MPa at F (3, 3, ...)."""
+        return self._energy(ddot(F, F), np.log(det(F)))
+
+    def P(self, F: Array) -> Array:
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at F (3, 3, ...)."""
+        w_I, w_t, *_ = self._slopes(ddot(F, F), np.log(det(F)))
+        return 2.0 * w_I * F + w_t * transpose(inv(F))
+
+    def tangent(self, F: Array) -> Array:
+        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at F (3, 3, ...)."""
+        w_I, w_t, w_II, w_It, w_tt = self._slopes(ddot(F, F), np.log(det(F)))
+        G = transpose(inv(F))
+        unit = np.einsum("ik,jl->ijkl", np.eye(3), np.eye(3)).reshape((3,) * 4 + (1,) * (F.ndim - 2))
+        A = 2.0 * w_I * unit - w_t * np.einsum("il...,kj...->ijkl...", G, G)
+        A = A + 4.0 * w_II * outer(F, F) + w_tt * outer(G, G)
+        return A + 2.0 * w_It * (outer(F, G) + outer(G, F))
+
+    def split_energy(self, F: Array, theta: Array) -> Array:
+        """W(F, theta) (...) at in-plane F (2, 2, ...)."""
+        return self._energy(ddot(F, F) + 1.0, theta)
+
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S = dW/dF (2, 2, ...) and q = dW/dtheta (...)."""
+        w_I, w_t, *_ = self._slopes(ddot(F, F) + 1.0, theta)
+        return 2.0 * w_I * F, w_t
+
+    def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """Second derivatives of W: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
+        w_I, _, w_II, w_It, w_tt = self._slopes(ddot(F, F) + 1.0, theta)
+        unit = UNIT_TANGENT.reshape((2,) * 4 + (1,) * theta.ndim)
+        return 2.0 * w_I * unit + 4.0 * w_II * outer(F, F), 2.0 * w_It * F, w_tt
+
+    def split_sigma_zz(self, F: Array, theta: Array) -> Array:
+        """Cauchy stress (...) out of the plane, (2 w_I + w_t) / det F."""
+        w_I, w_t, *_ = self._slopes(ddot(F, F) + 1.0, theta)
+        return (2.0 * w_I + w_t) / det(F)
+
+
+@dataclass(frozen=True)
+class NeoHookean(Isotropic, _InvariantLaw):
+    """Compressible neo-Hookean law, psi = mu/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2.
+
+    E (MPa) and nu are Young's modulus and Poisson's ratio at small strain; mu = E / (2 (1 + nu)) and
+    lambda = E nu / ((1 + nu)(1 - 2 nu)). `viscosity`: relaxation time of Kelvin-Voigt damping in s (None: the
+    finger's default); `density` in t/mm^3. Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite
+    Element Analysis, 2nd ed., 2008, doi:10.1017/CBO9780511755446, section 6.4.3.
+
+    >>> law = NeoHookean(E=3.0, nu=0.25)
+    >>> law.mu, law.lmbda
+    (1.2, 1.2)
+    >>> law.P(np.eye(3)).tolist()
+    [[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    """
+
+    def _energy(self, I1: Array, theta: Array) -> Array:
+        return 0.5 * self.mu * (I1 - 3.0 - 2.0 * theta) + 0.5 * self.lmbda * theta * theta
+
+    def _slopes(self, I1: Array, theta: Array) -> tuple[Array, Array, Array, Array, Array]:
+        zero = np.zeros(())
+        return np.array(0.5 * self.mu), self.lmbda * theta - self.mu, zero, zero, np.array(self.lmbda)
+
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S = mu F (2, 2, ...) and q = lambda theta - mu (...)."""
+        return self.mu * F, self.lmbda * theta - self.mu
+
+    def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """A = mu (unit), c = 0, k = lambda: constants, as read-only views of the right shapes."""
+        c = _spread(np.zeros((2, 2)), theta)
+        return _spread(self.mu * UNIT_TANGENT, theta), c, _spread(np.array(self.lmbda), theta)
+
+
+@dataclass(frozen=True)
+class Yeoh(_InvariantLaw):
+    """Yeoh's law with a volumetric part in ln J.
+
+    psi = c1 (Ib - 3) + c2 (Ib - 3)^2 + c3 (Ib - 3)^3 + K/2 (ln J)^2 with Ib = J^(-2/3) tr C; c1, c2, c3 and K
+    in MPa. The initial shear modulus is 2 c1; the bulk modulus K is given as `bulk`, or by Poisson's ratio at
+    small strain as `nu`. `viscosity` and `density` as in `NeoHookean`. Source: Yeoh, Rubber Chem. Technol. 66
+    (1993) 754-771, doi:10.5254/1.3538343.
+
+    >>> Yeoh(c1=0.5, c2=0.1, c3=0.01, nu=0.25).bulk_modulus
+    1.6666666666666667
+    """
+
+    c1: float
+    c2: float = 0.0
+    c3: float = 0.0
+    nu: float | None = None
+    bulk: float | None = None
+    viscosity: float | None = None
+    density: float = 1e-9
+
+    def __post_init__(self) -> None:
+        real("c1", self.c1, "a positive number", lambda c: c > 0.0)
+        for key in ("c2", "c3"):
+            real(key, getattr(self, key), "a finite number")
+        check_volumetric(self.nu, self.bulk)
+        check_rates(self.viscosity, self.density)
+
+    @property
+    def shear_modulus(self) -> float:
+        """Initial shear modulus in MPa."""
+        return 2.0 * self.c1
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Bulk modulus K in MPa."""
+        return bulk_modulus(self.shear_modulus, self.nu, self.bulk)
+
+    def _energy(self, I1: Array, theta: Array) -> Array:
+        x = np.exp(-2.0 / 3.0 * theta) * I1 - 3.0
+        return x * (self.c1 + x * (self.c2 + x * self.c3)) + 0.5 * self.bulk_modulus * theta * theta
+
+    def _slopes(self, I1: Array, theta: Array) -> tuple[Array, Array, Array, Array, Array]:
+        e = np.exp(-2.0 / 3.0 * theta)
+        Ib = e * I1
+        x = Ib - 3.0
+        first = self.c1 + x * (2.0 * self.c2 + 3.0 * self.c3 * x)
+        second = 2.0 * self.c2 + 6.0 * self.c3 * x
+        K = self.bulk_modulus
+        w_It = -2.0 / 3.0 * e * (first + Ib * second)
+        w_tt = 4.0 / 9.0 * Ib * (first + Ib * second) + K
+        return e * first, K * theta - 2.0 / 3.0 * Ib * first, e * e * second, w_It, w_tt
+
+
+@dataclass(frozen=True)
+class LinearElastic(Isotropic):
+    """Small-strain isotropic elasticity, psi = mu e : e + lambda/2 (tr e)^2, e = (F + F^T)/2 - I.
+
+    E (MPa), nu, mu and lambda as in `NeoHookean`, `viscosity` and `density` too. Not objective: rotations of
+    more than a few degrees strain it. Its volume change is tr e: in the split form theta stands for tr(F) - 2
+    and S + q I is the stress.
+
+    >>> LinearElastic(E=2.6, nu=0.3).mu
+    1.0
+    """
+
+    volume_measure: Literal["log", "trace"] = field(default="trace", init=False, repr=False)
+
+    def psi(self, F: Array) -> Array:
+        """Energy per volume (...) in MPa at F (3, 3, ...)."""
+        return self.split_energy(F, np.trace(F) - 3.0)
+
+    def P(self, F: Array) -> Array:
+        """Stress (3, 3, ...) in MPa at F (3, 3, ...)."""
+        S, q = self.split_stress(F, np.trace(F) - 3.0)
+        return S + q * identity(3, F.ndim - 2)
+
+    def tangent(self, F: Array) -> Array:
+        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at F (3, 3, ...), a read-only view."""
+        d = np.eye(3)
+        unit, turned = np.einsum("ik,jl->ijkl", d, d), np.einsum("il,jk->ijkl", d, d)
+        return _spread(self.mu * (unit + turned) + self.lmbda * np.einsum("ij,kl->ijkl", d, d), F[0, 0])
+
+    def split_energy(self, F: Array, theta: Array) -> Array:
+        """W(F, theta) = mu e : e + lambda/2 theta^2 (...)."""
+        e = 0.5 * (F + transpose(F)) - identity(len(F), F.ndim - 2)
+        return self.mu * ddot(e, e) + 0.5 * self.lmbda * theta * theta
+
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S = 2 mu e (of the shape of F) and q = lambda theta (...)."""
+        return self.mu * (F + transpose(F) - 2.0 * identity(len(F), F.ndim - 2)), self.lmbda * theta
+
+    def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """A = mu (unit + transposed unit), c = 0, k = lambda: constants, as read-only views."""
+        c = _spread(np.zeros((2, 2)), theta)
+        return _spread(self.mu * SYMMETRIC_TANGENT, theta), c, _spread(np.array(self.lmbda), theta)
+
+    def split_sigma_zz(self, F: Array, theta: Array) -> Array:
+        """Stress (...) out of the plane, lambda theta."""
+        return self.lmbda * theta
+
+
+#: The names of the laws in scene files.
+LAWS: Mapping[str, type] = {
+    "neo_hookean": NeoHookean,
+    "yeoh": Yeoh,
+    "ogden": Ogden,
+    "linear_elastic": LinearElastic,
+}
+
+
+def from_table(table: Mapping[str, Any], key: str = "material") -> Any:
+    """The law that a table {"law": name, parameter: value, ...} describes; `key` names the table in errors.
+
+    Raises `InputError` for an unknown law, an unknown, missing or impossible parameter.
+
+    >>> from_table({"law": "neo_hookean", "E": 0.05, "nu": 0.48})
+    NeoHookean(E=0.05, nu=0.48, viscosity=None, density=1e-09)
+    """
+    values = dict(table)
+    name = values.pop("law", "missing")
+    choice(f"{key}.law", name, tuple(LAWS))
+    parameters = [f for f in fields(LAWS[name]) if f.init]
+    allowed = f"{name} has the parameters " + ", ".join(f.name for f in parameters)
+    for given in values:
+        if given not in [f.name for f in parameters]:
+            raise InputError(f"{key}.{given}", "an unknown key", allowed)
+    for f in parameters:
+        if f.name not in values and f.default is MISSING:
+            raise InputError(f"{key}.{f.name}", "nothing", "a value; " + allowed)
+    try:
+        return LAWS[name](**values)
+    except InputError as error:
+        raise InputError(f"{key}.{error.key}", error.given, error.allowed) from None

@@ -1,0 +1,123 @@
+"""Ogden's hyperelastic law, by principal stretches; see `materials` for the two forms of a law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from evfem.common.checks import real, set_frozen
+from evfem.errors import InputError
+from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_power, transpose
+from evfem.tissue.moduli import bulk_modulus, check_rates, check_volumetric
+
+
+@dataclass(frozen=True)
+class Ogden:
+    """Ogden's law with a volumetric part in ln J.
+
+    psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with l_i =
+    J^(-1/3) times the principal stretches. mu (MPa) and alpha (no unit) are numbers or sequences of equal
+    length; the initial shear modulus is the sum of mu_p alpha_p / 2. K is given as `bulk`, or by Poisson's
+    ratio at small strain as `nu`. `viscosity` and `density` as in `materials.NeoHookean`. Source: Ogden,
+    Proc. R. Soc. Lond. A 328 (1972) 567-583, doi:10.1098/rspa.1972.0096.
+
+    >>> Ogden(mu=[1.0, -0.2], alpha=[2.0, -2.0], nu=0.25).shear_modulus
+    1.2
+    """
+
+    mu: float | Sequence[float]
+    alpha: float | Sequence[float]
+    nu: float | None = None
+    bulk: float | None = None
+    viscosity: float | None = None
+    density: float = 1e-9
+    volume_measure: Literal["log", "trace"] = field(default="log", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        for key in ("mu", "alpha"):
+            given = getattr(self, key)
+            values = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
+            allowed = "a number, or a list of numbers, none of them zero"
+            set_frozen(self, **{key: tuple(real(key, v, allowed, lambda v: v != 0.0) for v in values)})
+        if len(self._terms[0]) != len(self._terms[1]):
+            raise InputError("alpha", self.alpha, "as many numbers as in mu")
+        if not self.shear_modulus > 0.0:
+            raise InputError("mu", self.mu, "moduli with a positive sum of mu alpha / 2")
+        check_volumetric(self.nu, self.bulk)
+        check_rates(self.viscosity, self.density)
+
+    @property
+    def _terms(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        assert isinstance(self.mu, tuple)
+        assert isinstance(self.alpha, tuple)
+        return self.mu, self.alpha
+
+    @property
+    def shear_modulus(self) -> float:
+        """Initial shear modulus in MPa."""
+        return sum(m * a for m, a in zip(*self._terms, strict=True)) / 2.0
+
+    @property
+    def bulk_modulus(self) -> float:
+        """Bulk modulus K in MPa."""
+        return bulk_modulus(self.shear_modulus, self.nu, self.bulk)
+
+    def _energy(self, C: Array, theta: Array, out_of_plane: float) -> Array:
+        energy = 0.5 * self.bulk_modulus * theta * theta
+        for m, a in zip(*self._terms, strict=True):
+            powers = np.trace(symmetric_power(C, 0.5 * a)) + out_of_plane
+            energy = energy + m / a * (np.exp(-a / 3.0 * theta) * powers - 3.0)
+        return energy
+
+    def _stress(self, F: Array, theta: Array, out_of_plane: float) -> tuple[Array, Array]:
+        """Derivatives of the energy by F (n, n, ...) at fixed theta, and by theta."""
+        C = mul(transpose(F), F)
+        S: Array = np.zeros(())
+        q = self.bulk_modulus * theta
+        for m, a in zip(*self._terms, strict=True):
+            scaled = m * np.exp(-a / 3.0 * theta)
+            power = symmetric_power(C, 0.5 * a - 1.0)
+            S = S + scaled * mul(F, power)
+            q = q - scaled / 3.0 * (ddot(power, C) + out_of_plane)
+        return S, q
+
+    def psi(self, F: Array) -> Array:
+        """Energy per reference volume (...) in MPa at F (3, 3, ...)."""
+        return self._energy(mul(transpose(F), F), np.log(det(F)), 0.0)
+
+    def P(self, F: Array) -> Array:
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at F (3, 3, ...)."""
+        S, q = self._stress(F, np.log(det(F)), 0.0)
+        return S + q * transpose(inv(F))
+
+    def tangent(self, F: Array) -> Array:
+        """dP_ij/dF_kl (3, 3, 3, 3, ...) in MPa at real F (3, 3, ...)."""
+        return complex_step(self.P, F, rank=2)
+
+    def split_energy(self, F: Array, theta: Array) -> Array:
+        """W(F, theta) (...) at in-plane F (2, 2, ...)."""
+        return self._energy(mul(transpose(F), F), theta, 1.0)
+
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S = dW/dF (2, 2, ...) and q = dW/dtheta (...)."""
+        return self._stress(F, theta, 1.0)
+
+    def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """Second derivatives of W at real F and theta: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
+
+        def both(t: Array, F: Array) -> Array:
+            S, q = self.split_stress(F, t)
+            return np.concatenate([S.reshape(4, *t.shape), q[None]])
+
+        A = complex_step(lambda F: self.split_stress(F, theta)[0], F, rank=2)
+        by_theta = complex_step(both, theta, F)
+        return A, by_theta[:4].reshape(F.shape), by_theta[4]
+
+    def split_sigma_zz(self, F: Array, theta: Array) -> Array:
+        """Cauchy stress (...) out of the plane."""
+        _, q = self.split_stress(F, theta)
+        P33 = q + sum(m * np.exp(-a / 3.0 * theta) for m, a in zip(*self._terms, strict=True))
+        return P33 / det(F)
