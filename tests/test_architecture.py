@@ -33,7 +33,7 @@ ROOMS = {
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution plan"),
     "simulation": ({"numpy", "threadpoolctl"}, "result model ledger checkpoint run rendering"),
-    "fast": ({"numpy"}, "memory woodbury step training model"),
+    "fast": ({"numpy", "scipy"}, "memory woodbury step training model"),
     "sweeps": ({"numpy", "tqdm", "threadpoolctl", "distributed", "pyarrow"}, "samples file folder pools run"),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them

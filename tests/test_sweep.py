@@ -230,7 +230,7 @@ def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
 
 
 def test_a_script_without_guard_is_told_so(tmp_path):
-    script = "from evfem import pools\nwith pools.open_pool(2, None)(): pass\n"
+    script = "from evfem.sweeps import pools\nwith pools.open_pool(2, None)(): pass\n"
     (tmp_path / "script.py").write_text(script)
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
