@@ -235,7 +235,7 @@ def test_the_fingerprint_of_user_code_follows_the_code():
 
 
 def test_the_fingerprint_is_the_same_in_another_process():
-    code = f"import sys; sys.path[:0] = {sys.path!r}\nfrom evfem import default_scene\nprint(default_scene().digest())"
+    code = f"import sys; sys.path[:0] = {sys.path!r}\nimport evfem; print(evfem.default_scene().digest())"
     seeds = [
         subprocess.run(
             [sys.executable, "-c", code],
