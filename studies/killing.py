@@ -123,7 +123,7 @@ def broken(out: Path) -> list[str]:
     """Files in the folder of a run, under the names that a user knows, that are not whole."""
     checks = {
         "history.csv": lambda p: [float(x) for name in FORCES for x in history(p)[name]],
-        "checkpoint.npz": lambda p: load_arrays(p, "checkpoint", "evfem-checkpoint-2"),
+        "checkpoint.npz": lambda p: load_arrays(p, "checkpoint", "evfem-checkpoint-3"),
         "summary.json": lambda p: json.loads(p.read_text()),
         "fields.pvd": lambda p: [
             read((p.parent / e.attrib["file"]).read_bytes()) for e in ElementTree.parse(p).iter("DataSet")

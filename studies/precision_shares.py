@@ -41,9 +41,13 @@ WORK: Mapping[str, tuple[tuple[str, str, tuple[str, ...]], ...]] = {
         ("solver.condensation", "SuperLU", ("forward", "backward")),
     ),
     "contact": (
-        ("contact.condensed", "Step", ("solve",)),
+        ("contact.condensed", "LinearContactStep", ("solve",)),
         ("contact.condensed", "", ("_inverse",)),
-        ("solver.interface", "Interface", ("describe", "obeyed", "deepest", "contact_forces")),
+        (
+            "solver.interface",
+            "Interface",
+            ("candidates", "obeyed", "shallowest_penetration", "contact_forces"),
+        ),
         ("solver.linearisation", "Linearisation", ("choose_candidates",)),
     ),
     "output": (("simulation.ledger", "Ledger", ("accept", "row")), ("simulation.run", "", ("frame_of",))),

@@ -17,7 +17,10 @@ TESTS = Path(__file__).parent
 
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
-    "common": ({"numpy", "tqdm", "threadpoolctl"}, "arrays notices views checks digest storage tables"),
+    "common": (
+        {"numpy", "tqdm", "threadpoolctl"},
+        "arrays constants notices views checks digest storage tables",
+    ),
     "mesh": ({"numpy", "scipy", "meshio"}, "mesh quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem", "numba"},
@@ -29,7 +32,8 @@ ROOMS = {
     "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed friction"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state condensation interface linearisation anderson findings equilibrium stepping",
+        "strategy state control condensation interface linearisation anderson findings equilibrium "
+        "factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution plan"),
     "simulation": ({"numpy", "threadpoolctl"}, "result model ledger checkpoint run rendering"),

@@ -11,12 +11,12 @@ from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
-    Border,
+    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
-    Pull,
+    ExtraUnknowns,
     solve_contact,
-    solve_pulled,
+    solve_with_attraction,
 )
 
 
@@ -199,7 +199,7 @@ def punch(k=80, friction=0.2):
 
 def bordered(effect, row, pivot, value):
     """One extra unknown."""
-    return Border(effect[:, None], row[None, :], np.array([[pivot]]), np.array([value]))
+    return ExtraUnknowns(effect[:, None], row[None, :], np.array([[pivot]]), np.array([value]))
 
 
 def test_a_prescribed_force_is_reached_and_equals_the_prescribed_travel():
@@ -221,9 +221,9 @@ def test_the_border_may_depend_on_shear_and_on_its_own_unknown():
     k = problem.size
     effect = effect + np.concatenate([np.zeros(k), np.full(k, 0.1)])
     row = row + np.concatenate([np.zeros(k), np.full(k, 0.25)])
-    border = bordered(effect, row, 3.0, 0.7)
+    extra_unknowns = bordered(effect, row, 3.0, 0.7)
     found = solve_contact(
-        ContactProblem(problem.start, problem.compliance, problem.friction, border), closed(k)
+        ContactProblem(problem.start, problem.compliance, problem.friction, extra_unknowns), closed(k)
     )
     assert row @ found.force + 3.0 * found.extra[0] == pytest.approx(0.7, rel=1e-12)
     np.testing.assert_allclose(
@@ -265,16 +265,16 @@ def lost(gap, fall=30.0, closing=12.0):
     its fall times the compliance is 3, so what it moves returns to it threefold.
     """
     problem = ContactProblem(np.array([gap, 0.0]), 0.1 * np.eye(2), np.zeros(1))
-    return problem, Pull(np.array([fall]), np.array([1.0]), np.array([closing]))
+    return problem, AttractionStiffness(np.array([fall]), np.array([1.0]), np.array([closing]))
 
 
 def test_a_node_that_cannot_be_held_moves_the_right_way_or_snaps():
     problem, pull = lost(gap=0.98)
-    slow = solve_pulled(problem, pull, np.array([OPEN]))
+    slow = solve_with_attraction(problem, pull, np.array([OPEN]))
     # with the fall reduced to nine tenths of what can be held the way is ten times the free one
     assert slow.reduced
     assert slow.state[0] == pytest.approx(1.0 - 0.02 / (1.0 - 0.9), rel=1e-12)
-    quick = solve_pulled(problem, pull, np.array([OPEN]), snap=True)
+    quick = solve_with_attraction(problem, pull, np.array([OPEN]), snap=True)
     # closed, it presses with what the attraction gains less what the spring takes
     assert not quick.reduced
     assert quick.status.tolist() == [FORWARD]
@@ -283,7 +283,7 @@ def test_a_node_that_cannot_be_held_moves_the_right_way_or_snaps():
 
 def test_a_node_on_its_way_up_does_not_snap():
     problem, pull = lost(gap=1.02)
-    found = solve_pulled(problem, pull, np.array([OPEN]), snap=True)
+    found = solve_with_attraction(problem, pull, np.array([OPEN]), snap=True)
     assert found.reduced
     assert found.status.tolist() == [OPEN]
     assert found.state[0] > 1.0
@@ -291,10 +291,10 @@ def test_a_node_on_its_way_up_does_not_snap():
 
 def test_an_attraction_that_can_be_held_is_taken_whole_and_a_closed_node_feels_all_of_it():
     problem, pull = lost(gap=0.98, fall=5.0)
-    held = solve_pulled(problem, pull, np.array([OPEN]))
+    held = solve_with_attraction(problem, pull, np.array([OPEN]))
     assert not held.reduced
     assert held.state[0] == pytest.approx(1.0 - 0.02 / (1.0 - 0.5), rel=1e-12)
-    pressed = solve_pulled(problem, pull, np.array([FORWARD]))
+    pressed = solve_with_attraction(problem, pull, np.array([FORWARD]))
     assert pressed.status.tolist() == [FORWARD]
     assert pressed.force[0] == pytest.approx(12.0 - 0.98 / 0.1, rel=1e-12)
 
@@ -304,8 +304,8 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
     compliance = np.zeros((4, 4))
     compliance[:2, :2] = [[-1.0, 3.0], [3.0, -1.0]]
     problem = ContactProblem(np.array([-2.53, 1.0, 0.0, 0.0]), compliance, np.zeros(2))
-    pull = Pull(np.array([1.0, 0.0]), np.array([0.5, 0.0]), np.zeros(2))
-    found = solve_pulled(problem, pull, np.array([OPEN, FORWARD]))
+    pull = AttractionStiffness(np.array([1.0, 0.0]), np.array([0.5, 0.0]), np.zeros(2))
+    found = solve_with_attraction(problem, pull, np.array([OPEN, FORWARD]))
     # under the present attraction it would drift by -0.03; the fall is reduced to a feedback of 0.9
     assert found.reduced
     assert found.state[0] == pytest.approx(0.5 - 0.03 / (1.0 - 0.9))

@@ -30,7 +30,7 @@ def described(body, forces, u=None, status=(OPEN,)):
     reduced[body.bone] = 1e3
     for node, force in forces.items():
         reduced[body.unknowns[node]] = force
-    return findings(body, state, Balance(reduced, 1.0))
+    return findings(body, state, Balance(reduced, 1.0, state.attraction))
 
 
 def test_the_three_largest_forces_are_named_in_order_and_the_bones_are_left_out(body):

@@ -95,12 +95,12 @@ def run(place, *more):
 
 def replaced(path, **changes):
     """The same archive with some arrays changed, its checksums right."""
-    arrays = load_arrays(path, "checkpoint", "evfem-checkpoint-2")
+    arrays = load_arrays(path, "checkpoint", "evfem-checkpoint-3")
     save_arrays(path, arrays | {name.replace("__", "/"): a for name, a in changes.items()})
 
 
 def row_changed(path, change):
-    rows = json.loads(str(load_arrays(path, "checkpoint", "evfem-checkpoint-2")["rows"]))
+    rows = json.loads(str(load_arrays(path, "checkpoint", "evfem-checkpoint-3")["rows"]))
     change(rows)
     replaced(path, rows=np.array(json.dumps(rows)))
 
@@ -283,6 +283,6 @@ def test_output_that_cannot_be_printed_is_exit_status_4(tmp_path):
 
 
 def test_the_version_is_in_the_checkpoint(interrupted):
-    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", "evfem-checkpoint-2")
+    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", "evfem-checkpoint-3")
     assert str(arrays["version"]) == evfem.__version__
     assert export.__name__  # fields are written by the module whose writer the tests above replace

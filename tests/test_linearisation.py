@@ -28,8 +28,8 @@ def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
     law = Kaczmarek() if voltage and law is None else law
     model = make_model(Scene(body, surface, law, voltage, motion=[Press(indentation=0.1)], **options))
     state = model.equilibrium.rest(np.zeros(2), voltage)
-    model.equilibrium.linear.begin(state, False)
-    return model.equilibrium.linear, model, state
+    model.equilibrium.body.linearisation.begin(state, False)
+    return model.equilibrium.body.linearisation, model, state
 
 
 def gaps(model, surface_y=-0.1):
@@ -112,7 +112,7 @@ def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
     K = body.pattern.full(body.tangent(state.u)).toarray()
     kept = body.unknowns[model.pad.nodes[linear.candidates]].ravel()
     C = np.linalg.inv(K[:-2, :-2])
-    found = linear.condensed.compliance
+    found = linear.tangent.compliance
     np.testing.assert_allclose(found, C[np.ix_(kept, kept)], atol=1e-10 * np.abs(found).max())
     assert linear.made_at(state)
     assert not linear.made_at(replace(state, u=state.u.copy()))
@@ -124,7 +124,7 @@ def test_a_force_on_a_candidate_arrives_whole_at_the_bone():
     linear, _, state = made()
     linear.choose_candidates(state, 0.2)
     linear.factorise(state)
-    rows = linear.condensed.bone_rows
+    rows = linear.tangent.bone_rows
     np.testing.assert_allclose(rows, np.tile(-np.eye(2), linear.candidates.size), atol=1e-10)
 
 
@@ -159,12 +159,12 @@ HISTORIES = [
 def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
     linear, _, state = made(solver=Solver(tolerance=1e-8))
     linear.choose_candidates(state, 0.2)
-    assert linear.renew(state, history)  # there is none
-    assert linear.renew(state, history) == anew
+    assert linear.refactorise_if_needed(state, history)  # there is none
+    assert linear.refactorise_if_needed(state, history) == anew
     assert linear.record.factorisations == 1 + anew
     linear.forget()
-    assert linear.carried is None
-    assert linear.renew(state, history)
+    assert linear.reusable is None
+    assert linear.refactorise_if_needed(state, history)
 
 
 def test_patience_is_the_number_of_iterations_left():
@@ -173,7 +173,7 @@ def test_patience_is_the_number_of_iterations_left():
         linear, _, state = made(solver=Solver(tolerance=1e-8, strategy=Strategy(patience=patience)))
         linear.choose_candidates(state, 0.2)
         linear.factorise(state)
-        assert linear.renew(state, [1e-2, 4e-3]) == anew
+        assert linear.refactorise_if_needed(state, [1e-2, 4e-3]) == anew
 
 
 @pytest.mark.parametrize(("factor", "anew"), [(0.6, True), (0.7, False), (1.4, False), (1.6, True)])
@@ -183,13 +183,13 @@ def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
         body, Display(y=-0.1), motion=[Press(indentation=0.1, speed=1.0)], solver=Solver(dynamics="viscous")
     )
     model = make_model(scene)
-    linear, state = model.equilibrium.linear, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
     linear.choose_candidates(state, 0.2)
     linear.start_clock(state, 1e-3)
     linear.factorise(state)
     linear.start_clock(state, factor * 1e-3)
     assert model.body.dynamics.step == factor * 1e-3
-    assert linear.renew(state, [1.0]) == anew
+    assert linear.refactorise_if_needed(state, [1.0]) == anew
 
 
 def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_longer():
@@ -197,14 +197,14 @@ def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_lo
     motion = [Press(indentation=0.1, speed=1.0)]
     scene = Scene(body, Display(y=-0.1), motion=motion, solver=Solver(dynamics="viscous"))
     model = make_model(scene)
-    linear, state = model.equilibrium.linear, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
     linear.choose_candidates(state, 0.2)
     linear.start_clock(state, 1e-3)
     linear.factorise(state)
     renewed = []
     for factor in (1.4, 1.4**2):
         linear.start_clock(state, factor * 1e-3)
-        renewed.append(linear.renew(state, [1.0]))
+        renewed.append(linear.refactorise_if_needed(state, [1.0]))
     assert renewed == [False, True]
 
 
@@ -220,15 +220,15 @@ def test_a_resumed_run_makes_the_same_factorisation_again(how):
     )
     linear.choose_candidates(state, 0.6)
     linear.factorise(state)
-    at, before = linear.carried, linear.condensed
+    at, before = linear.reusable, linear.tangent
     again, _, rest = made(**options)
     again.candidates = linear.candidates
     again.restore(replace(rest, u=0.5 * state.u, voltage=10.0), at)
-    np.testing.assert_array_equal(again.condensed.schur, before.schur)
-    np.testing.assert_array_equal(again.condensed.compliance, before.compliance)
+    np.testing.assert_array_equal(again.tangent.schur, before.schur)
+    np.testing.assert_array_equal(again.tangent.compliance, before.compliance)
     # which is that of the voltage, but where it is frozen
     again.restore(rest, replace(at, voltage=1e5))
-    assert np.array_equal(again.condensed.compliance, before.compliance) == (how == "frozen")
+    assert np.array_equal(again.tangent.compliance, before.compliance) == (how == "frozen")
 
 
 # -- the attraction's part -------------------------------------------------------------------------------
@@ -252,7 +252,7 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
         return law.traction(g, 500.0, layers) * A
 
     free = state.status == OPEN
-    fall, closing = linear.fall(state), linear.closing(state)
+    fall, closing = linear.negative_stiffness(state), linear.gain_on_closing(state)
     np.testing.assert_allclose(fall[free], -((pull(gap + 1e-5) - pull(gap - 1e-5)) / 2e-5)[free], rtol=1e-6)
     np.testing.assert_allclose(closing[free], (pull(0.0 * gap) - pull(gap))[free], rtol=1e-12)
     assert closing[free].max() > 10.0 * pull(gap).max()
@@ -266,8 +266,8 @@ def test_an_attraction_that_does_not_change_has_no_part(how):
     if how == "no voltage":
         state = replace(state, voltage=0.0)
     linear.begin(state, how == "frozen")
-    assert not linear.fall(state).any()
-    assert not linear.closing(state).any()
+    assert not linear.negative_stiffness(state).any()
+    assert not linear.gain_on_closing(state).any()
     linear.choose_candidates(state, 0.6)
     linear.factorise(state)
-    np.testing.assert_allclose(linear.condensed.compliance, linear.condensed.compliance.T, atol=1e-9)
+    np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)

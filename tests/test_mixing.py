@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.common.constants import KILOVOLT
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.anderson import Mixing
-from evfem.solver.state import KILOVOLT, State
+from evfem.solver.anderson import Anderson
+from evfem.solver.state import State
 
 NODES = 2
 
@@ -24,7 +25,7 @@ def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
         attraction=zero[:1],
         reaction=zero[0],
         velocity=zero,
-        trend=zero,
+        last_increment=zero,
     )
 
 
@@ -40,7 +41,7 @@ def contraction(dimension, seed=0):
 def mixed(dimension, steps, start):
     """Errors (steps + 1,) of the iterates, the first that of the start."""
     point, M = contraction(dimension)
-    mixing, now = Mixing(), state(start)
+    mixing, now = Anderson(), state(start)
     errors = [np.abs(now.u.ravel() - point).max()]
     for _ in range(steps):
         now = mixing.next_iterate(now, state(point + M @ (now.u.ravel() - point)))
@@ -64,13 +65,13 @@ def test_a_linear_contraction_ends_after_one_step_more_than_it_has_dimensions(di
 
 def test_one_step_is_taken_as_it_is():
     after = state(np.ones(4))
-    assert Mixing().next_iterate(state(np.zeros(4)), after) is after
+    assert Anderson().next_iterate(state(np.zeros(4)), after) is after
 
 
 def test_forces_bone_and_squared_voltage_keep_their_linear_relations():
     """What is a linear function of u in every image is the same function of the mixture."""
     point, M = contraction(2)
-    mixing, now = Mixing(), state(np.array([3.0, -1.0, 2.0, 0.5]))
+    mixing, now = Anderson(), state(np.array([3.0, -1.0, 2.0, 0.5]))
     for _ in range(3):
         u = point + M @ (now.u.ravel() - point)
         after = state(u, force=[u[0] - 2.0, 3.0 * u[1]], bone=[u[2], -u[3]], squared=20.0 + u[0])
@@ -84,7 +85,7 @@ def test_forces_bone_and_squared_voltage_keep_their_linear_relations():
 
 def test_a_squared_voltage_below_zero_is_none():
     """Steps 1 and 1/2 lead to the fixed point 2, where 1 - u is -1."""
-    mixing = Mixing()
+    mixing = Anderson()
     first, second, third = (np.array([x, 0.0, 0.0, 0.0]) for x in (0.0, 1.0, 1.5))
     mixing.next_iterate(state(first), state(second, squared=0.5))
     found = mixing.next_iterate(state(second), state(third, squared=0.1))
@@ -94,7 +95,7 @@ def test_a_squared_voltage_below_zero_is_none():
 
 @pytest.mark.parametrize("how", ["status", "reset"])
 def test_another_map_begins_anew(how):
-    mixing = Mixing()
+    mixing = Anderson()
     first, second = state(np.zeros(4)), state(np.ones(4))
     mixing.next_iterate(first, second)
     if how == "reset":

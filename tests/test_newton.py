@@ -16,7 +16,8 @@ from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.equilibrium import StepFailed, Target
+from evfem.solver.control import Target
+from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -32,7 +33,7 @@ def pressed(surface, depth=0.2, **options):
     scene = Scene(ROUND, surface, motion=[Press(indentation=depth)], **options)
     model = make_model(scene)
     old = model.equilibrium.rest(model.bone(0.0, 0.0), float(scene.voltage))
-    return model, model.equilibrium.step(old, Target(model.bone(0.0, depth), None, float(scene.voltage)))
+    return model, model.equilibrium.step(old, Target.held(model.bone(0.0, depth), float(scene.voltage)))
 
 
 @pytest.mark.parametrize("surface", [Display(), GENTLE], ids=["flat", "sinusoid"])
@@ -60,7 +61,7 @@ def test_nodal_forces_of_an_accepted_state_balance(surface):
 def test_statuses_of_an_accepted_state_are_those_of_its_forces(surface):
     model, state = pressed(surface)
     equilibrium = model.equilibrium
-    slid = equilibrium.step(state, Target(model.bone(0.05, 0.2), None, 0.0))
+    slid = equilibrium.step(state, Target.held(model.bone(0.05, 0.2), 0.0))
     before, after = equilibrium.positions(state.u)[:, 0], equilibrium.positions(slid.u)
     gap = after[:, 1] - model.surface.y - model.surface.height(after[:, 0])
     normal, shear = slid.contact_force.T
@@ -100,15 +101,15 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     # iteration leaves a sixteenth for a quarter of the step; with any term missing it would leave a quarter
     model, state = pressed(**options)
     equilibrium, voltage = model.equilibrium, state.voltage
-    equilibrium.linear.candidates = np.flatnonzero(model.pad.free)
+    equilibrium.body.linearisation.candidates = np.flatnonzero(model.pad.free)
     # settle what slides under the load, so that no status changes between the two steps, and begin them there
-    state = equilibrium.step(state, Target(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], None, voltage))
+    state = equilibrium.step(state, Target.held(state.bone + 1e-2 * np.array(move) * [1.0, -1.0], voltage))
     rest = []
     for size in (2e-3, 5e-4):
-        equilibrium.linear.forget()
+        equilibrium.body.linearisation.forget()
         equilibrium.step(
-            replace(state, trend=0.0 * state.trend),
-            Target(state.bone + size * np.array(move) * [1.0, -1.0], None, voltage),
+            replace(state, last_increment=0.0 * state.last_increment),
+            Target.held(state.bone + size * np.array(move) * [1.0, -1.0], voltage),
         )
         rest.append(equilibrium.record.residuals[1])
     assert rest[1] < 0.1 * rest[0]
@@ -120,23 +121,23 @@ def test_a_failed_step_returns_nothing_and_leaves_its_start_alone():
         name: np.copy(getattr(state, name)) for name in ("u", "contact_force", "status", "bone", "reaction")
     }
     with pytest.raises(StepFailed) as caught:  # the bone would be below the surface
-        model.equilibrium.step(state, Target(model.bone(0.0, 2.5), None, 0.0))
+        model.equilibrium.step(state, Target.held(model.bone(0.0, 2.5), 0.0))
     assert caught.value.reason
     for name, before in kept.items():
         np.testing.assert_array_equal(getattr(state, name), before)
     # and the next possible step works as if nothing had happened
-    after = model.equilibrium.step(state, Target(model.bone(0.0, 0.25), None, 0.0))
+    after = model.equilibrium.step(state, Target.held(model.bone(0.0, 0.25), 0.0))
     fresh, start = pressed(Flat())
-    expected = fresh.equilibrium.step(start, Target(fresh.bone(0.0, 0.25), None, 0.0))
+    expected = fresh.equilibrium.step(start, Target.held(fresh.bone(0.0, 0.25), 0.0))
     np.testing.assert_allclose(after.reaction, expected.reaction, rtol=1e-7, atol=1e-10)
 
 
 def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypatch):
     """An older tangent may ask for what no contact can give; a fresh one that does has failed."""
     model, state = pressed(Flat())
-    equilibrium, target = model.equilibrium, Target(model.bone(0.0, 0.201), None, 0.0)
+    equilibrium, target = model.equilibrium, Target.held(model.bone(0.0, 0.201), 0.0)
     expected = equilibrium.step(state, target)
-    solve, refusals = condensed.solve_pulled, []
+    solve, refusals = condensed.solve_with_attraction, []
 
     def refuse_once(*arguments):
         if not refusals:
@@ -144,15 +145,15 @@ def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypa
             raise ContactNotSolved("as told")
         return solve(*arguments)
 
-    assert equilibrium.linear.carried is not None  # an older tangent is at hand
-    monkeypatch.setattr(condensed, "solve_pulled", refuse_once)
+    assert equilibrium.body.linearisation.reusable is not None  # an older tangent is at hand
+    monkeypatch.setattr(condensed, "solve_with_attraction", refuse_once)
     before = equilibrium.record.factorisations
     found = equilibrium.step(state, target)
     assert refusals == [before]
     assert equilibrium.record.factorisations > before
     np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-7, atol=1e-12)
     refusals.clear()
-    equilibrium.linear.forget()
+    equilibrium.body.linearisation.forget()
     with pytest.raises(StepFailed, match="contact: as told"):
         equilibrium.step(state, target)
 
@@ -160,14 +161,14 @@ def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypa
 def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
     """A soft pad 0.02 mm above 2 um of insulator closes; where the fall of the attraction had to be reduced
     three times, and only there, the lost nodes are closed at once."""
-    solve, seen, snaps = condensed.Step.solve, [], 0
+    solve, seen, snaps = condensed.LinearContactStep.solve, [], 0
 
     def watched(step):
         found = solve(step)
         seen.append((step.snap, found.reduced))
         return found
 
-    monkeypatch.setattr(condensed.Step, "solve", watched)
+    monkeypatch.setattr(condensed.LinearContactStep, "solve", watched)
     body, display = finger(block(16, 4, sag=0.1), E=0.05), Display(Layer(2e-3, 3.35))
     for top in (300.0, 400.0):
         model = make_model(Scene(body, display, StrongTroxel(), top, [Hover(0.02)]))
@@ -175,7 +176,7 @@ def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
         state = model.equilibrium.rest(bone, 0.0)
         for voltage in (0.5 * top, top):
             seen.clear()
-            state = model.equilibrium.step(state, Target(bone, None, voltage))
+            state = model.equilibrium.step(state, Target.held(bone, voltage))
             for k, (snap, _) in enumerate(seen):
                 assert snap == (k >= 3 and all(reduced for _, reduced in seen[k - 3 : k]))
             snaps += sum(snap for snap, _ in seen)
@@ -337,7 +338,7 @@ def test_penalty_contact_approaches_the_exact_one_like_one_over_the_penalty():
 
 def test_frozen_attraction_is_used_as_given():
     model, state = pressed(Display(), law=Kaczmarek(), voltage=1000.0)
-    target = Target(model.bone(0.0, 0.25), None, 1000.0)
+    target = Target.held(model.bone(0.0, 0.25), 1000.0)
     frozen = np.zeros_like(state.attraction)
     frozen[:, 1] = -1e-4
     held = model.equilibrium.step(state, target, frozen)
@@ -369,4 +370,4 @@ def test_the_travel_of_the_bone_does_not_count_as_force():
 def test_residuals_of_exactly_zero_are_numbers_like_others(history):
     """A balanced start, contact not settled: the factorisation is renewed only if the residual grew."""
     model, _ = pressed(Display())
-    assert model.equilibrium.linear._stale(history) == (history[1] > 0.0)
+    assert model.equilibrium.body.linearisation._too_old(history) == (history[1] > 0.0)

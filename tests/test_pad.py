@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from builders import block
 
-from evfem.contact.pad import Pad, frame, make_pad
+from evfem.contact.pad import Pad, make_pad, surface_state
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
@@ -107,7 +107,7 @@ def test_a_touching_node_that_faces_up_has_no_width():
 
 
 def test_frame_on_a_flat_surface():
-    found = frame(Flat(y=-0.5), np.array([[3.0, 0.25], [4.0, -0.75]]))
+    found = surface_state(Flat(y=-0.5), np.array([[3.0, 0.25], [4.0, -0.75]]))
     assert found.gap.tolist() == [0.75, -0.25]
     assert found.normal_gap.tolist() == [0.75, -0.25]
     assert found.stretch.tolist() == [1.0, 1.0]
@@ -116,7 +116,7 @@ def test_frame_on_a_flat_surface():
 def test_frame_on_a_sinusoid_by_hand():
     # h = 0.2 sin(3 x) at x = 0: slope 0.6, no curvature; at 3 x = pi/2: crest, curvature -0.2 * 9
     surface = Sinusoid(terms=[[0.2, 3.0, 0.0]], y=1.0)
-    found = frame(surface, np.array([[0.0, 1.5], [np.pi / 6, 1.5]]))
+    found = surface_state(surface, np.array([[0.0, 1.5], [np.pi / 6, 1.5]]))
     np.testing.assert_allclose(found.gap, [0.5, 0.3], rtol=1e-14)
     np.testing.assert_allclose(found.slope, [0.6, 0.0], atol=1e-15)
     np.testing.assert_allclose(found.curvature, [0.0, -1.8], atol=1e-14)
@@ -129,7 +129,7 @@ def test_the_normal_gap_is_the_distance_along_the_normal_to_first_order():
     rest = []
     for gap in (1e-3, 1e-4):
         position = np.column_stack([x, surface.height(x) + gap])
-        found = frame(surface, position)
+        found = surface_state(surface, position)
         normal = np.column_stack([-found.slope, np.ones_like(x)]) / found.stretch[:, None]
         foot = position - found.normal_gap[:, None] * normal
         # a tenth of the gap leaves a hundredth of the error

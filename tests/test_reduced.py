@@ -11,13 +11,25 @@ import pytest
 from builders import balance, block, finger
 
 import evfem as ev
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Border, ContactProblem, Pull
+from evfem.common.constants import PAD_TOLERANCE
+from evfem.contact.signorini import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    STICK,
+    AttractionStiffness,
+    ContactProblem,
+    ExtraUnknowns,
+)
 from evfem.fast.memory import CondensedPad, sums
 from evfem.fast.model import FastModel
-from evfem.fast.step import PadEquilibrium
+from evfem.fast.step import RememberedPad
 from evfem.fast.woodbury import Factors, KeptProblem
 from evfem.simulation.run import Run
-from evfem.solver.state import Limits, StepFailed, Target
+from evfem.solver.control import Target
+from evfem.solver.equilibrium import Equilibrium
+from evfem.solver.interface import Interface
+from evfem.solver.state import Limits, StepFailed
 
 INSULATOR = ev.Layer(thickness=0.09, eps_r=3.35)
 PRESS = ev.Press(force=0.05, steps=5)
@@ -63,20 +75,32 @@ def test_the_pad_is_exact_at_the_equilibria_it_remembers(trained):
         assert np.abs(pad.under(force) - moved).max() < 1e-11
 
 
+def alone_pad(model):
+    """The pad of a model by itself: its nodes are numbered from 0."""
+    return replace(model.pad, nodes=np.arange(model.pad.nodes.size))
+
+
+def fast_solver(model, pad, attraction, strategy=None):
+    """The solver of a remembered pad, at the fast model's tolerance."""
+    limits = Limits(PAD_TOLERANCE, strategy or ev.Strategy())
+    points = model.mesh.points[model.pad.nodes]
+    interface = Interface(alone_pad(model), points, model.surface, limits.tolerance)
+    return Equilibrium(RememberedPad(pad, interface, attraction, limits), interface, attraction, limits)
+
+
 def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained):
     run, states, fast = trained
     model, pad = run.model, fast.memory.pad
     nodes = model.pad.nodes
-    alone = replace(model.pad, nodes=np.arange(nodes.size))
-    attraction = replace(model.attraction, pad=alone)
-    solver = PadEquilibrium(pad, alone, model.mesh.points[nodes], model.surface, attraction, Limits(1e-8))
+    attraction = replace(model.attraction, pad=alone_pad(model))
+    solver = fast_solver(model, pad, attraction)
     found = 0
     for old, new in pairwise(states[6:]):
         force = model.equilibrium.contact_forces(new) + new.attraction
         if np.abs(pad.force - force).max(axis=(1, 2)).min() > 0.0:
             continue
         small = replace(old, u=old.u[nodes])
-        got = solver.step(small, Target(new.bone, None, new.voltage))
+        got = solver.step(small, Target.held(new.bone, new.voltage))
         assert np.abs(got.reaction - new.reaction).max() < 3e-5 * np.abs(new.reaction).max()
         assert np.abs(got.contact_force - new.contact_force).max() < 1e-3 * new.contact_force.max()
         found += 1
@@ -86,13 +110,10 @@ def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained)
 def test_a_step_is_tried_as_hard_as_the_strategy_says(trained):
     run, _, fast = trained
     model, pad = run.model, fast.memory.pad
-    nodes = model.pad.nodes
-    alone = replace(model.pad, nodes=np.arange(nodes.size))
-    asked = Target(model.bone(0.0, 0.1), None, 0.0)
-    place = pad, alone, model.mesh.points[nodes], model.surface, None
-    patient = PadEquilibrium(*place, Limits(1e-8))
+    asked = Target.held(model.bone(0.0, 0.1), 0.0)
+    patient = fast_solver(model, pad, None)
     patient.step(patient.rest(model.bone(0.0, 0.0), 0.0), asked)
-    hasty = PadEquilibrium(*place, Limits(1e-8, ev.Strategy(iterations=patient.record.iterations)))
+    hasty = fast_solver(model, pad, None, ev.Strategy(iterations=patient.record.iterations))
     with pytest.raises(StepFailed):
         hasty.step(hasty.rest(model.bone(0.0, 0.0), 0.0), asked)
     assert hasty.record.iterations == patient.record.iterations > 1
@@ -301,22 +322,22 @@ def random_problem(rng, k):
     half = rng.normal(size=(2 * k, 2 * k))
     compliance = half @ half.T + 2.0 * k * np.eye(2 * k)
     lift = np.repeat([1.0, 0.0], k)
-    border = Border(lift[:, None], lift[None].copy(), np.array([[-0.1]]), np.array([3.0]))
-    pull = Pull(np.where(rng.random(k) < 0.5, 1e-3, 0.0), rng.random(k), 0.1 * rng.random(k))
-    return rng.normal(size=2 * k), compliance, rng.random(k), border, pull
+    extra_unknowns = ExtraUnknowns(lift[:, None], lift[None].copy(), np.array([[-0.1]]), np.array([3.0]))
+    pull = AttractionStiffness(np.where(rng.random(k) < 0.5, 1e-3, 0.0), rng.random(k), 0.1 * rng.random(k))
+    return rng.normal(size=2 * k), compliance, rng.random(k), extra_unknowns, pull
 
 
 def test_exchanged_rows_give_the_same_solution_as_a_new_factorisation():
     rng = np.random.default_rng(3)
     k = 30
-    start, compliance, friction, border, pull = random_problem(rng, k)
+    start, compliance, friction, extra_unknowns, pull = random_problem(rng, k)
     factors = Factors()
     status = rng.integers(OPEN, BACKWARD + 1, size=k)
     for _ in range(12):
         status[rng.integers(k, size=2)] = rng.choice([OPEN, STICK, FORWARD, BACKWARD], size=2)
         start = rng.normal(size=2 * k)
-        plain = ContactProblem(start, compliance, friction, border, pull)
-        kept = KeptProblem(start, compliance, friction, border, pull, factors)
+        plain = ContactProblem(start, compliance, friction, extra_unknowns, pull)
+        kept = KeptProblem(start, compliance, friction, extra_unknowns, pull, factors)
         for a, b in zip(kept.solved(status), plain.solved(status), strict=True):
             assert np.allclose(a, b, rtol=1e-10, atol=1e-12)
 

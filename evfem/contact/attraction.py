@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
-from evfem.contact import pad as outline
+from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.laws import traction_derivative
 
 #: gaps up to this (mm) count as closed
@@ -36,7 +36,7 @@ class Attraction:
 
     law: Any
     layers: Any
-    pad: outline.Pad
+    pad: Pad
     surface: Any
     direction: str = "vertical"
     air_layer: bool = True
@@ -45,7 +45,7 @@ class Attraction:
         """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air layer."""
         if voltage == 0.0:
             return np.zeros_like(position)
-        frame = outline.frame(self.surface, position)
+        frame = surface_state(self.surface, position)
         gap = np.maximum(frame.gap, 0.0)
         on = 1.0 if self.air_layer else touching.astype(float)
         weight = on * self.law.traction(gap, voltage, self.layers) * self.pad.length(position[:, 0])
@@ -56,11 +56,11 @@ class Attraction:
         sideways = -np.bincount(moved, potential[of] * value, weight.size)
         return np.stack([sideways + weight * frame.slope, -weight], axis=1)
 
-    def fall(self, position: Floats, voltage: float, touching: Any) -> Floats:
-        """How fast the pull of a node falls with its vertical gap, -dp/dg A (P,) in N/mm per mm; 0 where it
-        touches: there contact holds the gap.
+    def negative_stiffness(self, position: Floats, voltage: float, touching: Any) -> Floats:
+        """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm per mm;
+        0 where it touches: there contact holds the gap.
         """
-        gap = outline.frame(self.surface, position).gap
+        gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
         rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
         return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
@@ -70,11 +70,11 @@ class Attraction:
         component).
         """
         size = position.shape[0]
-        frame = outline.frame(self.surface, position)
+        frame = surface_state(self.surface, position)
         length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
         p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
-        dp = -self.fall(position, voltage, touching)
+        dp = -self.negative_stiffness(position, voltage, touching)
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)
         rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]

@@ -1,16 +1,26 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
-it.
+it. For the plane: a node has one slip, and forces follow a profile over x.
 
-With the condensed tangent S, the bone's known step b and extra unknowns d (the
-bone's travel under a prescribed force, the squared voltage under a prescribed friction force) that push with
-p,
+With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel under a
+prescribed force, the squared voltage under a prescribed friction force) that push with p,
 
 .. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
           S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
 
 :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
-the node: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`, :math:`\phi' = h''/(1 + h'^2)`; that stiffness
-changes in every iteration but touches only the nodes near contact, so it is put into their small block alone.
+the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
+:math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the nodes near
+contact, so it is put into their small block alone.
+
+Algorithm (`LinearContactStep.solve`)::
+
+    free <- candidates' displacements without contact forces, and per unit of each extra unknown
+    near <- nodes that touch, would penetrate under the present forces, or are strongly attracted
+    repeat
+        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
+        displacements <- free + C (forces on `near`)
+        hit <- other candidates that have penetrated; stop if there are none
+        near <- near and hit
 """
 
 from __future__ import annotations
@@ -21,64 +31,64 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import Frame
+from evfem.common.constants import ROUNDING, UNHELD, WEAK
+from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
-    Border,
+    AttractionStiffness,
     ContactProblem,
     ContactSolution,
-    Pull,
-    solve_pulled,
+    ExtraUnknowns,
+    solve_with_attraction,
 )
-
-#: an attraction whose feedback on its own node is weaker than this share is left to the next iteration
-WEAK = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate: frame, slip since the last accepted state (c,),
-    contact forces (c, 2) along normal and tangent, statuses (c,), friction coefficients (c,), and the
-    interface's own compliance (c, 2) in mm per N/mm: 0 for exact contact, 1 / (penalty x tributary length)
-    for the penalty variant, which thereby needs no other solver. `fall` (c,) N/mm per mm: how fast the
-    attraction falls with the gap; `closing` (c,) N/mm: what it gains when the gap closes; `rise` (c,): slope
-    of the friction coefficient in 1/mm.
+    """What is known of the c candidate nodes at the iterate.
+
+    The `surface` below them, slip since the last accepted state (c,) in mm, contact forces (c, 2) along
+    normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes over x (c,) in
+    1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0 for exact contact, 1 /
+    (penalty x tributary length) for the penalty variant, which thereby needs no other solver. The attraction
+    weakens with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
+    (c,) N/mm where the gap is closed.
     """
 
-    frame: Frame
+    surface: SurfaceState
     slip: Floats
     force: Floats
     status: Ints
     friction: Floats
-    softness: Floats
-    fall: Floats
-    closing: Floats
-    rise: Floats
+    interface_compliance: Floats
+    negative_stiffness: Floats
+    gain_on_closing: Floats
+    friction_slope: Floats
 
     @cached_property
     def axes(self) -> Floats:
         """Rows n and t of every node, (c, 2, 2)."""
-        cos, sin = 1.0 / self.frame.stretch, self.frame.slope / self.frame.stretch
+        cos, sin = 1.0 / self.surface.stretch, self.surface.slope / self.surface.stretch
         return np.stack([np.stack([-sin, cos], axis=1), np.stack([cos, sin], axis=1)], axis=1)
 
     @property
-    def turning(self) -> Floats:
+    def follower_rate(self) -> Floats:
         """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2): it
         turns with the profile, and friction grows where its coefficient does.
         """
         axes = self.axes
-        rate = self.frame.curvature / self.frame.stretch**2
+        rate = self.surface.curvature / self.surface.stretch**2
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
-        return turned + (sign * self.rise * self.force[:, 0])[:, None] * axes[:, 1]
+        return turned + (sign * self.friction_slope * self.force[:, 0])[:, None] * axes[:, 1]
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class StepSolution:
     """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses (c,), the
-    extra unknowns, number of dense contact solves, and whether the attraction's fall had to be reduced.
+    extra unknowns, number of dense contact solves, and whether the negative stiffness had to be scaled down.
     """
 
     moved: Floats
@@ -90,8 +100,8 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Condensed:
-    """Condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, coupled by
+class CondensedTangent:
+    """The condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, coupled by
     the attraction.
     """
 
@@ -100,7 +110,7 @@ class Condensed:
     _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def make(cls, schur: Floats, coupling: Floats | None) -> Condensed:
+    def make(cls, schur: Floats, coupling: Floats | None) -> CondensedTangent:
         """From S (m, m) and the attraction's stiffness between nodes (m - 2, m - 2), or None."""
         inner = schur[:-2, :-2] if coupling is None else schur[:-2, :-2] - coupling
         return cls(schur, _inverse(inner, symmetric=coupling is None))
@@ -121,11 +131,11 @@ class Condensed:
 
 
 @dataclass(frozen=True, eq=False)
-class Unknown:
+class ExtraUnknown:
     """A number that a step has to find beside the displacements, and the force on the bone that settles it.
 
     `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose force shall be
-    `force`.
+    `force` (N/mm).
     """
 
     push: Floats
@@ -134,30 +144,32 @@ class Unknown:
 
 
 @dataclass(frozen=True, eq=False)
-class Step:
+class LinearContactStep:
     """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes
     back.
 
-    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known step; `unknowns` what else moves the
-    body; `snap`: nodes that the body cannot hold against the attraction close at once.
+    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known increment; `unknowns` what else moves
+    the body; `snap`: nodes that the attraction pulls over the gap close at once.
     """
 
-    body: Condensed
+    body: CondensedTangent
     candidates: Candidates
     residual: Floats
     bone: Floats
-    unknowns: tuple[Unknown, ...] = ()
+    unknowns: tuple[ExtraUnknown, ...] = ()
     snap: bool = False
 
-    def solve(self) -> Motion:
+    def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
         free = self._free_motion()
-        normal_gap = self.candidates.frame.normal_gap
+        normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1::2]
-        near = np.flatnonzero((status != OPEN) | (gap < 0.0) | (self.candidates.fall * own > WEAK))
+        near = np.flatnonzero(
+            (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
+        )
         if not near.size:
             near = np.array([np.argmin(gap)])
         while True:
@@ -167,13 +179,13 @@ class Step:
             moved = free[:, 0] + free[:, 1:] @ found.extra + self._moved_by(near, pushed)
             gap = normal_gap + self._along_normal(moved)
             gap[near] = 0.0
-            hit = np.flatnonzero(gap < -1e-12 * (1.0 + np.abs(self.candidates.frame.gap)))
+            hit = np.flatnonzero(gap < -ROUNDING * (1.0 + np.abs(self.candidates.surface.gap)))
             if not hit.size:
                 break
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
         force[near] = found.force.reshape(2, -1).T
-        return Motion(moved, force, status, found.extra, solves, found.reduced)
+        return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def _along_normal(self, moved: Floats) -> Floats:
         return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
@@ -198,31 +210,33 @@ class Step:
 
     def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
         """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y before x, that
-        move the body, turning included.
+        move the body, those of the follower stiffness included.
         """
         known, rows = self.candidates, y_before_x(near)
-        turning = Turning.of(known, near)
-        C, W = turning.soften(self.body.among(near), free[rows])
+        follower = FollowerStiffness.of(known, near)
+        C, W = follower.apply(self.body.among(near), free[rows])
         axes = known.axes[near]
         start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
-            [known.frame.normal_gap[near], known.slip[near]]
+            [known.surface.normal_gap[near], known.slip[near]]
         )
         compliance = _local(axes, _local(axes, C).T).T
-        if known.softness.any():
-            compliance = compliance + np.diag(known.softness[near].T.ravel())
-        border = self._border(rows, free, (C, W), turning, axes) if self.unknowns else None
-        problem = ContactProblem(start, compliance, known.friction[near], border)
-        pull = Pull(known.fall[near], known.frame.normal_gap[near], known.closing[near])
-        found = solve_pulled(problem, pull, status, self.snap)
-        pressed = (found.force + found.relief).reshape(2, -1)
+        if known.interface_compliance.any():
+            compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
+        extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
+        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns)
+        attraction = AttractionStiffness(
+            known.negative_stiffness[near], known.surface.normal_gap[near], known.gain_on_closing[near]
+        )
+        found = solve_with_attraction(problem, attraction, status, self.snap)
+        pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
-        if turning.loaded.size:
-            force = force + turning.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
+        if follower.loaded.size:
+            force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
 
-    def _border(
-        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], turning: Turning, axes: Floats
-    ) -> Border:
+    def _bone_balance(
+        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness, axes: Floats
+    ) -> ExtraUnknowns:
         """Balance of the bone along the unknowns' axes, as the equations that settle them."""
         C, W = near
         axis = [unknown.axis - 2 for unknown in self.unknowns]
@@ -232,17 +246,17 @@ class Step:
         row = self.body.bone_rows[[unknown.axis for unknown in self.unknowns]][:, rows]
         pivot = S[:, :-2] @ free[:, 1:] - pushes
         value = self.residual[axis] + wanted - S[:, -2:] @ self.bone - S[:, :-2] @ free[:, 0]
-        through = turning.transposed(row)
+        through = follower.transposed(row)
         row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
         # a body that nothing holds has a zero here, whose rounding may be negative: let it fall, not rise
-        floor = 1e-10 * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
+        floor = UNHELD * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
         own = np.diagonal(pivot)
         pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return Border(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
+        return ExtraUnknowns(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
 
 
 @dataclass(frozen=True, eq=False)
-class Turning:
+class FollowerStiffness:
     """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y per x
     displacement of the loaded nodes. Components of others come y before x.
     """
@@ -252,13 +266,13 @@ class Turning:
     rate: Floats
 
     @classmethod
-    def of(cls, candidates: Candidates, near: Ints) -> Turning:
+    def of(cls, candidates: Candidates, near: Ints) -> FollowerStiffness:
         """Of the `near` nodes; on a flat surface no node is loaded."""
-        rate = candidates.turning[near]
+        rate = candidates.follower_rate[near]
         loaded = np.flatnonzero(rate.any(axis=1))
         return cls(near.size, loaded, rate[loaded])
 
-    def soften(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
+    def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
         """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small system, T
         has few columns.
         """

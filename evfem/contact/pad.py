@@ -93,7 +93,7 @@ def make_pad(mesh: Mesh) -> Pad:
 
 
 @dataclass(frozen=True)
-class Frame:
+class SurfaceState:
     """The surface below (or above) the pad nodes: vertical gap, gap along the normal, slope and
     curvature, all (P,).
     """
@@ -113,17 +113,19 @@ class Frame:
         return self.gap / self.stretch
 
 
-def frame(surface: Any, position: Floats) -> Frame:
+def surface_state(surface: Any, position: Floats) -> SurfaceState:
     """Surface frame at current node positions (P, 2); `surface` has y set, so that h(x) = surface.y +
     surface.height(x).
     """
     x = position[:, 0]
     if surface.is_flat:
         zero = np.zeros_like(x)
-        return Frame(position[:, 1] - surface.y, zero, zero)
-    return Frame(position[:, 1] - surface.y - surface.height(x), surface.slope(x), surface.curvature(x))
+        return SurfaceState(position[:, 1] - surface.y, zero, zero)
+    return SurfaceState(
+        position[:, 1] - surface.y - surface.height(x), surface.slope(x), surface.curvature(x)
+    )
 
 
-def normals(frame: Frame) -> Floats:
+def normals(state: SurfaceState) -> Floats:
     """Unit normals of the profile at the nodes (P, 2), pointing towards the finger."""
-    return np.stack([-frame.slope, np.ones_like(frame.slope)], axis=1) / frame.stretch[:, None]
+    return np.stack([-state.slope, np.ones_like(state.slope)], axis=1) / state.stretch[:, None]

@@ -15,16 +15,33 @@ FORWARD   g = 0, lam_t = -mu lam_n    lam_n >= 0 and s >= 0
 BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 ========  ==========================  =================================================
 
-The attraction of an open node falls with its gap: its `relief` is one more unknown there, f = fall (g -
-level). A closed node needs none, its gap is known: the attraction is what it is at g = 0, its `closing` more
-than at the present gap. So a thin insulator's steep law acts only where it can.
+The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it has become,
+its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs none, its gap is known:
+the attraction is what it is at g = 0. So a thin insulator's steep law acts only where it can.
 
-A warm-started active set changes all violated nodes at once: open -> slip the way it is moving when the gap
-closes, slip -> open when it pulls, stick -> slip with the sign of its force when it leaves the cone, slip ->
-stick (never straight to the other slip) when it moves along its own friction. A node passes through slip
-between open and stick: one that sticks beside a pulling shear force would seem to open. If a set of statuses
-comes back, only the worst violated node changes per solve. No constant has to be chosen. What has not
-converged is never used.
+Algorithm (`solve_contact`), a primal-dual active set::
+
+    status <- that of the last iteration
+    repeat
+        solve the equations of `status` (one dense linear system) for forces and extra unknowns
+        gaps, slips <- start + C (forces + drops) + e d
+        wanted <- the status that each node's forces, gap and slip ask for
+        if wanted = status: done
+        change all violated nodes; only the worst one if these statuses have been met before
+    start again from all nodes sticking, then from all open, before giving up
+
+A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to slip with
+the sign of its force when it leaves the cone, from slip to stick (never straight to the other slip) when it
+moves along its own friction. It passes through slip between open and stick: one that sticks beside a pulling
+shear force would seem to open. No constant has to be chosen. What has not converged is never used.
+
+If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution;
+its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
+
+Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175, doi:10.1016/0045-7825(86)90095-2 (the
+frictional problem as complementarity); P. Alart and A.
+Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X; S. Hueeber, G.
+Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061 (primal-dual active set).
 """
 
 from __future__ import annotations
@@ -34,12 +51,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
-#: solves of an active set, of which a third may change many nodes at once
-LIMIT = 60
-#: feedback that an attraction is reduced to where its own fall cannot be held
-STABLE = 0.9
 
 
 class ContactNotSolved(ArithmeticError):
@@ -47,32 +61,33 @@ class ContactNotSolved(ArithmeticError):
 
 
 @dataclass(frozen=True)
-class Border:
-    """p extra unknowns d: `effect` (2 k, p) on gaps then slips, `row` (p, 2 k) lam + `pivot` (p, p) d =
-    `value` (p,).
+class ExtraUnknowns:
+    """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations that settle
+    them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,).
     """
 
-    effect: Floats
-    row: Floats
+    columns: Floats
+    rows: Floats
     pivot: Floats
-    value: Floats
+    right: Floats
 
 
 @dataclass(frozen=True)
-class Pull:
-    """An attraction of open nodes that falls by `fall` (k,) per unit of gap from its value at the gap
-    `level` (k,), and grows by `closing` (k,) when the gap closes.
+class AttractionStiffness:
+    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,) per unit
+    of gap from its value at `reference_gap` (k,) while open, and is stronger by `gain_on_closing` (k,) at g =
+    0.
     """
 
-    fall: Floats
-    level: Floats
-    closing: Floats
+    negative_stiffness: Floats
+    reference_gap: Floats
+    gain_on_closing: Floats
 
 
 @dataclass(frozen=True)
 class ContactProblem:
     """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients (k,),
-    optional border.
+    optional extra_unknowns.
 
     The first k entries are normal (gap, pressing force), the last k tangential (slip, shear force).
     """
@@ -80,8 +95,8 @@ class ContactProblem:
     start: Floats
     compliance: Floats
     friction: Floats
-    border: Border | None = None
-    pull: Pull | None = None
+    extra_unknowns: ExtraUnknowns | None = None
+    attraction: AttractionStiffness | None = None
 
     @property
     def size(self) -> int:
@@ -89,18 +104,18 @@ class ContactProblem:
         return self.friction.size
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), relief of the pull (2 k,) and extra unknowns (p,) for given statuses."""
+        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given statuses."""
         return _solve_statuses(self, status)
 
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), what nodes are pulled less (2 k,), statuses (k,), the extra unknowns (p,), new
-    gaps and slips (2 k,), the number of dense solves, and whether the attraction's fall had to be reduced.
+    """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns (p,), new gaps
+    and slips (2 k,), the number of dense solves, and whether the negative stiffness had to be scaled down.
     """
 
     force: Floats
-    relief: Floats
+    attraction_drop: Floats
     status: Ints
     extra: Floats
     state: Floats
@@ -110,10 +125,10 @@ class ContactSolution:
 
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from all nodes
-    sticking or all open; raises `ContactNotSolved` when none of them ends within `LIMIT` solves and one per
-    node.
+    sticking or all open; raises `ContactNotSolved` when none of them ends within `ACTIVE_SET_LIMIT` solves
+    and one per node.
     """
-    most = LIMIT + problem.size
+    most = ACTIVE_SET_LIMIT + problem.size
     for start in (status, np.full(problem.size, STICK)):
         try:
             return _active_set(problem, start, most)
@@ -126,54 +141,58 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
     seen: set[bytes] = set()
     for solves in range(1, most + 1):
-        force, relief, extra = problem.solved(status)
-        state = problem.start + problem.compliance @ (force + relief)
-        if problem.border is not None:
-            state = state + problem.border.effect @ extra
+        force, attraction_drop, extra = problem.solved(status)
+        state = problem.start + problem.compliance @ (force + attraction_drop)
+        if problem.extra_unknowns is not None:
+            state = state + problem.extra_unknowns.columns @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
         changes = np.flatnonzero(wanted != status)
         if not changes.size:
-            return ContactSolution(force, relief, status, extra, state, solves)
-        if status.tobytes() in seen or solves > LIMIT // 3:
-            changes = changes[[np.argmax(violation[changes])]] if solves < LIMIT else changes[:1]
+            return ContactSolution(force, attraction_drop, status, extra, state, solves)
+        if status.tobytes() in seen or solves > ACTIVE_SET_LIMIT // 3:
+            changes = changes[[np.argmax(violation[changes])]] if solves < ACTIVE_SET_LIMIT else changes[:1]
         seen.add(status.tobytes())
         status = status.copy()
         status[changes] = wanted[changes]
     raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")
 
 
-def solve_pulled(problem: ContactProblem, pull: Pull, status: Ints, snap: bool = False) -> ContactSolution:
-    """Contact of a pad whose open nodes are attracted. Where the body could not hold the attraction's fall
-    (the pad snaps) the linearised problem has no solution or the wrong one. Then the fall is reduced to what
-    it can hold, which goes the right way in small steps, or with `snap` the nodes that are being lost close.
+def solve_with_attraction(
+    problem: ContactProblem, attraction: AttractionStiffness, status: Ints, snap: bool = False
+) -> ContactSolution:
+    """Contact of a pad whose open nodes are attracted.
+
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the linear problem
+    has no solution or the wrong one. Its negative stiffness is then scaled to `STABLE` of the critical value,
+    which goes the right way in small steps; with `snap` the nodes that are being lost close instead.
     """
-    if not pull.fall.any():
+    if not attraction.negative_stiffness.any():
         return solve_contact(problem, status)
-    pulled = replace(problem, pull=pull)
-    root = np.sqrt(pull.fall)
+    attracted = replace(problem, attraction=attraction)
+    root = np.sqrt(attraction.negative_stiffness)
     gain = root[:, None] * problem.compliance[: problem.size, : problem.size] * root
     if np.abs(gain).sum(axis=1).max() < STABLE:
-        return solve_contact(pulled, status)
-    for start in (status, _snapped(problem, pull, status)) if snap else (status,):
+        return solve_contact(attracted, status)
+    for start in (status, _snapped(problem, attraction, status)) if snap else (status,):
         try:
-            found = _active_set(pulled, start, LIMIT)
+            found = _active_set(attracted, start, ACTIVE_SET_LIMIT)
         except ContactNotSolved:
             continue
-        if _feedback(problem, pull, found.status)[0] < 1.0:
+        if _feedback(problem, attraction, found.status)[0] < 1.0:
             return found
     # the closed nodes hold a body whose own compliance the attraction has made negative
     ways = (np.full(problem.size, OPEN), status)
-    share = STABLE / max(STABLE, *(_feedback(problem, pull, way)[0] for way in ways))
-    held = replace(problem, pull=replace(pull, fall=share * pull.fall))
-    return replace(solve_contact(held, status), reduced=True)
+    fraction = STABLE / max(STABLE, *(_feedback(problem, attraction, way)[0] for way in ways))
+    scaled = replace(attraction, negative_stiffness=fraction * attraction.negative_stiffness)
+    return replace(solve_contact(replace(problem, attraction=scaled), status), reduced=True)
 
 
-def _feedback(problem: ContactProblem, pull: Pull, status: Ints) -> tuple[float, Floats]:
+def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> tuple[float, Floats]:
     """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held, and
     the gaps (k,) that grow with it.
     """
-    k, C = problem.size, problem.compliance
-    free, closed = np.flatnonzero((status == OPEN) & (pull.fall > 0.0)), np.flatnonzero(status != OPEN)
+    k, C, stiffness = problem.size, problem.compliance, attraction.negative_stiffness
+    free, closed = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), np.flatnonzero(status != OPEN)
     mode = np.zeros(k)
     if not free.size:
         return 0.0, mode
@@ -181,64 +200,64 @@ def _feedback(problem: ContactProblem, pull: Pull, status: Ints) -> tuple[float,
     if closed.size:
         rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
         held = held - C[np.ix_(free, rows)] @ np.linalg.solve(C[np.ix_(rows, rows)], C[np.ix_(rows, free)])
-    root = np.sqrt(pull.fall[free])
+    root = np.sqrt(stiffness[free])
     gain = root[:, None] * held * root
     factors, modes = np.linalg.eigh(0.5 * (gain + gain.T))
     mode[free] = modes[:, -1] / root
     return float(factors[-1]), mode
 
 
-def _snapped(problem: ContactProblem, pull: Pull, status: Ints) -> Ints:
+def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> Ints:
     """Statuses (k,) with those open nodes closed that move most in the mode that is being lost, if it is on
     its way to the surface.
     """
-    factor, mode = _feedback(problem, pull, status)
-    drift = solve_contact(problem, status).state[: problem.size] - pull.level
-    if factor < 1.0 or drift @ (pull.fall * mode**2) >= 0.0:
+    factor, mode = _feedback(problem, attraction, status)
+    drift = solve_contact(problem, status).state[: problem.size] - attraction.reference_gap
+    if factor < 1.0 or drift @ (attraction.negative_stiffness * mode**2) >= 0.0:
         return status
     lost = (np.abs(mode) > 0.5 * np.abs(mode).max()) & (drift < 0.0)
     return np.where(lost, STICK, status)
 
 
 def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
-    """Contact forces (2 k,), relief of the pull (2 k,) and extra unknowns (p,) for given statuses: one dense
-    linear system.
+    """Contact forces (2 k,), drops of the attraction (2 k,) and extra unknowns (p,) for given statuses: one
+    dense linear system.
     """
-    k, C, border = problem.size, problem.compliance, problem.border
+    k, C, extra = problem.size, problem.compliance, problem.extra_unknowns
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     # shear force per pressing force of slipping nodes: against the slip
     ratio = problem.friction * ((status == BACKWARD).astype(float) - (status == FORWARD))
-    pulled = np.zeros(0, dtype=np.int64)
-    if problem.pull is not None:
-        pulled = np.flatnonzero((status == OPEN) & (problem.pull.fall > 0.0))
-    rows = np.concatenate([active, k + stick, pulled])
+    attracted = np.zeros(0, dtype=np.int64)
+    if problem.attraction is not None:
+        attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
+    rows = np.concatenate([active, k + stick, attracted])
     matrix = C[np.ix_(rows, rows)]
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
     right = -problem.start[rows]
-    relief = np.zeros(2 * k)
-    if problem.pull is not None:
-        relief[active] = -problem.pull.closing[active]
-        right -= C[rows] @ relief
-        own = np.arange(rows.size - pulled.size, rows.size)
-        matrix[own, own] -= 1.0 / problem.pull.fall[pulled]
-        right[own] += problem.pull.level[pulled]
-    if border is not None:
-        row = border.row[:, rows]
-        row[:, : active.size] += border.row[:, k + active] * ratio[active]
-        matrix = np.block([[matrix, border.effect[rows]], [row, border.pivot]])
-        right = np.append(right, border.value - border.row @ relief)
+    drop = np.zeros(2 * k)
+    if problem.attraction is not None:
+        drop[active] = -problem.attraction.gain_on_closing[active]
+        right -= C[rows] @ drop
+        own = np.arange(rows.size - attracted.size, rows.size)
+        matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
+        right[own] += problem.attraction.reference_gap[attracted]
+    if extra is not None:
+        row = extra.rows[:, rows]
+        row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
+        matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
+        right = np.append(right, extra.right - extra.rows @ drop)
     try:
         x = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
         raise ContactNotSolved(str(error)) from error
     force = np.zeros(2 * k)
-    contact = rows.size - pulled.size
+    contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
-    relief[pulled] = x[contact : rows.size]
+    drop[attracted] = x[contact : rows.size]
     force[k:] += ratio * force[:k]
-    return force, relief, x[rows.size :]
+    return force, drop, x[rows.size :]
 
 
 def _next_statuses(
@@ -249,9 +268,9 @@ def _next_statuses(
     """
     k, mu = problem.size, problem.friction
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
-    softness = np.maximum(np.abs(np.diagonal(problem.compliance)[:k]), 1e-300)
-    scale = max(np.abs(normal).max(initial=0.0), np.abs(gap / softness).max(initial=0.0) * 1e-3, 1e-300)
-    noise = 1e-12 * scale
+    own_compliance = np.maximum(np.abs(np.diagonal(problem.compliance)[:k]), 1e-300)
+    scale = max(np.abs(normal).max(initial=0.0), np.abs(gap / own_compliance).max(initial=0.0) * 1e-3, 1e-300)
+    noise = ROUNDING * scale
     violation = np.zeros(k)
     wanted = status.copy()
 
@@ -260,10 +279,10 @@ def _next_statuses(
         violation[where] = amount[where]
 
     entering = np.where((mu > 0) & (slip == 0.0), STICK, np.where(slip < 0, BACKWARD, FORWARD))
-    change((status == OPEN) & (gap / softness < -noise), entering, -gap / softness)
+    change((status == OPEN) & (gap / own_compliance < -noise), entering, -gap / own_compliance)
     beyond = np.abs(shear) - mu * normal
     change((status == STICK) & (beyond > noise), np.where(shear < 0, FORWARD, BACKWARD), beyond)
-    along = np.where(status == BACKWARD, slip, -slip) / softness
+    along = np.where(status == BACKWARD, slip, -slip) / own_compliance
     change((status >= FORWARD) & (mu > 0) & (along > noise), np.full(k, STICK), along)
     change((status >= FORWARD) & (normal < -noise), np.full(k, OPEN), -normal)
     return wanted, violation

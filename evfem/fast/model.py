@@ -26,13 +26,14 @@ from threadpoolctl import threadpool_limits
 import evfem
 from evfem.common import notices
 from evfem.common.arrays import Floats
+from evfem.common.constants import PAD_TOLERANCE, SMALLEST_FORCE
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
-from evfem.contact import pad as outline
+from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, NotConverged
 from evfem.fast.memory import CondensedPad, Kept
-from evfem.fast.step import PadEquilibrium
+from evfem.fast.step import RememberedPad
 from evfem.fast.training import Memory, check_shapes, remember
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Press, Slide
@@ -42,8 +43,11 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model, make_attraction, make_model, placed
 from evfem.simulation.result import Result, provenance
 from evfem.simulation.run import Request, Run, simulate
+from evfem.solver.control import Target
 from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.state import SMALLEST_FORCE, Limits, State, StepFailed, Target
+from evfem.solver.factorised import FactorisedBody
+from evfem.solver.interface import Interface
+from evfem.solver.state import Limits, State, StepFailed
 from evfem.solver.stepping import Stepper
 from evfem.tissue.body import Body
 
@@ -115,7 +119,7 @@ class FastModel:
     memory: Memory
     identity: Mapping[str, str]
     provenance: dict[str, Any] = field(default_factory=dict)
-    _parts: tuple[Mesh, outline.Pad] | None = field(default=None, init=False, repr=False)
+    _parts: tuple[Mesh, Pad] | None = field(default=None, init=False, repr=False)
     _body: Body | None = field(default=None, init=False, repr=False)
 
     def __repr__(self) -> str:
@@ -181,7 +185,7 @@ class FastModel:
             raise InputError("reduced", f"{path}, damaged: {error}", allowed) from error
         return cls(memory, identity, made)
 
-    def _parts_for(self, scene: Scene) -> tuple[Mesh, outline.Pad]:
+    def _parts_for(self, scene: Scene) -> tuple[Mesh, Pad]:
         """Mesh and pad, if this is a model of the finger of `scene`."""
         _check_scene(scene)
         for key, value in _identity(scene).items():
@@ -191,7 +195,7 @@ class FastModel:
             mesh, _ = scene_mesh(scene)
             if digest(mesh) != self.provenance["mesh"]["digest"]:
                 raise InputError("finger", "another mesh", "the mesh that the fast model was made with")
-            self._parts = mesh, outline.make_pad(mesh)
+            self._parts = mesh, make_pad(mesh)
         return self._parts
 
     def _stated(self, run: FastRun, checks: int) -> dict[str, Any]:
@@ -222,7 +226,9 @@ class FastModel:
         fast, solver = run.model, run.scene.solver
         attraction = None if fast.attraction is None else replace(fast.attraction, pad=pad)
         limits = Limits(solver.tolerance, solver.strategy, solver.threads)
-        full = Equilibrium(self._body, pad, fast.surface, attraction, limits)
+        interface = Interface(pad, mesh.points, fast.surface, solver.tolerance)
+        factorised = FactorisedBody(self._body, interface, attraction, limits)
+        full = Equilibrium(factorised, interface, attraction, limits)
         return Model(run.scene, mesh, self._body, pad, fast.surface, attraction, full, fast.first_gap)
 
     def _checked(self, full: Model, run: FastRun, step: int) -> dict[str, float]:
@@ -243,7 +249,7 @@ class FastModel:
         """A state of the pad as one of the whole finger, the tissue as between the stored equilibria."""
         weight = self.memory.pad.weights(on_pad(state))
         u = state.bone + np.tensordot(weight, self.memory.whole, 1)
-        return replace(state, u=u, velocity=np.zeros_like(u), trend=np.zeros_like(u))
+        return replace(state, u=u, velocity=np.zeros_like(u), last_increment=np.zeros_like(u))
 
 
 def on_pad(state: State) -> Floats:
@@ -256,7 +262,7 @@ class FastRun(Run):
     the steps.
     """
 
-    def __init__(self, pad: CondensedPad, scene: Scene, mesh: Mesh, whole: outline.Pad) -> None:
+    def __init__(self, pad: CondensedPad, scene: Scene, mesh: Mesh, whole: Pad) -> None:
         self.scene, solver = scene, scene.solver
         alone = replace(whole, nodes=np.arange(whole.nodes.size))
         points = mesh.points[whole.nodes]
@@ -265,9 +271,10 @@ class FastRun(Run):
         if scene.law is not None and largest_voltage(scene) != 0.0:
             attraction = make_attraction(scene, mesh, whole, surface)
             attraction = replace(attraction, pad=alone)
-        equilibrium: Any = PadEquilibrium(
-            pad, alone, points, surface, attraction, Limits(solver.tolerance, solver.strategy)
-        )
+        limits = Limits(max(solver.tolerance, PAD_TOLERANCE), solver.strategy)
+        interface = Interface(alone, points, surface, limits.tolerance)
+        remembered = RememberedPad(pad, interface, attraction, limits)
+        equilibrium = Equilibrium(remembered, interface, attraction, limits)
 
         body: Any = NoTissue()
         self.model = Model(scene, mesh, body, alone, surface, attraction, equilibrium, first_gap)
@@ -283,13 +290,13 @@ class FastRun(Run):
         begin, record = clock.perf_counter(), self.model.equilibrium.record
         iterations = record.iterations
         try:
-            self.state, parts = self.stepper.follow(self.state, request.path, self.ledger.accept)
+            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
         except StepFailed as error:
-            advice = f"{error.reason}; {ADVICE}"
+            advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
             raise NotConverged(request.step, error.residuals, advice, self.result()) from error
         self.time += request.duration
         row = self._row(request)
-        row |= {"substeps": parts, "newton_iterations": record.iterations - iterations}
+        row |= {"substeps": substeps, "newton_iterations": record.iterations - iterations}
         self.rows.append(row | {"seconds": clock.perf_counter() - begin})
         self.states.append(self.state)
         self.targets.append(request.path(0.0, 1.0))

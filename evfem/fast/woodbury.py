@@ -9,7 +9,7 @@ row                       equation
 ========================  =====================================================
 closed gap, or stick      row of the compliance times x = -start
 open                      x = 0
-open and pulled           row of the compliance times x - x / fall = level - start
+open and attracted           row of the compliance times x - x / stiffness = gap - start
 slip                      shear force - ratio x pressing force = 0
 ========================  =====================================================
 
@@ -29,7 +29,7 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSo
 
 #: share of the rows that may be exchanged before the system is factorised again
 MOST = 0.2
-ZERO, FULL, PULLED, SLIPPING = 0, 1, 2, 3
+ZERO, FULL, ATTRACTED, SLIPPING = 0, 1, 2, 3
 
 
 @dataclass(eq=False)
@@ -84,11 +84,11 @@ class Factors:
     def _factorise(self, problem: ContactProblem, kinds: Ints, values: Floats) -> None:
         from scipy.linalg import lapack
 
-        border = problem.border
-        extra = 0 if border is None else border.pivot.shape[0]
+        extra_unknowns = problem.extra_unknowns
+        extra = 0 if extra_unknowns is None else extra_unknowns.pivot.shape[0]
         matrix = _rows(problem, kinds, values, np.arange(kinds.size), extra)
-        if border is not None:
-            matrix = np.vstack([matrix, np.hstack([border.row, border.pivot])])
+        if extra_unknowns is not None:
+            matrix = np.vstack([matrix, np.hstack([extra_unknowns.rows, extra_unknowns.pivot])])
         lu, pivots, failed = lapack.dgetrf(matrix)
         if failed:
             self.compliance = None
@@ -105,16 +105,18 @@ class KeptProblem(ContactProblem):
     factors: Factors = field(default_factory=Factors)
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), relief of the pull (2 k,) and extra unknowns (p,) for given statuses."""
+        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given statuses."""
         kinds, values = row_kinds(self, status)
         right, grown = _right(self, kinds)
         x, k = self.factors.solve(self, kinds, values, right), self.size
-        pulled, both = kinds == PULLED, x[: 2 * k]
-        return np.where(pulled, 0.0, both), np.where(pulled, both, grown), x[2 * k :]
+        attracted, both = kinds == ATTRACTED, x[: 2 * k]
+        return np.where(attracted, 0.0, both), np.where(attracted, both, grown), x[2 * k :]
 
 
 def row_kinds(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats]:
-    """Kind of every row (2 k,), and the number in it: 1 / fall of pulled nodes, ratio of slipping ones."""
+    """Kind of every row (2 k,), and the number in it: 1 / negative stiffness of attracted nodes, ratio of
+    slipping ones.
+    """
     k = problem.size
     kinds, values = np.full(2 * k, ZERO), np.zeros(2 * k)
     kinds[:k][status != OPEN] = FULL
@@ -122,9 +124,12 @@ def row_kinds(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats]:
     slips = k + np.flatnonzero(status >= FORWARD)
     sign = (status == BACKWARD).astype(float) - (status == FORWARD)
     kinds[slips], values[slips] = SLIPPING, (problem.friction * sign)[slips - k]
-    if problem.pull is not None:
-        pulled = np.flatnonzero((status == OPEN) & (problem.pull.fall > 0.0))
-        kinds[pulled], values[pulled] = PULLED, 1.0 / problem.pull.fall[pulled]
+    if problem.attraction is not None:
+        attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
+        kinds[attracted], values[attracted] = (
+            ATTRACTED,
+            1.0 / problem.attraction.negative_stiffness[attracted],
+        )
     return kinds, values
 
 
@@ -134,11 +139,11 @@ def _rows(problem: ContactProblem, kinds: Ints, values: Floats, which: Ints, ext
     rows = np.zeros((which.size, 2 * k + extra))
     unit = float(problem.compliance[0, 0])
     kind = kinds[which]
-    full = (kind == FULL) | (kind == PULLED)
+    full = (kind == FULL) | (kind == ATTRACTED)
     rows[full, : 2 * k] = problem.compliance[which[full]]
-    if problem.border is not None:
-        rows[full, 2 * k :] = problem.border.effect[which[full]]
-    own = np.where(kind == PULLED, -values[which], np.where(full, 0.0, unit))
+    if problem.extra_unknowns is not None:
+        rows[full, 2 * k :] = problem.extra_unknowns.columns[which[full]]
+    own = np.where(kind == ATTRACTED, -values[which], np.where(full, 0.0, unit))
     rows[place, which] += own
     slips = np.flatnonzero(kind == SLIPPING)
     rows[slips, which[slips] - k] = -unit * values[which[slips]]
@@ -146,16 +151,16 @@ def _rows(problem: ContactProblem, kinds: Ints, values: Floats, which: Ints, ext
 
 
 def _right(problem: ContactProblem, kinds: Ints) -> tuple[Floats, Floats]:
-    """Right-hand side (2 k + p,), and the known relief (2 k,) of nodes that have closed."""
+    """Right-hand side (2 k + p,), and the known drop of the attraction (2 k,) of nodes that have closed."""
     k = problem.size
-    full = (kinds == FULL) | (kinds == PULLED)
+    full = (kinds == FULL) | (kinds == ATTRACTED)
     right = np.where(full, -problem.start, 0.0)
     grown = np.zeros(2 * k)
-    if problem.pull is not None:
-        grown[:k] = np.where(kinds[:k] == FULL, -problem.pull.closing, 0.0)
-        right[:k] += np.where(kinds[:k] == PULLED, problem.pull.level, 0.0)
+    if problem.attraction is not None:
+        grown[:k] = np.where(kinds[:k] == FULL, -problem.attraction.gain_on_closing, 0.0)
+        right[:k] += np.where(kinds[:k] == ATTRACTED, problem.attraction.reference_gap, 0.0)
         some = np.flatnonzero(grown)
         right[full] -= (problem.compliance[:, some] @ grown[some])[full]
-    if problem.border is not None:
-        right = np.concatenate([right, problem.border.value - problem.border.row @ grown])
+    if problem.extra_unknowns is not None:
+        right = np.concatenate([right, problem.extra_unknowns.right - problem.extra_unknowns.rows @ grown])
     return right, grown

@@ -1,7 +1,7 @@
 """From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
 
-Beside the state a run carries over from step to step: the contact candidates, the part of a step that
-worked last, the sums of works, and a factorisation made some steps ago. Of the last one the checkpoint keeps
+Beside the state a run carries over from step to step: the contact candidates, the substep that worked
+last, the sums of works, and a factorisation made some steps ago. Of the last one the checkpoint keeps
 where it was made; a resumed run makes it there again, and the iterations that follow are the same to the last
 bit (with one thread, on the same machine and backend).
 """
@@ -16,8 +16,7 @@ import numpy as np
 
 from evfem.errors import InputError
 from evfem.simulation.result import Saved
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.state import Linearised, State
+from evfem.solver.state import Reusable, State, TangentPoint
 
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
@@ -28,23 +27,35 @@ def state_arrays(state: State) -> dict[str, Any]:
     return {spec.name: np.asarray(getattr(state, spec.name)) for spec in fields(State)}
 
 
-def carried_arrays(equilibrium: Equilibrium) -> dict[str, Any]:
-    """What an equilibrium solver takes with it to the next step; of the same shapes with and without a
-    factorisation.
-    """
-    at, dynamics = equilibrium.linear.carried, equilibrium.body.dynamics
-    nowhere = np.zeros_like(equilibrium.points)
+def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
+    """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
+    at, nowhere = carried.tangent_point, np.zeros_like(state.u)
     return {
-        "candidates": equilibrium.linear.candidates,
+        "candidates": carried.candidates,
         "factorised": np.array(at is not None),
         "factor_u": nowhere if at is None else at.u,
         "factor_begin": nowhere if at is None else at.begin,
         "factor_voltage": np.array(0.0 if at is None else at.voltage),
         "factor_duration": np.array(0.0 if at is None else at.duration),
         "factor_frozen": np.array(False if at is None else at.frozen),
-        "factor_touching": np.zeros(equilibrium.pad.nodes.size, dtype=bool) if at is None else at.touching,
-        "duration": np.array(0.0 if dynamics is None else dynamics.step),
+        "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
+        "duration": np.array(carried.duration),
     }
+
+
+def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
+    """What the solver had taken with it, from the arrays of a checkpoint."""
+    at = None
+    if arrays["factorised"]:
+        at = TangentPoint(
+            u=arrays["factor_u"],
+            voltage=float(arrays["factor_voltage"]),
+            touching=arrays["factor_touching"],
+            frozen=bool(arrays["factor_frozen"]),
+            begin=arrays["factor_begin"],
+            duration=float(arrays["factor_duration"]),
+        )
+    return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
@@ -71,8 +82,8 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
             raise _unusable(name)
     if (np.diff(arrays["candidates"]) <= 0).any():
         raise _unusable("candidates")
-    if not 0.0 < arrays["part"] <= 1.0:
-        raise _unusable("part")
+    if not 0.0 < arrays["substep"] <= 1.0:
+        raise _unusable("substep")
     return arrays
 
 
@@ -84,20 +95,3 @@ def state_of(arrays: Mapping[str, np.ndarray]) -> State:
     """The state in the arrays of a checkpoint."""
     parts: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State)}
     return State(**parts | {"voltage": float(arrays["voltage"])})
-
-
-def carry_on(equilibrium: Equilibrium, state: State, arrays: Mapping[str, np.ndarray]) -> None:
-    """Put an equilibrium solver where it was after the step that led to `state`."""
-    equilibrium.linear.candidates = arrays["candidates"].astype(np.int64)
-    if arrays["factorised"]:
-        at = Linearised(
-            u=arrays["factor_u"],
-            voltage=float(arrays["factor_voltage"]),
-            touching=arrays["factor_touching"],
-            frozen=bool(arrays["factor_frozen"]),
-            begin=arrays["factor_begin"],
-            duration=float(arrays["factor_duration"]),
-        )
-        equilibrium.linear.restore(state, at)
-    if equilibrium.body.dynamics is not None:
-        equilibrium.body.dynamics.step = float(arrays["duration"])

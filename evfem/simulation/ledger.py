@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact import pad as outline
+from evfem.contact.pad import surface_state
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
@@ -36,7 +36,7 @@ class Ledger:
         self.sums["external_work"] += float(0.5 * (old.reaction + new.reaction) @ (new.bone - old.bone))
         moved = new.u[nodes] - old.u[nodes]
         self.sums["electrostatic_work"] += float(np.sum(0.5 * (old.attraction + new.attraction) * moved))
-        before, after = (outline.frame(model.surface, model.equilibrium.positions(s.u)) for s in (old, new))
+        before, after = (surface_state(model.surface, model.equilibrium.positions(s.u)) for s in (old, new))
         slip = 0.5 * (before.stretch + after.stretch) * moved[:, 0]
         slip[(new.status == STICK) | (new.status == OPEN)] = 0.0
         shear = 0.5 * (old.contact_force[:, 1] + new.contact_force[:, 1])
@@ -67,7 +67,7 @@ class Ledger:
             "electrostatic_force_x": float(attraction[0]),
             "contact_width": width,
             "real_contact_width": real,
-            "min_gap": float(outline.frame(model.surface, position).gap.min()),
+            "min_gap": float(surface_state(model.surface, position).gap.min()),
             **self.sums,
             "stored_energy": model.body.energy(state.u),
             "kinetic_energy": 0.0 if dynamics is None else dynamics.kinetic_energy(state.velocity),
@@ -79,7 +79,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     size, nodes = model.body.space.size, model.pad.nodes
     position = model.equilibrium.positions(state.u)
     length = model.pad.length(position[:, 0])
-    surface = outline.frame(model.surface, position)
+    surface = surface_state(model.surface, position)
     share = np.where(length > 0, length, np.inf)
 
     def on_pad(values: Any, off: float) -> Any:

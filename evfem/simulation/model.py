@@ -11,15 +11,17 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact import pad as outline
 from evfem.contact.attraction import Attraction
+from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
-from evfem.solver.equilibrium import Equilibrium, RigidOutline
+from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
+from evfem.solver.factorised import FactorisedBody
+from evfem.solver.interface import Interface
 from evfem.solver.state import Limits
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
@@ -37,10 +39,10 @@ class Model:
     scene: Scene
     mesh: Mesh
     body: Body
-    pad: outline.Pad
+    pad: Pad
     surface: Any
     attraction: Attraction | None
-    equilibrium: Equilibrium
+    equilibrium: StepSolver
     first_gap: float
 
     def bone(self, position: float, indentation: float) -> Floats:
@@ -60,7 +62,7 @@ def make_model(scene: Scene) -> Model:
     if needed.warning is not None:
         warnings.warn(needed.warning, stacklevel=2)
     space = make_space(mesh, element)
-    pad = outline.make_pad(mesh)
+    pad = make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
     terms = [
@@ -72,13 +74,15 @@ def make_model(scene: Scene) -> Model:
     if needed.has("time"):
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
-    solve = Equilibrium if needed.has("tissue") else RigidOutline
-    equilibrium = solve(
-        body, pad, surface, attraction, Limits(solver.tolerance, solver.strategy, solver.threads)
-    )
+    limits = Limits(solver.tolerance, solver.strategy, solver.threads)
+    interface = Interface(pad, mesh.points, surface, solver.tolerance)
     if solver.contact == "penalty":
         normal = float(solver.penalty_normal or 0.0)
-        equilibrium.interface.penalties = (normal, solver.penalty_tangential or normal)
+        interface.penalties = (normal, solver.penalty_tangential or normal)
+    equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
+    if needed.has("tissue"):
+        factorised = FactorisedBody(body, interface, attraction, limits)
+        equilibrium = Equilibrium(factorised, interface, attraction, limits)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 
@@ -96,7 +100,7 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     return surface, max(g0, 0.0)
 
 
-def make_attraction(scene: Scene, mesh: Mesh, pad: outline.Pad, surface: Any) -> Attraction:
+def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
     electrical = scene.finger.electrical
     thickness = None if electrical is None else electrical.stratum_corneum_thickness

@@ -31,7 +31,7 @@ from evfem.scene.scene import Scene
 
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-2"
+CHECKPOINT_FORMAT = "evfem-checkpoint-3"
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 #: what is shown of the last step, with units

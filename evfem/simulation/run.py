@@ -19,11 +19,20 @@ from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene
-from evfem.simulation.checkpoint import carried_arrays, carry_on, state_arrays, state_of, usable
+from evfem.simulation.checkpoint import reusable_arrays, reusable_of, state_arrays, state_of, usable
 from evfem.simulation.ledger import SUMS, Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
-from evfem.solver.state import State, StepFailed, Target
+from evfem.solver.control import (
+    FollowFriction,
+    Force,
+    GivenVoltage,
+    HeightControl,
+    Indentation,
+    Target,
+    VoltageControl,
+)
+from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 
 ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
@@ -111,7 +120,6 @@ class Run:
         return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
 
     # -- from motions to targets
-    # -------------------------------------------------------------------------------------
 
     def requests(self) -> Iterator[Request]:
         """The steps still to do; paths start from the state at the time they are asked for."""
@@ -126,7 +134,7 @@ class Run:
                 begin, end = (self._target(motion, start, j / motion.steps) for j in (k - 1, k))
                 if first + k == 1 and not isinstance(self.scene.voltage, VoltageProfile):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
-                    begin = replace(begin, voltage=0.0)
+                    begin = replace(begin, drive=GivenVoltage(0.0))
                 seconds = _duration(motion, start)
                 yield Request(first + k, index, motion.kind, self._path(begin, end, seconds), seconds)
 
@@ -142,11 +150,11 @@ class Run:
         row = self.rows[rows_before - 1]
         return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
 
-    def _target(self, motion: Motion, start: dict[str, float], share: float) -> Target:
-        """The target at `share` (0 to 1) of a motion."""
+    def _target(self, motion: Motion, start: dict[str, float], fraction: float) -> Target:
+        """The target at `fraction` (0 to 1) of a motion."""
 
         def towards(name: str, end: float) -> float:
-            return end if share == 1.0 else start[name] + share * (end - start[name])
+            return end if fraction == 1.0 else start[name] + fraction * (end - start[name])
 
         position, indentation, force = start["position"], start["indentation"], None
         voltage = start["voltage"]
@@ -164,46 +172,51 @@ class Run:
             force = start["applied_force"] if motion.hold == "force" else None
         if isinstance(self.scene.voltage, VoltageProfile):
             voltage = self.voltage_at(position)
-        wish = None
+        bone = self.model.bone(position, indentation)
+        height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
+        drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.scene.voltage, FollowForce) and isinstance(motion, Slide):
-            wish, voltage = float(self.scene.voltage(position)), self.scene.voltage.largest_voltage
-        return Target(self.model.bone(position, indentation), force, voltage, tangential_force=wish)
+            drive = self._following(self.scene.voltage, position)
+        return Target(position, height, drive)
+
+    @staticmethod
+    def _following(wish: FollowForce, position: float) -> FollowFriction:
+        return FollowFriction(float(wish(position)), wish.largest_voltage)
 
     def _path(self, start: Target, end: Target, seconds: float) -> Path:
-        """Straight from one target to the next; a voltage profile is followed on the way."""
+        """Straight from one target to the next; a voltage profile or wished force is followed on the way."""
 
-        def target(done: float, share: float) -> Target:
-            duration = (share - done) * seconds
-            if share == 1.0:
+        def target(done: float, fraction: float) -> Target:
+            duration = (fraction - done) * seconds
+            if fraction == 1.0:
                 return replace(end, duration=duration)
-            bone = start.bone + share * (end.bone - start.bone)
-            force = None
-            if start.force is not None and end.force is not None:
-                force = start.force + share * (end.force - start.force)
-            voltage = start.voltage + share * (end.voltage - start.voltage)
-            if isinstance(self.scene.voltage, VoltageProfile):
-                voltage = self.voltage_at(float(bone[0]))
-            wish = None
-            if isinstance(self.scene.voltage, FollowForce) and end.tangential_force is not None:
-                wish, voltage = float(self.scene.voltage(float(bone[0]))), end.voltage
-            return Target(bone, force, voltage, duration, wish)
+            x = start.x + fraction * (end.x - start.x)
+            return Target(x, start.height.towards(end.height, fraction), drive(x, fraction), duration)
+
+        def drive(x: float, fraction: float) -> VoltageControl:
+            wanted = self.scene.voltage
+            if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
+                return self._following(wanted, x)
+            if isinstance(wanted, VoltageProfile):
+                return GivenVoltage(self.voltage_at(x))
+            first, last = start.drive.voltage, end.drive.voltage
+            return GivenVoltage(first + fraction * (last - first))
 
         return target
 
     # -- one requested step
-    # -----------------------------------------------------------------------------------------------
 
     def advance(self, request: Request) -> Frame | None:
         """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         try:
-            self.state, parts = self.stepper.follow(self.state, request.path, self.ledger.accept)
+            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
         except StepFailed as error:
             advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
             raise NotConverged(request.step, error.residuals, advice, self.result()) from error
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
-        row["substeps"] = parts
+        row["substeps"] = substeps
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
@@ -227,7 +240,7 @@ class Run:
             "factorisations": record.factorisations,
             "contact_solves": record.contact_solves,
             "cuts": self.stepper.cuts,
-            "candidates": int(self.model.equilibrium.linear.candidates.size),
+            "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
         }
         return Result.from_rows(
@@ -235,14 +248,13 @@ class Run:
         )
 
     # -- checkpoints
-    # --------------------------------------------------------------------------------------------------------
 
     def checkpoint(self) -> dict[str, Any]:
         """Arrays from which the run can go on after its last converged step."""
         return {
             **state_arrays(self.state),
-            **carried_arrays(self.model.equilibrium),
-            "part": np.array(self.stepper.part),
+            **reusable_arrays(self.state, self.model.equilibrium.reusable()),
+            "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
             "sums": np.array([self.ledger.sums[name] for name in SUMS]),
         }
@@ -250,8 +262,8 @@ class Run:
     def _restore(self, saved: Saved) -> None:
         arrays = usable(saved, self.checkpoint(), self.scene.total_steps)
         self.state = state_of(arrays)
-        carry_on(self.model.equilibrium, self.state, arrays)
-        self.stepper.part, self.time = float(arrays["part"]), float(arrays["time"])
+        self.model.equilibrium.resume(self.state, reusable_of(arrays))
+        self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
         self.rows = list(saved.rows)
 

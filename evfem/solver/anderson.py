@@ -19,13 +19,11 @@ from dataclasses import replace
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.solver.state import KILOVOLT, State
-
-#: how many earlier iterations are remembered
-DEPTH = 3
+from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
+from evfem.solver.state import State
 
 
-class Mixing:
+class Anderson:
     """Remembers the last iterations of a step, as long as they used the same map."""
 
     def __init__(self) -> None:
@@ -44,8 +42,8 @@ class Mixing:
             self.reset()
             return after
         image = _vector(after)
-        self._steps = [*self._steps[-DEPTH:], (after.u - before.u).ravel()]
-        self._images = [*self._images[-DEPTH:], image]
+        self._steps = [*self._steps[-ANDERSON_DEPTH:], (after.u - before.u).ravel()]
+        self._images = [*self._images[-ANDERSON_DEPTH:], image]
         if len(self._steps) < 2:
             return after
         changes = np.diff(self._steps, axis=0)

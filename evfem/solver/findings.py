@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.constants import NAMED
 from evfem.contact.signorini import OPEN, STICK
 from evfem.solver.state import Balance, State
 from evfem.tissue.body import Body
-
-#: so many of the largest out-of-balance forces are named
-NAMED = 3
 
 
 def findings(body: Body, state: State, balance: Balance) -> str:

@@ -14,15 +14,11 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact import pad as outline
+from evfem.common.constants import CHANGES, HAIR, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates
+from evfem.contact.pad import Pad, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.solver.state import SMALLEST_FORCE, State
-
-#: how far inside the rougher side a node is pinned (mm): far above rounding, far below any mesh
-HAIR = 1e-9
-#: so many changes of side in one step show that neither side is consistent
-CHANGES = 3
+from evfem.solver.state import State
 
 
 class Pins:
@@ -79,7 +75,7 @@ class Pins:
 class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
 
-    def __init__(self, pad: outline.Pad, points: Floats, surface: Any, tolerance: float) -> None:
+    def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
         self.points = points[pad.nodes]
         self.penalties: tuple[float, float] | None = None
@@ -97,74 +93,75 @@ class Interface:
         """
         position = self.positions(state.u)
         touching = state.status != OPEN
-        position[touching, 1] -= outline.frame(self.surface, position).gap[touching]
+        position[touching, 1] -= surface_state(self.surface, position).gap[touching]
         return position
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        frame = outline.frame(self.surface, self.positions(state.u))
+        surface = surface_state(self.surface, self.positions(state.u))
         normal, shear = state.contact_force.T
-        slope, stretch = frame.slope, frame.stretch
+        slope, stretch = surface.slope, surface.stretch
         return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
 
-    def describe(self, old: State, state: State, c: Ints, fall: Floats, closing: Floats) -> Candidates:
-        """What the contact problem has to know of the candidates c; `fall` (P,) of the attraction, and what
-        it gains when a node closes (P,).
+    def candidates(
+        self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
+    ) -> Candidates:
+        """What the contact problem has to know of the candidates c (numbers of pad nodes); of every pad node
+        the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
         """
         position = self.positions(state.u)[c]
-        frame = outline.frame(self.surface, position)
-        softness = self._softness(old)[c]
+        surface = surface_state(self.surface, position)
+        compliance = self._compliance(old)[c]
         origin = self._origin(old)[c]
-        slip = frame.stretch * (position[:, 0] - origin) - softness[:, 1] * old.contact_force[c, 1]
+        slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
         friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
-        rise = np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape)
         return Candidates(
-            frame,
-            slip,
-            state.contact_force[c],
-            state.status[c],
-            friction,
-            softness,
-            fall[c],
-            closing[c],
-            rise,
+            surface=surface,
+            slip=slip,
+            force=state.contact_force[c],
+            status=state.status[c],
+            friction=friction,
+            friction_slope=np.broadcast_to(self.surface.friction_slope(position[:, 0]), friction.shape),
+            interface_compliance=compliance,
+            negative_stiffness=negative_stiffness[c],
+            gain_on_closing=gain_on_closing[c],
         )
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
-    def _softness(self, old: State) -> Floats:
+    def _compliance(self, old: State) -> Floats:
         """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
         exact.
         """
         if self.penalties is None:
             return np.zeros_like(old.contact_force)
-        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), 1e-3 * self.length)
+        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), SHORTEST_LENGTH * self.length)
         return 1.0 / np.outer(length, self.penalties)
 
     def _friction(self, x: Floats) -> Floats:
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
-    def deepest(self, state: State) -> float | None:
+    def shallowest_penetration(self, state: State) -> float | None:
         """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
-        gap = outline.frame(self.surface, self.positions(state.u)).gap
+        gap = surface_state(self.surface, self.positions(state.u)).gap
         sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[sunk].max()) if sunk.any() else None
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
         position = self.positions(state.u)
-        frame = outline.frame(self.surface, position)
+        surface = surface_state(self.surface, position)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
         if self.pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
             return False
         normal, shear = state.contact_force[active].T
-        slip = (frame.stretch * (position[:, 0] - self._origin(old)))[active]
-        softness = self._softness(old)[active]
-        slip = slip + softness[:, 1] * (shear - old.contact_force[active, 1])
+        slip = (surface.stretch * (position[:, 0] - self._origin(old)))[active]
+        compliance = self._compliance(old)[active]
+        slip = slip + compliance[:, 1] * (shear - old.contact_force[active, 1])
         x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
         limit = self._friction(x) * normal
         status = state.status[active]
@@ -175,6 +172,6 @@ class Interface:
             | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
             | (limit == 0.0)
         )
-        gap = frame.normal_gap[active] + softness[:, 0] * normal
+        gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())

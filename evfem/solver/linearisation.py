@@ -1,9 +1,15 @@
-"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for how long that
-serves.
+r"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for how long
+that serves.
 
-A factorisation is kept across iterations and steps. It is made again when the contact candidates change, when
-the residual stalls, when the time step is another one, or when more iterations than the
-strategy's `patience` would be left.
+A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_needed`)::
+
+    factorise at the present state if
+        there is no factorisation, or the contact candidates have changed, or
+        the time step is another one than it was made for, or
+        the residual has stalled, or falls so slowly that more iterations than `patience` would be left
+    S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
+
+The coupling is the stiffness that the attraction's tributary lengths add between neighbouring nodes.
 """
 
 from __future__ import annotations
@@ -14,22 +20,15 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact import pad as outline
+from evfem.common.constants import FAINT, LONGER, NEIGHBOURS, SHORTER, SLOW, SPARE, STALLED, STEEP
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import Condensed
+from evfem.contact.condensed import CondensedTangent
+from evfem.contact.pad import normals, surface_state
 from evfem.contact.signorini import OPEN, STICK
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
-from evfem.solver.state import Limits, Linearised, Record, State, StepFailed
+from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.tissue.body import Body
-
-#: candidates are chosen so many times more than needed, as every new choice costs an analysis of the matrix
-SPARE = 1.5
-#: an attraction that falls with the gap by more than this share of the tissue's shear modulus over its height
-#: makes its node a candidate
-SOFT = 0.02
-#: changes of tributary lengths that stiffen no node by more than this share are left to the iterations
-FAINT = 0.01
 
 
 class Linearisation:
@@ -47,13 +46,13 @@ class Linearisation:
         self.record = Record()
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
-        self.soft = SOFT * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
+        self.steep = STEEP * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
         self.factor: Any = None
-        self.condensed: Any = None
+        self.tangent: Any = None
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self.frozen = False
-        self._made: Linearised | None = None
+        self._made_at: TangentPoint | None = None
         self._outdated = False
 
     def begin(self, old: State, frozen: bool) -> None:
@@ -65,8 +64,10 @@ class Linearisation:
         dynamics = self.body.dynamics
         if dynamics is None:
             return
-        if self._made is not None:
-            self._outdated = not 0.67 * self._made.duration <= duration <= 1.5 * self._made.duration
+        if self._made_at is not None:
+            self._outdated = (
+                not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
+            )
         dynamics.begin(old.u, old.velocity, duration)
 
     def choose_candidates(self, state: State, reach: float) -> None:
@@ -74,15 +75,15 @@ class Linearisation:
         present set does not do.
         """
         position = self.interface.positions(state.u)
-        gap = np.where(self.pad.free, outline.frame(self.interface.surface, position).gap, np.inf)
-        steep = self.fall(state) > self.soft * self.pad.length(position[:, 0])
+        gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
+        steep = self.negative_stiffness(state) > self.steep * self.pad.length(position[:, 0])
         needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(gap)] = True
         if needed[self.candidates].sum() == needed.sum():
             return
         enough = np.sort(gap)[min(int(SPARE * needed.sum()), int(self.pad.free.sum()) - 1)]
-        wider = self.pad.free & ((gap <= max(enough, 4.0 * self.interface.length)) | needed)
+        wider = self.pad.free & ((gap <= max(enough, NEIGHBOURS * self.interface.length)) | needed)
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
 
@@ -92,11 +93,11 @@ class Linearisation:
         """Drop the factorisation, so that the next iteration starts from a fresh one."""
         self.factor = None
 
-    def renew(self, state: State, history: list[float]) -> bool:
+    def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
         """Factorise at the present state where there is no factorisation, the old one stalls, or a new
         one saves iterations; says whether it did.
         """
-        if self.factor is not None and not self._outdated and not self._stale(history):
+        if self.factor is not None and not self._outdated and not self._too_old(history):
             return False
         self.factorise(state)
         return True
@@ -114,34 +115,34 @@ class Linearisation:
             self.factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
-        self.condensed = Condensed.make(self.factor.schur, self._coupling(state))
+        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state))
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         dynamics = self.body.dynamics
         begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        self._made = Linearised(state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        self._made_at = TangentPoint(state.u, state.voltage, self.touching, self.frozen, begin, seconds)
         self.record.factorisations += 1
 
     def made_at(self, state: State) -> bool:
         """Whether the factorisation is that of `state`."""
-        return self._made is not None and self._made.u is state.u
+        return self._made_at is not None and self._made_at.u is state.u
 
     @property
-    def carried(self) -> Linearised | None:
+    def reusable(self) -> TangentPoint | None:
         """Where the factorisation was made that the next step may use, if there is one."""
-        return None if self.factor is None else self._made
+        return None if self.factor is None else self._made_at
 
-    def restore(self, state: State, at: Linearised) -> None:
+    def restore(self, state: State, at: TangentPoint) -> None:
         """Make the factorisation again that a run which goes on from `state` had made at `at`."""
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
         self.factorise(replace(state, u=at.u, voltage=at.voltage))
 
-    def _stale(self, history: list[float]) -> bool:
+    def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
             return False
         before, now = history[-2:]
-        if now > 0.1 or now > 0.5 * before:
+        if now > STALLED or now > SLOW * before:
             return True
         tolerance = self.limits.tolerance
         if now <= tolerance:
@@ -150,13 +151,13 @@ class Linearisation:
 
     # -- the attraction's part
 
-    def fall(self, state: State) -> Floats:
-        """How fast the attraction of every pad node falls with its gap (P,) in N/mm per mm."""
+    def negative_stiffness(self, state: State) -> Floats:
+        """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
-        return self.attraction.fall(self.interface.resting(state), state.voltage, self.touching)
+        return self.attraction.negative_stiffness(self.interface.resting(state), state.voltage, self.touching)
 
-    def closing(self, state: State) -> Floats:
+    def gain_on_closing(self, state: State) -> Floats:
         """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
@@ -168,9 +169,9 @@ class Linearisation:
         return np.maximum(now - closed, 0.0)
 
     def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for its fall with a node's own gap, which belongs
-        to the contact problem: what is left are changes of tributary lengths. None without attraction, or
-        where they are faint: a symmetric compliance takes a third of the time.
+        """The attraction's stiffness on the candidates but for the weakening with a node's own gap, which
+        belongs to the contact problem: what is left are changes of tributary lengths. None without
+        attraction, or where they are faint: a symmetric compliance takes a third of the time.
         """
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return None
@@ -183,8 +184,8 @@ class Linearisation:
         beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
         index = np.arange(unknowns.size)
         inner[index, 2 * (index // 2)] += beyond
-        normal = outline.normals(outline.frame(self.interface.surface, position[c]))
-        own = self.fall(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
+        normal = normals(surface_state(self.interface.surface, position[c]))
+        own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
         blocks = inner.reshape(c.size, 2, c.size, 2)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
         stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-2]

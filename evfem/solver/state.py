@@ -1,4 +1,4 @@
-"""Configurations of a body and what is asked of the next one: the nouns of the equilibrium solver."""
+"""Configurations of a body and what is asked of a step: the nouns of the equilibrium solver."""
 
 from __future__ import annotations
 
@@ -6,12 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from evfem.common.arrays import Floats, Ints
+from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
-
-#: voltages are squared and counted in kV^2 where they are an unknown
-KILOVOLT = 1000.0
-#: forces are compared with the largest reaction, or with this (N/mm) where it is smaller
-SMALLEST_FORCE = 1e-6
 
 
 class StepFailed(ArithmeticError):
@@ -26,10 +22,13 @@ class StepFailed(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """A converged configuration: displacements u (N, 2), contact forces on the pad nodes along the profile's
-    normal and tangent (P, 2), their statuses (P,), the bone's translation (2,), voltage, attraction on the
-    pad nodes (P, 2), forces on the bone (2,), nodal velocities (N, 2) in mm/s, and the displacements of the
-    step that led here (N, 2)."""
+    """A configuration of a body with N nodes, P of them on the pad.
+
+    Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and tangent
+    (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V, the attraction on
+    the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in mm/s, and the increment of
+    the displacements in the step that led here (N, 2).
+    """
 
     u: Floats
     contact_force: Floats
@@ -39,13 +38,18 @@ class State:
     attraction: Floats
     reaction: Floats
     velocity: Floats
-    trend: Floats
+    last_increment: Floats
+
+    @property
+    def touching(self) -> Any:
+        """Which pad nodes touch (P,) bool."""
+        return self.status != OPEN
 
 
 @dataclass(frozen=True, eq=False)
-class Linearised:
+class TangentPoint:
     """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,), whether the
-    attraction was frozen, and the step's displacements at its beginning (N, 2) and its seconds.
+    attraction was frozen, and the time step's displacements at its beginning (N, 2) and its seconds.
     """
 
     u: Floats
@@ -56,18 +60,15 @@ class Linearised:
     duration: float
 
 
-@dataclass(frozen=True)
-class Target:
-    """Where a step goes: bone translation (2,) in mm, or its x and the downward force on it (N/mm);
-    voltage (V); seconds it takes. With a wished `tangential_force` (N/mm, along x on the bone) the voltage is
-    found by the step, between 0 and `voltage`.
+@dataclass(frozen=True, eq=False)
+class Reusable:
+    """What a solver takes with it from step to step: the contact candidates (numbers of pad nodes), where its
+    factorisation was made if it has one, and the seconds of the last time step.
     """
 
-    bone: Floats
-    force: float | None
-    voltage: float
-    duration: float = 0.0
-    tangential_force: float | None = None
+    candidates: Ints
+    tangent_point: TangentPoint | None
+    duration: float
 
 
 @dataclass(frozen=True)
@@ -92,9 +93,10 @@ class Record:
 
 @dataclass(frozen=True)
 class Balance:
-    """Out-of-balance forces of the reduced unknowns (n,), and their largest relative to the
-    reaction.
+    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced unknowns in N/mm,
+    the largest of them relative to the reaction, and the attraction (P, 2) at its positions.
     """
 
     forces: Floats
     residual: float
+    attraction: Floats

@@ -1,7 +1,14 @@
-"""Adaptive steps: a requested step is reached exactly, in as many parts as its equilibria need.
+"""Adaptive steps: a requested step is reached exactly, in as many substeps as its equilibria need.
 
-A part that fails is halved; after a part that took few iterations the next one grows. Nothing that has not
-converged is kept.
+Algorithm (`Stepper.follow`)::
+
+    substep <- the one that worked last
+    repeat until the end of the path
+        solve one equilibrium at `done + substep`
+        if it failed: halve the substep, or give up at the strategy's smallest
+        else: accept; if it took few iterations, let the next substep grow
+
+Nothing that has not converged is kept.
 """
 
 from __future__ import annotations
@@ -11,46 +18,50 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.state import State, StepFailed, Target
+from evfem.common.constants import SMALLEST_FORCE, STAGGERED_LIMIT
+from evfem.solver.control import Target
+from evfem.solver.equilibrium import StepSolver
+from evfem.solver.state import State, StepFailed
 
-#: from the share of the way that is done (0 to 1) and the next one to the target there
+#: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
 
 
 @dataclass
 class Stepper:
-    """Follows paths with an equilibrium solver; remembers the part of a step that worked last."""
+    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
+    last.
+    """
 
-    equilibrium: Equilibrium
+    equilibrium: StepSolver
     coupling: str = "monolithic"
-    part: float = 1.0
+    substep: float = 1.0
     cuts: int = 0
 
     def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
-        """From `state` to the end of `path`; `accept(old, new)` sees every converged part. Returns the end
-        and the number of parts.
+        """From `state` to the end of `path`; `accept(old, new)` sees every converged substep. Returns the end
+        and the number of substeps.
 
-        Raises `StepFailed` when the smallest part fails; what was accepted before stays accepted.
+        Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
         """
-        done, parts, strategy = 0.0, 0, self.equilibrium.strategy
+        done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
         while done < 1.0:
-            share = 1.0 if self.part >= 1.0 - done - 1e-12 else done + self.part
+            fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
-                new = self.solve(state, path(done, share))
+                new = self.solve(state, path(done, fraction))
             except StepFailed:
                 self.cuts += 1
-                self.part = 0.5 * (share - done)
-                if self.part < strategy.smallest_part:
-                    self.part = 1.0
+                self.substep = 0.5 * (fraction - done)
+                if self.substep < strategy.smallest_part:
+                    self.substep = 1.0
                     raise
                 continue
             accept(state, new)
-            state, done, parts = new, share, parts + 1
+            state, done, substeps = new, fraction, substeps + 1
             if self.equilibrium.record.iterations - before <= strategy.easy:
-                self.part = min(1.0, strategy.growth * self.part)
-        return state, parts
+                self.substep = min(1.0, strategy.growth * self.substep)
+        return state, substeps
 
     def solve(self, state: State, target: Target) -> State:
         """One equilibrium with the coupling asked for: all at once, or mechanics under attraction found
@@ -59,14 +70,15 @@ class Stepper:
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:
             return equilibrium.step(state, target)
-        frozen = equilibrium.attraction_at(state, state, target.voltage)
+        voltage = target.drive.voltage
+        frozen = equilibrium.attraction_at(state, state, voltage)
         new = equilibrium.step(state, target, frozen)
         if self.coupling == "staggered_once":
             return new
-        for _ in range(200):
-            frozen = equilibrium.attraction_at(state, new, target.voltage)
+        for _ in range(STAGGERED_LIMIT):
+            frozen = equilibrium.attraction_at(state, new, voltage)
             change = np.abs(frozen - new.attraction).max()
-            if change <= equilibrium.tolerance * max(np.abs(new.reaction).max(), 1e-6):
+            if change <= equilibrium.tolerance * max(np.abs(new.reaction).max(), SMALLEST_FORCE):
                 return new
             new = equilibrium.step(state, target, frozen, start=new)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

@@ -1,0 +1,91 @@
+"""Every constant of the contact and equilibrium solvers in one table.
+
+None of them decides what is accepted: an accepted step satisfies the scene's tolerance whatever they are.
+They decide how an equilibrium is found, and how soon. "seen in" names the scenes in which another value was
+worse; the groups are those of `evfem study stability`, A and B the scenes of `evfem study peers`. What a user
+may change is in `evfem.solver.strategy`.
+
+======================  ========================================================================  ==========
+constant                meaning                                                                   seen in
+======================  ========================================================================  ==========
+SMALLEST_FORCE          forces are compared with the largest reaction, N/mm, or with this
+KILOVOLT                squared voltages are counted in kV^2 where they are an unknown
+SMALLEST_J              no update shrinks a sampled volume below this ratio                       tissue
+SHORTEST_FRACTION       an update that must be cut below this fails the step                      tissue
+LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
+                        body's height in one iteration
+PAD_BONE_INCREMENT      the same for the remembered pad, which has no cells to collapse           fast model
+PAD_TOLERANCE           no step of the remembered pad is solved further: what is remembered is    fast model
+                        off by more
+PAD_WEIGHT_CHANGE       its mean compliance is kept while its weights change by less than this    fast model
+PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage changes by       fast model
+                        less than this fraction
+PAD_SPARE, PAD_FEWEST   so many times more of its nodes are in play than touch, and so many more  fast model
+PAD_SPRING              stiffness of the spring that holds it without contact, relative to that   fast model
+                        of a node
+GROWTH_LIMIT            a residual so many times the smallest of the step ends it,                contact
+GROWTH_GRACE            but not before so many iterations
+SPARE                   candidates are chosen so many times more than needed, as every new        A
+                        choice costs an analysis of the matrix
+REACH                   a gap below so many times the step's travel makes a candidate             A
+NEIGHBOURS              and so does one below so many node distances once any is chosen           B
+STEEP                   an attraction whose negative stiffness exceeds this fraction of the       thin
+                        softest shear modulus per height of the body makes its node a candidate   insulators
+FAINT                   changes of tributary lengths that stiffen no node by more than this       C
+                        fraction are left to the iterations
+WEAK                    an attraction whose feedback on its own node is below this fraction       C
+                        is left to the next iteration
+STALLED, SLOW           a residual above the first, or above the second times the last one,       A, B
+                        asks for a new factorisation
+SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
+                        made for
+ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
+ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
+STABLE                  fraction of the critical negative stiffness that is used if the           attraction
+                        attraction weakens with the gap faster than the tissue stiffens
+LOST                    so many such iterations in a row show that nodes are being lost           attraction
+ROUNDING                violations below this fraction of the largest force are rounding
+UNHELD                  pivots of the bone below this fraction belong to a body that nothing holds
+HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
+                        mm: far above rounding, far below any mesh
+CHANGES                 so many changes of side in one step show that neither side is             jumps
+                        consistent
+SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
+                        distance
+STAGGERED_LIMIT         rounds of the staggered coupling
+NAMED                   so many of the largest out-of-balance forces are named in a failure
+======================  ========================================================================  ==========
+"""
+
+SMALLEST_FORCE = 1e-6
+KILOVOLT = 1000.0
+SMALLEST_J = 0.05
+SHORTEST_FRACTION = 1.0 / 64.0
+LARGEST_BONE_INCREMENT = 0.05
+PAD_BONE_INCREMENT = 0.1
+PAD_TOLERANCE = 1e-5
+PAD_WEIGHT_CHANGE = 1.5
+PAD_VOLTAGE_CHANGE = 0.1
+PAD_SPARE, PAD_FEWEST = 1.2, 8
+PAD_SPRING = 1e-9
+GROWTH_LIMIT = 1e3
+GROWTH_GRACE = 8
+SPARE = 1.5
+REACH = 1.2
+NEIGHBOURS = 4.0
+STEEP = 0.02
+FAINT = 0.01
+WEAK = 1e-4
+STALLED, SLOW = 0.1, 0.5
+SHORTER, LONGER = 0.67, 1.5
+ANDERSON_DEPTH = 3
+ACTIVE_SET_LIMIT = 60
+STABLE = 0.9
+LOST = 3
+ROUNDING = 1e-12
+UNHELD = 1e-10
+HAIR = 1e-9
+CHANGES = 3
+SHORTEST_LENGTH = 1e-3
+STAGGERED_LIMIT = 200
+NAMED = 3

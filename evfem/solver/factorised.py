@@ -1,0 +1,281 @@
+r"""Finite elements behind `evfem.solver.equilibrium.LinearisedBody`: factorise, solve contact, move.
+
+With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and the bone b,
+
+.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b = g_c + \lambda^+ - \lambda + \Delta f, \qquad
+          S_{bc}\,\Delta u_c + S_{bb}\,\Delta u_b = g_b + F_b .
+
+The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the new forces
+(`evfem.contact.condensed`). Algorithm (`FactorisedBody.advance`), one outer iteration::
+
+    factorise at the iterate if the factorisation at hand has become too old
+    g <- forward elimination of -R
+    forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
+    if the bone would move too far for a linear step: shorten its travel and solve contact again
+    du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
+    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`)
+
+Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import (
+    KILOVOLT,
+    LARGEST_BONE_INCREMENT,
+    LOST,
+    REACH,
+    SHORTEST_FRACTION,
+    SMALLEST_FORCE,
+    SMALLEST_J,
+)
+from evfem.contact.attraction import Attraction
+from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.signorini import ContactNotSolved
+from evfem.solver.anderson import Anderson
+from evfem.solver.control import Drive, DrivenStep, Target
+from evfem.solver.findings import findings
+from evfem.solver.interface import Interface
+from evfem.solver.linearisation import Linearisation
+from evfem.solver.state import Balance, Limits, Reusable, State, StepFailed
+from evfem.tissue.body import Body
+
+
+@dataclass(frozen=True, eq=False)
+class Update:
+    """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2) in mm, the
+    squared voltage in kV^2; and the fraction of it that may be taken.
+    """
+
+    contact: StepSolution
+    bone: Floats
+    u: Floats
+    squared: float
+    fraction: float
+
+
+class FactorisedBody:
+    """The finger's finite elements: contact is solved on their condensed tangent."""
+
+    def __init__(
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+    ) -> None:
+        self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
+        self.size, self.pad = body.space.size, interface.pad
+        self.linearisation = Linearisation(body, interface, attraction, limits)
+        self.record = self.linearisation.record
+        self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        self._anderson = Anderson()
+        self._scaled_down = 0
+
+    # -- a step begins
+
+    def known(self, old: State, target: Target) -> None:
+        """Nothing is known without iterating."""
+        return
+
+    def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
+        """Prepare everything for a step, and say where its iterations start."""
+        self.linearisation.begin(old, frozen)
+        state = self._first_guess(start, target)
+        travel = abs(target.bone(old.bone)[1] - old.bone[1])
+        self.linearisation.choose_candidates(state, REACH * travel)
+        self.linearisation.start_clock(old, target.duration)
+        self._anderson.reset()
+        self._scaled_down = 0
+        return state
+
+    def _first_guess(self, state: State, target: Target) -> State:
+        """Where iterations begin: the present state moved on along its last increment, or with the bone if
+        nothing touches.
+        """
+        state = replace(state, voltage=target.drive.guess(state.voltage))
+        if state.touching.any():
+            return self._extrapolated(state, target)
+        bone = target.bone(state.bone)
+        return replace(state, u=state.u + (bone - state.bone), bone=bone)
+
+    def _extrapolated(self, state: State, target: Target) -> State:
+        """As far along the last increment of the displacements as the bone's next one is along its last."""
+        node = self.body.space.mesh.node_sets["bone"][0]
+        last, way = state.last_increment[node], target.bone(state.bone) - state.bone
+        axis = int(np.argmax(np.abs(way)))
+        if way[axis] * last[axis] <= 0.0:
+            return state
+        fraction = min(float(way[axis] / last[axis]), self.limits.strategy.reach)
+        u = state.u + fraction * state.last_increment
+        if not self.body.tissue.smallest_J(u) > SMALLEST_J:
+            return state
+        return replace(state, u=u, bone=u[node].copy())
+
+    # -- how far from equilibrium
+
+    def balance(self, state: State, attraction: Floats, target: Target) -> tuple[State, Balance]:
+        """Out-of-balance forces of the reduced unknowns and their relative size."""
+        nodal = self.body.forces(state.u)
+        nodal[self.pad.nodes] -= attraction + self.interface.contact_forces(state)
+        forces = self.body.reduce(nodal)
+        reaction = forces[self.body.bone]
+        rounding = self._rounding(state) / self.limits.tolerance
+        largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
+        dim = state.bone.size
+        sums = np.abs(forces[:-dim].reshape(-1, dim).sum(axis=0)).max()
+        missing = (target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction))
+        free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
+        state = replace(state, attraction=attraction, reaction=reaction)
+        return state, Balance(forces, float(free / largest), attraction)
+
+    def _rounding(self, state: State) -> float:
+        """Forces (N/mm) below which the balance is rounding of displacements that contain the bone's
+        travel.
+        """
+        epsilon = float(np.finfo(float).eps)
+        return 4.0 * epsilon * self.linearisation.stiffest * float(np.abs(state.bone).max())
+
+    # -- one outer iteration
+
+    def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """The next iterate, with the factorisation at hand if that does and a new one if not."""
+        if self.linearisation.refactorise_if_needed(state, self.record.residuals):
+            self._anderson.reset()
+        try:
+            after = self._linear_step(old, state, target, balance)
+        except ContactNotSolved:
+            # an older tangent may ask for what no contact can give
+            if self.linearisation.made_at(state):
+                raise
+            self.linearisation.factorise(state)
+            self._anderson.reset()
+            after = self._linear_step(old, state, target, balance)
+        mixed = self._anderson.next_iterate(state, after)
+        # what is given is kept to the last digit
+        height = mixed.bone[1] if target.height.free else after.bone[1]
+        voltage = mixed.voltage if target.drive.free else after.voltage
+        return replace(mixed, bone=np.array([after.bone[0], height]), voltage=voltage)
+
+    def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
+        factor = self.linearisation.factor
+        saved, residual = factor.forward(-balance.forces)
+        step = self._contact_step(old, state, target, residual)
+        driven = self._driven(step, state, target)
+        if driven.change:
+            saved = saved + driven.change * driven.unit
+        found, bone = self._limited(step, driven.solution, state, target)
+        delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
+        update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
+        return self._moved(state, target, update)
+
+    def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
+        """The linear contact problem at an iterate."""
+        linearisation = self.linearisation
+        weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
+        return LinearContactStep(
+            body=linearisation.tangent,
+            candidates=self.interface.candidates(old, state, linearisation.candidates, weakening, gain),
+            residual=residual,
+            bone=target.bone(state.bone) - state.bone,
+            unknowns=target.height.unknowns(linearisation.tangent, float(state.bone[1])),
+            snap=self._scaled_down >= LOST,
+        )
+
+    def _solve(self, step: LinearContactStep) -> StepSolution:
+        found = step.solve()
+        self.record.contact_solves += found.solves
+        self._scaled_down = self._scaled_down + 1 if found.reduced else 0
+        return found
+
+    def _driven(self, step: LinearContactStep, state: State, target: Target) -> DrivenStep:
+        """Contact as the voltage control wants it, with the attraction of one kV^2 at its disposal."""
+
+        def unit() -> tuple[Floats, Floats]:
+            assert self.attraction is not None
+            nodal = np.zeros_like(state.u)
+            touching = self.linearisation.touching
+            position = self.interface.resting(state)
+            nodal[self.pad.nodes] = self.attraction.forces(position, KILOVOLT, touching)
+            return self.linearisation.factor.forward(self.body.reduce(nodal))
+
+        squared = (state.voltage / KILOVOLT) ** 2
+        return target.drive.solve(step, Drive(squared, self._solve, unit))
+
+    def _limited(
+        self, step: LinearContactStep, found: StepSolution, state: State, target: Target
+    ) -> tuple[StepSolution, Floats]:
+        """The solution and the bone's increment (2,), shortened where it is too long for a linear step."""
+        if not step.unknowns:
+            return found, step.bone
+        bone = np.array([step.bone[0], found.extra[0]])
+        missing = target.height.missing(float(state.bone[1]), state.reaction)
+        flies = not found.status.any() and bone[1] * missing < 0.0
+        if abs(bone[1]) > self.largest_bone_increment or flies:
+            # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
+            # part of the way, the way the missing force pushes
+            bone[1] = np.copysign(self.largest_bone_increment, missing if flies else bone[1])
+            found = self._solve(replace(step, bone=bone, unknowns=()))
+        return found, bone
+
+    def _moved(self, state: State, target: Target, update: Update) -> State:
+        """The iterate after the fraction of an update that may be taken."""
+        c, fraction = self.linearisation.candidates, update.fraction
+        force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
+        force[c], status[c] = update.contact.force, update.contact.status
+        whole = fraction == 1.0 and not target.height.free
+        voltage = state.voltage
+        if update.squared:
+            squared = (voltage / KILOVOLT) ** 2 + fraction * update.squared
+            voltage = KILOVOLT * float(np.sqrt(max(squared, 0.0)))
+        return replace(
+            state,
+            u=state.u + fraction * update.u,
+            contact_force=state.contact_force + fraction * (force - state.contact_force),
+            status=status,
+            bone=target.bone(state.bone) if whole else state.bone + fraction * update.bone,
+            voltage=voltage,
+        )
+
+    def _largest_fraction(self, u: Floats, delta: Floats) -> float:
+        """Largest fraction 1, 1/2, 1/4 ... of an update that keeps every sampled volume."""
+        fraction = 1.0
+        while not self.body.tissue.smallest_J(u + fraction * delta) > SMALLEST_J:
+            fraction *= 0.5
+            if fraction < SHORTEST_FRACTION:
+                raise StepFailed("cells would collapse", self.record.residuals)
+        return fraction
+
+    # -- a step ends
+
+    def accepted(self, old: State, state: State) -> State:
+        """The converged state with its velocity and its increment."""
+        return replace(state, velocity=self.body.velocity(state.u), last_increment=state.u - old.u)
+
+    def admit(self, state: State, gap: float) -> None:
+        """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
+        self.linearisation.choose_candidates(state, max(0.0, gap))
+
+    def forget(self) -> None:
+        """Drop the factorisation, so that the next step starts from a fresh one."""
+        self.linearisation.forget()
+
+    def findings(self, state: State, balance: Balance) -> str:
+        """The largest out-of-balance forces, the state of contact and the smallest volume ratio."""
+        return findings(self.body, state, balance)
+
+    def reusable(self) -> Reusable:
+        """Candidates, where the factorisation was made, and the last time step."""
+        dynamics, linearisation = self.body.dynamics, self.linearisation
+        duration = 0.0 if dynamics is None else dynamics.step
+        return Reusable(linearisation.candidates, linearisation.reusable, duration)
+
+    def resume(self, state: State, carried: Reusable) -> None:
+        """Make the factorisation again that the interrupted run had at hand."""
+        self.linearisation.candidates = carried.candidates
+        if carried.tangent_point is not None:
+            self.linearisation.restore(state, carried.tangent_point)
+        if self.body.dynamics is not None:
+            self.body.dynamics.step = carried.duration
