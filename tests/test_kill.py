@@ -128,7 +128,7 @@ DAMAGES = {
     "nodes elsewhere": (lambda p: replaced(p, state__candidates=np.array([3, 9999])), "no usable candidates"),
     "nodes twice": (lambda p: replaced(p, state__candidates=np.array([3, 3])), "no usable candidates"),
     "status 7": (lambda p: replaced(p, state__status=np.full(25, 7)), "no usable status"),
-    "part 0": (lambda p: replaced(p, state__part=np.array(0.0)), "no usable part"),
+    "part 0": (lambda p: replaced(p, state__substep=np.array(0.0)), "no usable substep"),
     "no rows": (lambda p: row_changed(p, list.clear), "damaged"),
     "row lost": (lambda p: row_changed(p, lambda rows: rows.pop(2)), "damaged"),
     "row not finite": (lambda p: row_changed(p, lambda rows: rows[6].update(position=1e999)), "damaged"),
