@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from fakes import SQUARE_SCENE, square_mesh
+from tools.fakes import SQUARE_SCENE, square_mesh
 
 import evfem
 from evfem import cli

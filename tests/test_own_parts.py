@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import INSULATOR, SKIN, block
 from matplotlib.figure import Figure
+from tools.builders import INSULATOR, SKIN, block
 
 import evfem as ev
 from evfem.contact.own import completed

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fakes import KINDS, fake_result, square_mesh
 from matplotlib.collections import LineCollection, PolyCollection
+from tools.fakes import KINDS, fake_result, square_mesh
 
 from evfem.errors import InputError
 from evfem.plotting import FIELDS, contact_pressure, deformed, forces, regions
