@@ -1,5 +1,7 @@
 """Whole scenes: the benchmark, symmetry, balances of forces and energies, history and checkpoints."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from tools.builders import INSULATOR, balance, benchmark_scene, block, finger
@@ -39,31 +41,47 @@ def columns(result, *names):
 # -- the benchmark ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("kind", "table"), [("A", TABLE_A), ("B", TABLE_B)])
-def test_benchmark_on_the_second_mesh_with_the_default_element(kind, table):
-    result = simulate(benchmark_scene(kind, 1))
-    np.testing.assert_allclose(numbers_of(kind, result), table, rtol=3e-3)
-    assert balance(result).max() < 1e-7
+@cache
+def benchmark(kind, level, element=None):
+    return simulate(benchmark_scene(kind, level, element))
 
 
-@pytest.mark.parametrize(("kind", "table"), [("A", TABLE_A), ("B", TABLE_B)])
-def test_benchmark_on_the_second_mesh_with_plain_linear_quads(kind, table):
-    result = simulate(benchmark_scene(kind, 1, "q1"))
-    error = numbers_of(kind, result) / table - 1.0
-    assert (error[:3] > 0.007).all()  # plain quads are too stiff
-    assert (error[:3] < 0.012).all()
-    assert (error < 0.016).all()
+def benchmark_error(kind, level, element=None):
+    """Relative errors of the benchmark's numbers."""
+    table = TABLE_A if kind == "A" else TABLE_B
+    return numbers_of(kind, benchmark(kind, level, element)) / table - 1.0
 
 
+@pytest.mark.parametrize("kind", ["A", "B"])
+@pytest.mark.parametrize(
+    ("level", "error"), [(0, 5e-3), pytest.param(1, 3e-3, marks=pytest.mark.slow)], ids=["first", "second"]
+)
+def test_benchmark_with_the_default_element(kind, level, error):
+    assert np.abs(benchmark_error(kind, level)).max() < error
+    assert balance(benchmark(kind, level)).max() < 1e-7
+
+
+def test_plain_linear_quads_are_too_stiff_by_the_square_of_their_size():
+    coarse, fine = (benchmark_error("A", level, "q1") for level in (0, 1))
+    assert (fine > 0.007).all()
+    assert (fine < 0.012).all()
+    assert (coarse > 3.2 * fine).all()
+    assert (coarse < 4.2 * fine).all()
+    # with friction a coarse mesh errs by as much in the shear forces
+    errors = benchmark_error("B", 0, "q1")
+    assert (errors > 0.015).all()
+    assert (errors < 0.05).all()
+
+
+@pytest.mark.slow
 def test_benchmark_on_the_third_mesh_is_as_stiff_as_the_other_packages():
     # linear quads of the other packages: 0.13 to 0.16 % above the table there; here within 0.1 % of that
-    result = simulate(benchmark_scene("A", 2, "q1"))
-    np.testing.assert_allclose(numbers_of("A", result), 1.00145 * TABLE_A, rtol=1e-3)
-    assert balance(result).max() < 1e-7
+    assert np.abs(benchmark_error("A", 2, "q1") - 0.00145).max() < 1e-3
+    assert balance(benchmark("A", 2, "q1")).max() < 1e-7
 
 
 def test_full_slip_has_exactly_the_friction_coefficient():
-    result = simulate(benchmark_scene("B", 0))
+    result = benchmark("B", 0)
     assert result.tangential_force[-1] == pytest.approx(0.3 * result.normal_force[-1], rel=1e-9)
     assert (result.tangential_force <= 0.3 * result.normal_force * (1.0 + 1e-9)).all()
     # reached only near 2.6 mm, whatever the mesh
@@ -158,14 +176,14 @@ def energy_error(result):
 def test_the_energy_balance_closes_and_improves_with_smaller_steps(name):
     options = dict(BALANCED[name])
     surface, errors = options.pop("surface"), []
-    for steps in (25, 50, 100):
+    for steps in (25, 50):
         motion = Press(indentation=0.3, steps=steps // 2), Slide(0.6, steps=steps - steps // 2)
         result = run(surface, *motion, output=Output(every=1000), **options)
         errors.append(abs(energy_error(result)))
         assert result.stored_energy[-1] > 0.001
         assert result.friction_dissipation[-1] > 1e-4
-    assert errors[1] < 0.01
-    assert errors[2] < 0.6 * errors[0]
+    assert errors[1] < 1e-3
+    assert errors[1] < 0.4 * errors[0]  # of second order: a quarter
 
 
 def test_electrostatic_work_is_counted_when_the_voltage_moves_the_pad():
