@@ -33,7 +33,9 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
+from evfem.scene import file as _scene_file
 from evfem.scene.motion import Hover as Hover
 from evfem.scene.motion import Press as Press
 from evfem.scene.motion import Slide as Slide
@@ -68,9 +70,13 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.tissue import laws as _laws
 from evfem.tissue.laws import LinearElastic as LinearElastic
 from evfem.tissue.laws import NeoHookean as NeoHookean
 from evfem.tissue.laws import Ogden as Ogden
 from evfem.tissue.laws import Yeoh as Yeoh
 
+materials = _laws
+meshfile = _mesh_file
+scenefile = _scene_file
 __version__: str

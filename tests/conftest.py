@@ -3,4 +3,4 @@
 from importlib.util import find_spec
 
 #: compiled loops are part of evfem[fast]
-collect_ignore = [] if find_spec("numba") else ["test_lanes.py", "test_viscous.py"]
+collect_ignore = [] if find_spec("numba") else ["tissue/kernels"]

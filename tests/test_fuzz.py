@@ -10,9 +10,9 @@ from contextlib import contextmanager
 import numpy as np
 import pytest
 from evfem.studies import fuzzing
-from fakes import fake_result, square_mesh
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tools.fakes import fake_result, square_mesh
 
 from evfem.common import tables
 from evfem.contact.surfaces import Flat, Profile, Sinusoid

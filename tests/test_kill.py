@@ -1,8 +1,6 @@
 """Nothing is lost: runs that are killed, disks that are full, checkpoints damaged or of other scenes."""
 
-import contextlib
 import errno
-import io
 import json
 import os
 import shutil
@@ -11,25 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from evfem.studies import killing
+from tools.commands import called
 
 import evfem
-from evfem import cli, export, runfolder
+from evfem import export, runfolder
 from evfem.common import storage
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
 from evfem.simulation.result import COLUMNS, Saved, csv_header
 from evfem.simulation.run import simulate
-
-
-def called(folder, *words):
-    """Exit status and standard error of the command, called in this process in `folder`."""
-    error, before = io.StringIO(), Path.cwd()
-    os.chdir(folder)
-    try:
-        with contextlib.redirect_stderr(error), contextlib.redirect_stdout(io.StringIO()):
-            return cli.main([*map(str, words)]), error.getvalue()
-    finally:
-        os.chdir(before)
 
 
 def contents(folder):
@@ -83,14 +71,22 @@ def interrupted(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="module")
+def whole(interrupted):
+    """The folder of the same run from its first step to its last."""
+    assert called(interrupted, "run", "force.toml", "--no-plots", "--no-fields", "--out", "whole")[0] == 0
+    return interrupted / "whole"
+
+
 @pytest.fixture
 def place(interrupted, tmp_path):
     """A copy of that folder."""
-    return shutil.copytree(interrupted, tmp_path / "place")
+    return shutil.copytree(interrupted, tmp_path / "place", ignore=shutil.ignore_patterns("whole"))
 
 
 def run(place, *more):
-    return called(place, "run", "force.toml", "--out", "stopped", "--no-plots", *more)
+    status, _, error = called(place, "run", "force.toml", "--out", "stopped", "--no-plots", *more)
+    return status, error
 
 
 def replaced(path, **changes):
@@ -234,7 +230,7 @@ class Full:
 
 @pytest.mark.parametrize("room", [0, 1, 2, 3, 11, 20, 23, 24, 25, 29, 50])
 def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_later(
-    place, monkeypatch, room
+    place, whole, monkeypatch, room
 ):
     before = killing.history(place / "stopped" / "history.csv")
     Full(room, monkeypatch)
@@ -248,9 +244,8 @@ def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_l
     now = killing.history(place / "stopped" / "history.csv")
     assert {name: column[:7] for name, column in now.items()} == before
     assert run(place, "--resume")[0] == 0
-    assert run(place, "--out", "whole", "--no-fields")[0] == 0
     # the last digits may differ: PARDISO's depend on where its memory lies
-    assert killing.difference(place / "stopped", place / "whole")[0] < 1e-12
+    assert killing.difference(place / "stopped", whole)[0] < 1e-12
 
 
 def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
@@ -264,7 +259,7 @@ def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
             f"{storage.__name__}.{'os.replace' if name == 'replace' else 'open'}", refuse, raising=False
         )
     monkeypatch.setattr(Path, "write_text", refuse)
-    status, error = called(place, "run", "force.toml", "--out", "stopped", "--no-plots")
+    status, error = run(place)
     monkeypatch.undo()
     assert status == 4
     assert "Permission denied" in error.splitlines()[-1]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from builders import INSULATOR, SKIN, block
 from matplotlib.figure import Figure
+from tools.builders import INSULATOR, SKIN, block
 
 import evfem as ev
 from evfem.contact.own import completed
@@ -270,7 +270,8 @@ def test_objects_that_are_no_surface() -> None:
     class Rough(Waves):
         friction = -1.0
 
-    for wrong in (object(), Waves, 3.0):
+    no_surfaces: list[Any] = [object(), Waves, 3.0]
+    for wrong in no_surfaces:
         with pytest.raises(InputError, match=r"surface: given .*an object with a method height\(x\)"):
             ev.Scene(pad(), wrong, motion=[PRESS])
     with pytest.raises(InputError, match=r"surface\.friction: given -1\.0"):

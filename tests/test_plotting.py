@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fakes import KINDS, fake_result, square_mesh
 from matplotlib.collections import LineCollection, PolyCollection
+from tools.fakes import KINDS, fake_result, square_mesh
 
 from evfem.errors import InputError
 from evfem.plotting import FIELDS, contact_pressure, deformed, forces, regions
@@ -145,7 +145,7 @@ def test_axes_that_are_given_are_used(tmp_path):
 def test_matplotlib_is_loaded_only_when_something_is_drawn_and_pyplot_never(tmp_path):
     code = (
         "import sys, evfem.plotting as p; assert 'matplotlib' not in sys.modules\n"
-        "from fakes import fake_result; p.forces(fake_result()).figure.savefig('f.png')\n"
+        "from tools.fakes import fake_result; p.forces(fake_result()).figure.savefig('f.png')\n"
         "assert 'matplotlib' in sys.modules and 'matplotlib.pyplot' not in sys.modules"
     )
     command = [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}\n{code}"]

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from fakes import fake_frame, fake_row, square_mesh
+from tools.fakes import fake_frame, fake_row, square_mesh
 
 from evfem import export
 from evfem.errors import InputError, StorageError

@@ -7,7 +7,7 @@ start.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
@@ -116,6 +116,16 @@ class Output:
         set_frozen(self, every=count("every", self.every))
 
 
+class Motions:
+    """What `Scene.motion` is: given one motion or several, it is a tuple of them."""
+
+    def __get__(self, scene: Scene | None, owner: type[Scene]) -> tuple[Motion, ...]:
+        return () if scene is None else vars(scene)["motion"]
+
+    def __set__(self, scene: Scene, motions: Motion | Sequence[Motion]) -> None:
+        vars(scene)["motion"] = (motions,) if isinstance(motions, Motion) else tuple(motions)
+
+
 @dataclass(frozen=True)
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
@@ -130,7 +140,7 @@ class Scene:
     surface: Surface
     law: ForceLaw | None = None
     voltage: float | VoltageProfile | FollowForce = 0.0
-    motion: Sequence[Motion] = ()
+    motion: Motions = Motions()
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
     coupling: str = field(default="monolithic", kw_only=True)
@@ -141,7 +151,7 @@ class Scene:
 
     def __post_init__(self) -> None:
         _check_parts(self)
-        set_frozen(self, motion=_motions(self.motion), forms=tuple(self.forms))
+        set_frozen(self, forms=tuple(self.forms))
         _check_electrostatics(self)
         _check_motion(self)
         _check_dynamics(self)
@@ -208,16 +218,11 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("name", scene.name, "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):
         raise InputError("forms", scene.forms, "terms as made by Scene.with_term")
-
-
-def _motions(motions: Motion | Iterable[Motion]) -> tuple[Motion, ...]:
-    listed = (motions,) if isinstance(motions, Motion) else tuple(motions)
-    if not listed:
+    if not scene.motion:
         raise InputError("motion", "nothing", "at least one of Press, Slide, Hover, VoltageRamp")
-    for i, motion in enumerate(listed):
+    for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
             raise InputError(f"motion[{i}]", motion, "Press, Slide, Hover or VoltageRamp")
-    return listed
 
 
 def _check_electrostatics(scene: Scene) -> None:

@@ -1,0 +1,141 @@
+"""What objects say of themselves: short, true, complete where it counts, and safe inside a page."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from tools.fakes import fake_result
+
+import evfem as ev
+from evfem.scene import file as scenefile
+from evfem.simulation.result import Result
+
+NAIL = ev.NeoHookean(E=20.0, nu=0.3)
+EVIL = "<script>alert('&')</script>"
+
+
+def rows(page):
+    """Caption, {heading: text} and the curves of a small table; it must be well-formed."""
+    tree = ElementTree.fromstring(page)
+    assert tree.tag == "table"
+    found = {tr.find("th").text: tr.find("td").text for tr in tree.iter("tr") if tr.find("th") is not None}
+    return tree.find("caption").text, found, list(tree.iter("polyline"))
+
+
+def test_a_finger_shows_what_differs_from_table_2():
+    assert repr(ev.FingerPad()) == "FingerPad()"
+    finger = ev.FingerPad(ridge_height=0.1, resolution="coarse", materials={"nail": NAIL})
+    known = {"FingerPad": ev.FingerPad, "NeoHookean": ev.NeoHookean}
+    name, _, arguments = repr(finger).partition("(")
+    assert name in known
+    assert arguments == f"ridge_height=0.1, resolution='coarse', materials={{'nail': {NAIL!r}}})"
+    caption, found, _ = rows(finger._repr_html_())
+    assert caption == "FingerPad"
+    assert found["ridges"] == "0.1 mm high, every 0.5 mm"
+    assert found["materials"].startswith("{'nail': NeoHookean(E=20.0")
+    assert rows(ev.FingerPad(ridges=False)._repr_html_())[1]["ridges"] == "none"
+
+
+def test_a_scene_shows_itself_in_at_most_three_lines():
+    scene = ev.default_scene()
+    lines = repr(scene).splitlines()
+    assert lines[0].startswith("Scene 'default': FingerPad() on Display(insulator=Layer(thickness=0.09")
+    assert lines[0].endswith("at 1000 V")
+    assert lines[1:] == ["  Press(force=0.05), Slide(distance=5.0)"]
+    special = replace(
+        scene, solver=ev.Solver(element="q1"), air_layer=False, motion=[ev.Press(force=0.1)] * 40
+    )
+    lines = repr(special).splitlines()
+    assert len(lines) == 3
+    assert lines[1].endswith("... (40 motions)")
+    assert "air_layer=False" in lines[2]
+    assert "element='q1'" in lines[2]
+    assert max(map(len, lines)) < 600
+    still = ev.Scene(ev.FingerPad(), ev.Flat(), motion=[ev.Press(force=0.1)])
+    assert "no attraction" in repr(still)
+    signal = replace(scene, voltage=ev.VoltageProfile(np.linspace(0.0, 1.0, 1000), np.zeros(1000)))
+    assert "at VoltageProfile" in repr(signal)
+    caption, found, _ = rows(special._repr_html_())
+    assert caption == "Scene default, 400 steps"
+    assert len([key for key in found if key.startswith("motion")]) == 6
+    assert found["air_layer"] == "False"
+
+
+def test_a_voltage_shows_its_size():
+    shown = repr(ev.VoltageProfile([1.0, 2.0, 4.0], [-50.0, 200.0, 0.0]))
+    assert shown == "VoltageProfile(3 rows, x 1 to 4 mm, -50 to 200 V)"
+
+
+def test_a_profile_shows_its_size_so_that_a_wrong_unit_is_seen():
+    x = np.linspace(0.0, 8000.0, 801)
+    shown = repr(ev.Profile(x, 8.0 * np.sign(x - 1.0), friction=0.2))
+    assert shown == "Profile(801 points, x 0 to 8000 mm, height -8 to 8 mm, friction=0.2)"
+
+
+def test_a_result_shows_how_far_it_came_and_its_end():
+    result = fake_result(steps=4)
+    assert repr(result).splitlines() == [
+        "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes",
+        "  position 0.2 mm; indentation 1.286 mm; voltage 1.429 V",
+        "  normal force 1.857 N/mm; tangential force 2 N/mm",
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
+    ]
+    caption, found, curves = rows(result._repr_html_())
+    assert caption == "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes"
+    assert found["tangential force"] == "2 N/mm"
+    points = [[float(v) for v in pair.split(",")] for pair in curves[1].get("points").split()]
+    # tangential forces 11/7 ... 14/7 N/mm on a scale of 44 pixels from 0 to the largest, 14/7
+    assert [y for _, y in points] == pytest.approx(
+        [2 + 44 * (14 - n) / 14 for n in (11, 12, 13, 14)], abs=0.06
+    )
+    assert [x for x, _ in points] == pytest.approx([2.0, 80.7, 159.3, 238.0], abs=0.06)
+
+
+def test_results_without_or_with_odd_steps():
+    empty = Result.from_rows([], [], fake_result().mesh, {})
+    assert repr(empty) == "Result of 'scene': 0 of 0 steps, 0 with fields, 9 nodes"
+    assert rows(empty._repr_html_())[2] == []
+    odd = fake_result(steps=4)
+    odd.normal_force[1:3] = np.nan, np.inf
+    assert len(rows(odd._repr_html_())[2][0].get("points").split()) == 2
+    long = fake_result(steps=4)
+    many = replace(long, **{name: np.resize(getattr(long, name), 5000) for name in ("normal_force", "step")})
+    assert len(many._repr_html_()) < 10_000
+
+
+def test_text_of_others_is_escaped():
+    scene = replace(ev.default_scene(), name=EVIL.replace("/", ""))
+    result = fake_result(provenance={"scene": {"name": EVIL, "total_steps": 4}})
+    finger = ev.FingerPad(materials={"nail": type("Law", (), {"__repr__": lambda self: EVIL, "P": abs})()})
+    for page in (scene._repr_html_(), result._repr_html_(), finger._repr_html_()):
+        assert "<script>" not in page
+        assert "alert" in page
+        rows(page)
+
+
+def test_provenance_of_a_scene_that_no_file_can_hold_is_complete():
+    class Law:
+        def traction(self, gap, voltage, layers):
+            return 0.0 * gap
+
+    from evfem.simulation.result import provenance
+
+    scene = replace(ev.default_scene(), law=Law(), finger=ev.FingerPad(nail_width=10.5))
+    text = provenance(scene, fake_result().mesh, {})["parameters"]
+    for part in ("nail_width=10.5", "friction=0.3", "Slide(distance=5.0, steps=100", "tolerance=1e-08"):
+        assert part in text
+    assert scenefile.loads(provenance(ev.default_scene(), fake_result().mesh, {})["parameters"])
+
+
+def test_showing_a_scene_loads_nothing_heavy():
+    code = (
+        "import evfem as ev, sys\n"
+        "scene = ev.default_scene(); repr(scene); scene._repr_html_(); scene.finger._repr_html_()\n"
+        "print(sorted({'skfem', 'matplotlib', 'scipy.optimize', 'meshio', 'pydantic'} & set(sys.modules)))"
+    )
+    words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr

@@ -1,0 +1,137 @@
+"""The outline that faces the surface: tributary lengths, contact widths and frames by hand."""
+
+import numpy as np
+import pytest
+from tools.builders import block
+
+from evfem.contact.pad import Pad, make_pad, surface_state
+from evfem.contact.surfaces import Flat, Sinusoid
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh, raised
+
+CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
+
+
+def pad_of(edges):
+    nodes = np.arange(np.max(edges) + 1)
+    return Pad(nodes, np.array(edges), np.ones(nodes.size, dtype=bool))
+
+
+def square(kind="quad"):
+    points = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
+    names = {"tissue": 0}
+    sets = {"pad": np.arange(4), "bone": np.array([3])}
+    mesh = Mesh(points, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, dtype=int), names, sets)
+    return mesh if kind == "quad" else raised(mesh)
+
+
+def test_linear_edges_give_half_of_their_projection_to_each_end():
+    assert pad_of(CHAIN).length(np.array([0.0, 1.0, 3.0, 7.0])).tolist() == [0.5, 1.5, 3.0, 2.0]
+
+
+def test_edges_that_face_up_carry_nothing():
+    # the outline turns back at node 2: its last edge lies above itself, facing up
+    assert pad_of(CHAIN).length(np.array([0.0, 1.0, 3.0, 2.5])).tolist() == [0.5, 1.5, 1.0, 0.0]
+
+
+def test_quadratic_edges_share_one_four_one():
+    pad = pad_of([[0, 1, 2], [1, 3, 4]])
+    # the place of the middle nodes does not matter; 6 mm and 3 mm of projection
+    length = pad.length(np.array([0.0, 6.0, 2.9, 9.0, 7.6]))
+    np.testing.assert_allclose(length, [1.0, 1.5, 4.0, 0.5, 2.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad9"])
+def test_only_the_lower_side_of_a_square_faces_down(kind):
+    mesh = square(kind)
+    pad = make_pad(mesh)
+    length = pad.length(mesh.points[pad.nodes, 0])
+    low = mesh.points[pad.nodes, 1] == 0.0
+    assert length[~low].tolist() == [0.0] * int((~low).sum())
+    assert length.sum() == pytest.approx(2.0, rel=1e-15)
+
+
+def test_nodes_on_the_bone_are_not_free_but_carry_length():
+    mesh = square()
+    pad = make_pad(mesh)
+    assert pad.nodes.tolist() == [0, 1, 2, 3]
+    assert pad.free.tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize("sets", [{}, {"pad": np.array([0, 2])}])
+def test_a_mesh_without_a_pad_edge_is_refused(sets):
+    mesh = block(2, 2)
+    with pytest.raises(InputError, match="pad"):
+        make_pad(Mesh(mesh.points, mesh.cells, "quad", mesh.region, mesh.region_names, sets))
+
+
+@pytest.mark.parametrize("edges", [CHAIN, [[0, 1, 2], [1, 3, 4]]], ids=["linear", "quadratic"])
+def test_gradient_of_the_lengths_by_central_differences(edges):
+    pad = pad_of(edges)
+    x = np.array([0.0, 3.1, 1.2, 2.7, 5.0])[: pad.nodes.size]
+    of, moved, value = pad.length_gradient(x)
+    gradient = np.zeros((pad.nodes.size, pad.nodes.size))
+    np.add.at(gradient, (of, moved), value)
+    h = 1e-4
+    for i, unit in enumerate(np.eye(pad.nodes.size)):
+        difference = (pad.length(x + h * unit) - pad.length(x - h * unit)) / (2 * h)
+        np.testing.assert_allclose(gradient[:, i], difference, atol=1e-11)
+    # the reversed edge must be among them, or the test would not see it
+    assert (x[pad.edges[:, 1]] < x[pad.edges[:, 0]]).any()
+
+
+def touching(*nodes, of):
+    return np.isin(np.arange(of), nodes)
+
+
+def test_contact_widths_on_linear_edges():
+    pad, x = pad_of(CHAIN), np.array([0.0, 1.0, 2.0, 4.0])
+    assert pad.contact_widths(x, touching(of=4)) == (0.0, 0.0)
+    assert pad.contact_widths(x, touching(1, of=4)) == (1.0, 1.0)
+    assert pad.contact_widths(x, touching(1, 2, of=4)) == (2.5, 2.5)
+    # first and last node only: the open part between counts for the overall width alone
+    assert pad.contact_widths(x, touching(0, 3, of=4)) == (4.0, 1.5)
+
+
+def test_contact_widths_on_quadratic_edges():
+    pad, x = pad_of([[0, 1, 2], [1, 3, 4]]), np.array([0.0, 6.0, 3.0, 12.0, 9.0])
+    np.testing.assert_allclose(pad.contact_widths(x, touching(2, of=5)), (4.0, 4.0))
+    np.testing.assert_allclose(pad.contact_widths(x, touching(1, of=5)), (2.0, 2.0))
+    # middle nodes of both edges: from 1 to 11, less the 2 mm of the open node between
+    np.testing.assert_allclose(pad.contact_widths(x, touching(2, 4, of=5)), (10.0, 8.0))
+
+
+def test_a_touching_node_that_faces_up_has_no_width():
+    x = np.array([0.0, 1.0, 3.0, 2.5])
+    assert pad_of(CHAIN).contact_widths(x, touching(3, of=4)) == (0.0, 0.0)
+
+
+def test_frame_on_a_flat_surface():
+    found = surface_state(Flat(y=-0.5), np.array([[3.0, 0.25], [4.0, -0.75]]))
+    assert found.gap.tolist() == [0.75, -0.25]
+    assert found.normal_gap.tolist() == [0.75, -0.25]
+    assert found.stretch.tolist() == [1.0, 1.0]
+
+
+def test_frame_on_a_sinusoid_by_hand():
+    # h = 0.2 sin(3 x) at x = 0: slope 0.6, no curvature; at 3 x = pi/2: crest, curvature -0.2 * 9
+    surface = Sinusoid(terms=[[0.2, 3.0, 0.0]], y=1.0)
+    found = surface_state(surface, np.array([[0.0, 1.5], [np.pi / 6, 1.5]]))
+    np.testing.assert_allclose(found.gap, [0.5, 0.3], rtol=1e-14)
+    np.testing.assert_allclose(found.slope, [0.6, 0.0], atol=1e-15)
+    np.testing.assert_allclose(found.curvature, [0.0, -1.8], atol=1e-14)
+    np.testing.assert_allclose(found.stretch, [np.sqrt(1.36), 1.0], rtol=1e-15)
+
+
+def test_the_normal_gap_is_the_distance_along_the_normal_to_first_order():
+    surface = Sinusoid(y=0.0)
+    x = np.linspace(0.0, 1.0, 40)
+    rest = []
+    for gap in (1e-3, 1e-4):
+        position = np.column_stack([x, surface.height(x) + gap])
+        found = surface_state(surface, position)
+        normal = np.column_stack([-found.slope, np.ones_like(x)]) / found.stretch[:, None]
+        foot = position - found.normal_gap[:, None] * normal
+        # a tenth of the gap leaves a hundredth of the error
+        rest.append(np.abs(foot[:, 1] - surface.height(foot[:, 0])).max())
+    assert rest[1] < 0.0105 * rest[0]

@@ -1,0 +1,446 @@
+"""Scene files: three examples load, what is written is read back, mistakes get one sentence."""
+
+import numpy as np
+import pytest
+from tools.fakes import square_mesh
+
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.errors import InputError
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.mesh import file as meshfile
+from evfem.scene.file import dump, load, loads
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver, default_scene
+from evfem.scene.terms import Boundary, form
+from evfem.solver.strategy import Strategy
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
+
+DISPLAY = """
+version = 1
+[finger]                          # all optional: Table 2
+width = 16.68                     # full width and height of the cross-section
+height = 12.79
+ridges = true
+ridge_height = 0.15
+ridge_width = 0.50                # the pitch; crests lie on the ellipse, grooves ridge_height inside it
+ridge_exponent = 7.0              # crest: depth = ridge_height * t**exponent, t = |x - crest| / (pitch/2)
+ridge_phase = 0.0                 # in pitches: 0 = a crest in the middle, 0.5 = a groove
+resolution = "medium"
+[surface]
+kind = "flat"                     # flat | sinusoid | profile
+friction = 0.3                    # or [[x, mu], ...]
+[electrostatics]                  # leave the table out when there is no voltage
+law = "kaczmarek"                 # strong_troxel | kaczmarek
+voltage = 1000.0                  # or voltage_file = "voltage.csv" (header: position,voltage)
+insulator_thickness = 0.09
+insulator_eps_r = 3.35
+air_layer = true                  # false: only touching nodes carry force, eq. (10)
+direction = "vertical"            # vertical (the paper) | normal
+coupling = "monolithic"           # monolithic | staggered | staggered_once
+[[motion]]
+kind = "press"                    # press | slide | hover | voltage
+force = 0.05                      # or indentation = 1.5
+steps = 10
+[[motion]]
+kind = "slide"
+distance = 5.0
+steps = 100
+hold = "indentation"              # default; or "force"
+"""
+
+OWN_MESH = """
+version = 1
+[finger]
+mesh = "pad.vtu"
+[finger.regions]
+tissue = 0
+skin = 1
+[finger.materials.tissue]
+law = "neo_hookean"
+E = 0.05
+nu = 0.48
+[finger.materials.skin]
+law = "neo_hookean"
+E = 1.0
+nu = 0.30
+[finger.electrical]
+stratum_corneum_thickness = 0.38
+stratum_corneum_eps_r = 1650.0
+[surface]
+kind = "flat"
+y = -6.395
+friction = 0.0
+[solver]
+element = "q1"
+[[motion]]
+kind = "press"
+indentation = 1.5
+steps = 15
+"""
+
+TEXTURE = """
+version = 1
+[finger]
+viscosity = 1.0e-3
+[surface]
+kind = "sinusoid"
+friction = 0.1
+[solver]
+dynamics = "viscous"
+contact = "exact"
+tolerance = 1e-8
+threads = 1
+[output]
+every = 1
+[[motion]]
+kind = "press"
+force = 0.05
+steps = 10
+[[motion]]
+kind = "slide"
+distance = 4.0
+steps = 200
+speed = 20.0
+hold = "indentation"
+"""
+SHORT = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with a mesh, a voltage and a profile."""
+    meshfile.write(square_mesh("quad"), tmp_path / "pad.vtu")
+    (tmp_path / "voltage.csv").write_text("position,voltage\n0,0\n5,100\n")
+    (tmp_path / "scan.csv").write_text("x,height\n-10,0\n0,0.01\n10,0\n")
+    return tmp_path
+
+
+def test_the_first_example_is_the_default_scene():
+    scene = loads(DISPLAY)
+    assert scene.digest() == default_scene().digest()
+    assert scene.motion == (Press(force=0.05, steps=10), Slide(distance=5.0, steps=100))
+
+
+def test_the_second_example_has_a_mesh_of_its_own(folder):
+    scene = loads(OWN_MESH, folder)
+    assert scene.finger.materials == {
+        "tissue": NeoHookean(E=0.05, nu=0.48),
+        "skin": NeoHookean(E=1.0, nu=0.3),
+    }
+    assert scene.finger.electrical == Electrical(0.38, 1650.0)
+    assert (scene.surface, scene.law, scene.voltage) == (Flat(friction=0.0, y=-6.395), None, 0.0)
+    assert scene.solver == Solver(element="q1")
+    assert scene.motion == (Press(indentation=1.5, steps=15),)
+    assert scene.finger.source == folder / "pad.vtu"
+    assert scene.finger.regions == {"tissue": 0, "skin": 1}
+
+
+def test_the_third_example_has_texture_and_time():
+    scene = loads(TEXTURE)
+    assert scene.finger == FingerPad(viscosity=1e-3)
+    assert scene.surface == Sinusoid(friction=0.1)
+    assert (scene.solver, scene.output) == (Solver(dynamics="viscous"), Output(every=1))
+    assert scene.motion[1] == Slide(distance=4.0, steps=200, speed=20.0)
+
+
+def test_a_file_gives_its_name_and_folder(folder):
+    (folder / "my scan.toml").write_text(
+        "version = 1\n[surface]\nkind='profile'\nfile='scan.csv'\n[electrostatics]\nlaw='strong_troxel'\n"
+        "voltage_file='voltage.csv'\ninsulator_thickness=0.1\ninsulator_eps_r=3\n[[motion]]\nkind='hover'\ngap=1\n"
+    )
+    scene = load(folder / "my scan.toml")
+    assert scene.name == "my scan"
+    assert scene.voltage(2.5) == 50.0
+    assert float(scene.surface.height(np.array(0.0))) == 0.01
+    assert (scene.law, scene.surface.insulator) == (StrongTroxel(), Layer(0.1, 3.0))
+    assert scene.motion == (Hover(gap=1.0),)
+
+
+def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
+    text = (
+        "version = 1\n[surface]\nkind='sinusoid'\nfriction=[[0, 0.3], [1, 0.5]]\nterms=[[0.1, 2, 0]]\n"
+        "[electrostatics]\nlaw='kaczmarek'\ninsulator_thickness=0.1\ninsulator_eps_r=3\nair_layer=false\n"
+        "[[motion]]\nkind='press'\nindentation=1\nspeed=2\n[[motion]]\nkind='voltage'\nvoltage=100\nsteps=3\nhold='force'\n"
+        "[[motion]]\nkind='slide'\ndistance=-1\nhold='force'\n"
+    )
+    scene = loads(text)
+    press, ramp = Press(indentation=1.0, speed=2.0), VoltageRamp(100.0, steps=3, hold="force")
+    assert scene.motion == (press, ramp, Slide(distance=-1.0, hold="force"))
+    assert scene.voltage == 0.0
+    assert scene.surface.friction_coefficient(np.array([0.5])).tolist() == [0.4]
+    assert scene.surface.terms == ((0.1, 2.0, 0.0),)
+    assert scene.air_layer is False
+
+
+def scenes(folder):
+    """Scenes that use everything a file can hold."""
+    laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
+    press = Press(indentation=1.0, steps=3, speed=2.0)
+    profile = Profile([0.0, 0.1, 1.0], [0.0, 0.2, 0.1], friction=[[0.0, 0.1], [0.0, 0.3]], y=-7.0)
+    voltage = VoltageProfile([0.0, 1.0, 1.0], [0.0, 100.0 / 3.0, 7.0])
+    tissue = {"soft": Yeoh(c1=0.1, c2=0.01, c3=0.001, nu=0.4), "hard": Ogden(mu=[0.1], alpha=[2.0], nu=0.4)}
+    own = MeshedFinger(folder / "pad.vtu", tissue, Electrical(0.4), viscosity=0.01)
+    insulated = Sinusoid(friction=0.1, terms=[[0.1, 2.0, 0.3]], insulator=Layer(0.1 / 3, 3.0))
+    yield default_scene()
+    yield Scene(FingerPad(width=16.0, ridges=False, materials=laws), Flat(friction=0.0), motion=[press])
+    yield Scene(FingerPad(electrical=Electrical(0.3)), profile, motion=[press, Slide(-1.0, speed=3.0)])
+    yield Scene(own, insulated, Kaczmarek(gap_eps_r=2.0), voltage, [Hover(0.5)], direction="normal")
+    yield Scene(
+        FingerPad(viscosity=0.1),
+        Display(friction=0.1 + 0.2),
+        StrongTroxel(),
+        motion=[VoltageRamp(0.1, steps=1)],
+        air_layer=False,
+        coupling="staggered_once",
+        solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
+        output=Output(3),
+    )
+
+
+@pytest.mark.parametrize("number", range(5))
+def test_what_is_written_is_read_back(folder, number):
+    scene = list(scenes(folder))[number]
+    text = dump(scene)
+    assert loads(text).digest() == scene.digest()
+    assert dump(loads(text)) == text
+
+
+@form
+def spring(u, v, w):
+    return u * v
+
+
+class Own:
+    """A user's law, of forces and of materials."""
+
+    viscosity = None
+
+    def traction(self, gap, voltage, layers):
+        return gap
+
+    def psi(self, F):
+        return F
+
+
+def test_what_a_file_cannot_hold_is_refused(folder):
+    scene = default_scene()
+    mesh = square_mesh()
+    law = NeoHookean(E=1.0, nu=0.3)
+    laws = {"soft": law, "hard": law}
+    cannot = {
+        "forms": scene.with_term(spring, on=Boundary("nail")),
+        "electrostatics.law": Scene(scene.finger, scene.surface, Own(), 1.0, scene.motion),
+        "finger.mesh": Scene(MeshedFinger(mesh, laws), Flat(), motion=scene.motion),
+        "finger.materials.hard": Scene(
+            MeshedFinger(folder / "pad.vtu", laws | {"hard": Own()}), Flat(), motion=scene.motion
+        ),
+    }
+    for key, wrong in cannot.items():
+        with pytest.raises(InputError) as caught:
+            dump(wrong)
+        assert caught.value.key == key
+
+
+#: (example, what is replaced, by what, the key in the sentence, words of the sentence)
+WRONG = [
+    (SHORT, "version = 1", "", "version", "given nothing; allowed: version = 1"),
+    (SHORT, "version = 1", "version = 2", "version", "given 2"),
+    (SHORT, "version = 1", "version = true", "version", "given true"),
+    (SHORT, "version = 1", "version = 1\nspeed = 3", "speed", "an unknown key"),
+    (SHORT, "[surface]", "[surfaces]", "surfaces", "an unknown key; allowed: surface? (version"),
+    (SHORT, "[surface]\nkind = 'flat'", "", "surface", "given nothing"),
+    (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", "given 'flat'"),
+    (SHORT, "kind = 'flat'", "", "surface.kind", "flat | sinusoid | profile"),
+    (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", "given round"),
+    (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = -0.3", "surface.friction", "given -0.3"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = nan", "surface.friction", "given nan"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = 'a lot'", "surface.friction", "given 'a lot'"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = true", "surface.friction", "given true"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = [[0, 1, 2]]", "surface.friction", "[[x, mu], ...]"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'flat'\nfriction = [[1, 1], [0, 1]]",
+        "surface.friction",
+        "not decreasing",
+    ),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\ny = inf", "surface.y", "given inf"),
+    (SHORT, "kind = 'flat'", "kind = 'sinusoid'\nterms = [[1, 2]]", "surface.terms", "wavenumber"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'", "surface.file", "given nothing"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'none.csv'", "surface.file", "No such file"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'voltage.csv'", "surface.file", "x,height"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = '.'", "surface.file", "no file"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'pad.vtu'", "surface.file", "x,height"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'\npoints = [[1]]", "surface.points[0]", "two numbers"),
+    (SHORT, "force = 0.05", "force = 0.05\n[[motion]]\nkind = 'jump'", "motion[1].kind", "press | slide"),
+    (SHORT, "[[motion]]\nkind = 'press'\nforce = 0.05", "", "motion", "given nothing"),
+    (SHORT, "[[motion]]\nkind = 'press'\nforce = 0.05", "[motion]\nkind = 'press'", "motion", "[[motion]]"),
+    (SHORT, "version = 1\n[surface]", "version = 1\nmotion = []\n[surface]", "scene", "TOML"),
+    (SHORT, "force = 0.05", "", "motion[0].force", "neither force nor indentation"),
+    (SHORT, "force = 0.05", "force = 0.05\nindentation = 1", "motion[0].force", "force and indentation"),
+    (SHORT, "force = 0.05", "force = '0.05'", "motion[0].force", "given '0.05'"),
+    (SHORT, "force = 0.05", "force = -1", "motion[0].force", "given -1"),
+    (SHORT, "force = 0.05", "force = 1" + "0" * 400, "motion[0].force", "N/mm"),
+    (SHORT, "force = 0.05", "force = 1e999", "motion[0].force", "given inf"),
+    (SHORT, "force = 0.05", "force = 1979-05-27", "motion[0].force", "N/mm"),
+    (SHORT, "force = 0.05", "force = 0.05\nsteps = 2.5", "motion[0].steps", "given 2.5"),
+    (SHORT, "force = 0.05", "force = 0.05\nsteps = 0", "motion[0].steps", "given 0"),
+    (SHORT, "force = 0.05", "force = 0.05\ndistance = 2", "motion[0].distance", "an unknown key"),
+    (SHORT, "force = 0.05", "force = 0.05\n[output]\nevery = 0", "output.every", "given 0"),
+    (SHORT, "force = 0.05", "force = 0.05\n[solver]\nelement = 'p3'", "solver.element", "q2p1"),
+    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ntolerance = 1", "solver.tolerance", "given 1.0"),
+    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ncontact='penalty'", "solver.penalty_normal", "nothing"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = -3", "finger.width", "given -3"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = 'w'", "finger.width", "given w"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidht = 3", "finger.widht", "width?"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nresolution = 'x'", "finger.resolution", "coarse"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nridges = 1", "finger.ridges", "given 1"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nmaterials = 3", "finger.materials", "given 3"),
+    (
+        SHORT,
+        "force = 0.05",
+        "force = 0.05\n[finger.materials]\ndermis=3",
+        "finger.materials.dermis",
+        "given 3",
+    ),
+    (
+        SHORT,
+        "force = 0.05",
+        "force = 0.05\n[finger.materials.skin]\nlaw='neo_hookean'\nE=1\nnu=0.3",
+        "finger.materials.skin",
+        "dermis",
+    ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nelectrical = 3", "finger.electrical", "given 3"),
+    (SHORT, "version = 1", "version = ", "scene", "no valid TOML"),
+    (SHORT, "version = 1", "version = 1\nversion = 1", "scene", "no valid TOML"),
+    (SHORT, "version = 1", "version = 1\na = " + "[" * 5000, "scene", "no valid TOML"),
+    (SHORT, "version = 1", "version = " + "1" * 5000, "scene", "no valid TOML"),
+    (DISPLAY, 'law = "kaczmarek"', 'law = "coulomb"', "electrostatics.law", "strong_troxel | kaczmarek"),
+    (DISPLAY, 'law = "kaczmarek"', "", "electrostatics.law", "given nothing"),
+    (DISPLAY, "voltage = 1000.0", "", "electrostatics.voltage", "given nothing"),
+    (DISPLAY, "voltage = 1000.0", "voltage = '1 kV'", "electrostatics.voltage", "given '1 kV'"),
+    (DISPLAY, "voltage = 1000.0", "voltage = 1e9", "electrostatics.voltage", "given 1000000000.0"),
+    (
+        DISPLAY,
+        "voltage = 1000.0",
+        "voltage = 1\nvoltage_file = 'voltage.csv'",
+        "electrostatics.voltage",
+        "exactly",
+    ),
+    (DISPLAY, "voltage = 1000.0", "voltage_file = 'none.csv'", "electrostatics.voltage_file", "No such file"),
+    (
+        DISPLAY,
+        "voltage = 1000.0",
+        "voltage_file = 'scan.csv'",
+        "electrostatics.voltage_file",
+        "position,voltage",
+    ),
+    (
+        DISPLAY,
+        "insulator_thickness = 0.09",
+        "insulator_thickness = -0.09",
+        "electrostatics.insulator_thickness",
+        "-0.09",
+    ),
+    (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "given nothing"),
+    (
+        DISPLAY,
+        "insulator_eps_r = 3.35",
+        "insulator_eps_r = 0.5",
+        "electrostatics.insulator_eps_r",
+        "given 0.5",
+    ),
+    (DISPLAY, "air_layer = true", "air_layer = 'no'", "electrostatics.air_layer", "true | false"),
+    (DISPLAY, 'direction = "vertical"', 'direction = "up"', "electrostatics.direction", "vertical | normal"),
+    (DISPLAY, 'coupling = "monolithic"', 'coupling = "weak"', "electrostatics.coupling", "staggered_once"),
+    (DISPLAY, 'hold = "indentation"', 'hold = "height"', "motion[1].hold", "indentation | force"),
+    (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "none.vtu"', "finger.mesh", "No such file"),
+    (OWN_MESH, 'mesh = "pad.vtu"', "mesh = 3", "finger.mesh", "given 3"),
+    (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nwidth = 16.0', "finger.width", "no geometry keys"),
+    (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nviscosity = -1.0', "finger.viscosity", "given -1.0"),
+    (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", "given 'zero'"),
+    (OWN_MESH, "nu = 0.48", "nu = 0.5", "finger.materials.tissue.nu", "given 0.5"),
+    (OWN_MESH, "nu = 0.48", "", "finger.materials.tissue.nu", "given nothing"),
+    (OWN_MESH, "nu = 0.48", "nu = 0.48\nmu = 3", "finger.materials.tissue.mu", "an unknown key"),
+    (OWN_MESH, "E = 0.05", "E = -0.05", "finger.materials.tissue.E", "given -0.05"),
+    (OWN_MESH, "E = 0.05", "E = 'soft'", "finger.materials.tissue.E", "soft"),
+    (
+        OWN_MESH,
+        "stratum_corneum_thickness = 0.38",
+        "stratum_corneum_thickness = -1.0",
+        "finger.electrical.stratum_corneum_thickness",
+        "given -1.0",
+    ),
+    (
+        OWN_MESH,
+        "stratum_corneum_thickness = 0.38",
+        "thickness = 0.38",
+        "finger.electrical.thickness",
+        "unknown key",
+    ),
+    (TEXTURE, "speed = 20.0", "", "motion[1].speed", "dynamics = viscous"),
+    (TEXTURE, "viscosity = 1.0e-3", "", "finger.viscosity", "dynamics = viscous"),
+    (TEXTURE, "viscosity = 1.0e-3", "viscosity = nan", "finger.viscosity", "given nan"),
+    (
+        TEXTURE,
+        'dynamics = "viscous"',
+        'dynamics = "slow"',
+        "solver.dynamics",
+        "quasistatic | viscous | inertial",
+    ),
+]
+
+
+@pytest.mark.parametrize(("text", "old", "new", "key", "words"), WRONG)
+def test_each_mistake_gets_one_sentence_with_its_key(text, old, new, key, words, folder):
+    assert old in text
+    with pytest.raises(InputError) as caught:
+        loads(text.replace(old, new, 1), folder)
+    sentence = str(caught.value)
+    assert words in sentence
+    assert "\n" not in sentence
+    assert len(sentence) < 600
+    assert caught.value.key == key
+
+
+def test_a_voltage_file_beside_a_ramp_is_refused(folder):
+    text = DISPLAY.replace("voltage = 1000.0", "voltage_file = 'voltage.csv'")
+    with pytest.raises(InputError, match=r"motion\[2\]: given a voltage ramp beside a voltage profile"):
+        loads(text + "[[motion]]\nkind = 'voltage'\nvoltage = 1\n", folder)
+
+
+def test_files_that_cannot_be_scenes_get_a_sentence(tmp_path):
+    cases = {
+        "none.toml": (None, "No such file"),
+        "binary.toml": (bytes(range(256)), "UTF-8"),
+        "huge.toml": (b"#" + b" " * (5 * 2**20), "at most 4 MB"),
+        "empty.toml": (b"", "version"),
+    }
+    for name, (content, words) in cases.items():
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(InputError, match=words):
+            load(tmp_path / name)
+    with pytest.raises(InputError, match="no file"):
+        load(tmp_path)
+
+
+def test_a_table_that_is_too_large_is_refused_before_it_is_read(folder):
+    with open(folder / "voltage.csv", "r+b") as file:
+        file.truncate(65 * 2**20)
+    with pytest.raises(InputError, match="at most 64 MB"):
+        loads(DISPLAY.replace("voltage = 1000.0", "voltage_file = 'voltage.csv'"), folder)
+
+
+def test_the_strategy_goes_to_a_file_and_back():
+    text = 'version = 1\n[surface]\nkind = "flat"\n[[motion]]\nkind = "press"\nforce = 0.05\n'
+    scene = loads(text.replace("[[motion]]", "[solver.strategy]\npatience = 3.0\neasy = 5\n[[motion]]", 1))
+    assert scene.solver.strategy == Strategy(patience=3.0, easy=5)
+    assert loads(dump(scene)).solver == scene.solver
+    with pytest.raises(InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"):
+        loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))

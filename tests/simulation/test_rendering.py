@@ -1,0 +1,223 @@
+"""Rendering: from a reference to a voltage, by closed forms and exactly, and what is felt then."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import block, finger
+
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
+from evfem.errors import InputError
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.rendering import (
+    ApparentFriction,
+    apparent_friction,
+    compare,
+    exact,
+    pearson,
+    record,
+    replay,
+    voltage_for,
+)
+
+PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)
+LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
+STEP = [[0.0, 0.3], [1.4, 0.3], [1.4, 0.4]]
+MOTION = (Press(force=0.02, steps=2), Slide(1.8, steps=18))
+
+
+def encoding(friction, law=None, area=None):
+    return Encoding(law or Kaczmarek(), LAYERS, area or AreaLaw(60.0), friction)
+
+
+@pytest.fixture(scope="module")
+def jump():
+    return record(Scene(PAD, Flat(friction=STEP), motion=MOTION))
+
+
+@pytest.fixture(scope="module")
+def texture():
+    motion = (Press(indentation=0.15, steps=3), Slide(0.6, steps=30, speed=20.0))
+    solver = Solver(dynamics="inertial")
+    return record(Scene(PAD, Sinusoid(friction=0.1), motion=motion, solver=solver))
+
+
+def felt(friction, force=0.05):
+    friction = np.asarray(friction)
+    return ApparentFriction(np.arange(friction.size), np.full(friction.size, force), force * friction)
+
+
+def test_apparent_friction_goes_from_stick_to_the_first_and_the_second_coefficient(jump):
+    friction = apparent_friction(jump.result)
+    assert friction.position.tolist() == pytest.approx([0.1 * i for i in range(19)])  # with the start
+    assert friction.friction[0] == pytest.approx(0.0, abs=1e-9)
+    slipping = friction.position >= jump.full_slip
+    assert 0.1 < jump.full_slip < 0.4
+    # full slip on flat ground is where Coulomb's limit is reached, not a step earlier or later
+    assert friction.friction[slipping][0] == pytest.approx(0.3, rel=1e-7)
+    assert (friction.friction[~slipping] < 0.2999).all()
+    # the contact, 2 mm wide, is on its way across the step in the end
+    assert 0.34 < friction.friction[-1] < 0.38
+    assert friction.minimum(after=jump.full_slip) == pytest.approx(0.3, rel=1e-7)
+
+
+def test_voltages_by_hand():
+    # s = 0.38/1650 + 0.09/3.35 = 0.02709597; F_e/F_n = 0.5; (20a) sqrt(2 s 0.47 * 0.5 / (eps0 60))
+    s, eps_0 = 0.38 / 1650.0 + 0.09 / 3.35, 8.8541878128e-12
+    wish = felt([0.1, 0.2, 0.3])
+    assert voltage_for(wish, encoding(0.2)).largest == pytest.approx(
+        np.sqrt(s * 0.47 / (eps_0 * 60.0)), rel=1e-8
+    )
+    troxel = voltage_for(wish, encoding(0.2, StrongTroxel()))
+    assert troxel.largest == pytest.approx(s / np.sqrt(eps_0 * 60.0), rel=1e-8)
+    # (19) with m = 0.5 at 0.05 N/mm over 8 mm: k F^-0.5 = 60 / sqrt(0.4) takes the place of k'
+    power = voltage_for(wish, encoding(0.2, area=AreaLaw(60.0, 0.5)), depth=8.0)
+    assert power.largest == pytest.approx(np.sqrt(s * 0.47 * np.sqrt(0.4) / (eps_0 * 60.0)), rel=1e-8)
+    # U = 0, 0, U: linear over the second mm, so rms^2 = U^2 / 3 / 2 over both
+    assert power.profile.voltage[:2].tolist() == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert power.rms == pytest.approx(power.largest / np.sqrt(6.0), rel=1e-6)
+    assert power.carrier == pytest.approx(np.sqrt(2.0) * power.largest, rel=1e-12)
+
+
+def test_what_is_below_the_displays_own_friction_is_reported():
+    signal = voltage_for(felt([0.4, 0.2, 0.2, 0.4, -0.1]), encoding(0.3))
+    assert signal.profile.voltage[[1, 2, 4]].tolist() == [0.0, 0.0, 0.0]
+    # half of the first piece, the second, half of the third, 0.8 of the last; four in all
+    assert signal.share_not_renderable == pytest.approx((0.5 + 1.0 + 0.5 + 0.8) / 4.0, rel=1e-5)
+    wanted, short = np.array([0.4, 0.2, 0.2, 0.4, -0.1]), np.array([0.0, 0.1, 0.1, 0.0, 0.4])
+    assert signal.error_of_display == pytest.approx(np.linalg.norm(short) / np.linalg.norm(wanted), rel=1e-9)
+    # friction that is the display's own but for noise is not lost
+    assert voltage_for(felt([0.3 - 1e-9, 0.4]), encoding(0.3)).share_not_renderable == 0.0
+
+
+def test_an_amplifier_costs_what_it_cuts_off():
+    wish = felt([0.2, 0.4, 0.4])
+    free = voltage_for(wish, encoding(0.2))
+    assert (free.share_limited, free.error_of_amplifier) == (0.0, 0.0)
+    half = voltage_for(wish, encoding(0.2), amplifier=Amplifier(0.5 * free.largest))
+    assert half.largest == pytest.approx(0.5 * free.largest, rel=1e-12)
+    # F_e falls to a quarter in two of three rows: 0.75 * 0.2 out of 0.2, 0.4, 0.4
+    cost = 0.15 * np.sqrt(2.0) / np.linalg.norm([0.2, 0.4, 0.4])
+    assert half.error_of_amplifier == pytest.approx(cost, rel=1e-8)
+    assert half.share_limited == pytest.approx(0.75, rel=1e-6)
+    # at 20 mm/s a slew of 10 U/s climbs U / 2 per mm: there after 2 mm instead of 1
+    slow = voltage_for(wish, encoding(0.2), amplifier=Amplifier(1e4, slew=10.0 * free.largest), speed=20.0)
+    np.testing.assert_allclose(slow.profile([1.0, 2.0]) / free.largest, [0.5, 1.0], rtol=1e-6)
+    assert slow.share_limited == pytest.approx(1.0, rel=1e-6)
+    assert slow.error_of_amplifier == pytest.approx(0.15 / np.linalg.norm([0.2, 0.4, 0.4]), rel=1e-6)
+
+
+def test_exact_encoding_reproduces_a_friction_step(jump):
+    found = exact(jump, Display(friction=0.3), Kaczmarek())
+    fidelity = compare(jump.result, found.result)
+    assert fidelity.relative_l2 < 1e-8
+    assert fidelity.pearson == pytest.approx(1.0, abs=1e-12)
+    assert fidelity.position.tolist() == pytest.approx([0.1 * i for i in range(1, 19)])
+    # while the finger sticks, or slips before the step, nothing is needed; then more and more
+    before = found.result.position < 0.35
+    assert found.result.voltage[before].max() < 1.0
+    assert fidelity.voltage_difference == found.result.voltage.max() > 500.0
+    assert found.result.voltage[-1] == pytest.approx(found.result.voltage.max(), rel=1e-6)
+    # the voltage found, replayed as a table, gives the same again
+    slide = np.array(found.result.motion) == "slide"
+    table = VoltageProfile(found.result.position[slide], found.result.voltage[slide])
+    again = replay(jump, Display(friction=0.3), Kaczmarek(), table)
+    assert compare(found.result, again.result).relative_l2 < 1e-7
+
+
+def test_the_closed_form_is_near_where_its_area_law_is_right(jump):
+    felt = apparent_friction(jump.result)
+    width = jump.result.contact_width[-1] / 0.02  # mm2/N of the gross contact, as an area law of one load
+    signal = voltage_for(felt, encoding(0.3, area=AreaLaw(width)))
+    open_loop = replay(jump, Display(friction=0.3), Kaczmarek(), signal.profile)
+    fidelity = compare(jump.result, open_loop.result)
+    # the air layer adds to the attraction, so that the force is somewhat too large, nowhere too small
+    assert fidelity.error.min() > -1e-6 * 0.02
+    assert 1e-4 < fidelity.relative_l2 < 0.03
+    assert fidelity.pearson > 0.999
+    assert fidelity.largest_error == fidelity.error.max()
+
+
+def test_where_the_wish_is_below_the_displays_own_friction(jump):
+    rough = Display(friction=0.35)
+    found = exact(jump, rough, Kaczmarek())
+    slide = np.array(found.result.motion) == "slide"
+    wish, force = jump.result.applied_tangential_force[slide], found.result.applied_tangential_force[slide]
+    own = wish < 0.35 * 0.02 * (1.0 - 1e-6)
+    slipping = np.array(jump.result.position[slide]) >= 0.35
+    assert (own & slipping).any()
+    assert (~own).any()
+    assert found.result.voltage[slide][own & slipping].max() == 0.0
+    load = found.result.applied_force[slide]
+    np.testing.assert_allclose(force[own & slipping], 0.35 * load[own & slipping], rtol=1e-7)
+    np.testing.assert_allclose(force[~own], wish[~own], rtol=1e-7)
+    assert (found.result.voltage[slide][~own][1:] > 0.0).all()
+    signal = voltage_for(apparent_friction(jump.result), encoding(0.35))
+    assert 0.5 < signal.share_not_renderable < 1.0
+    assert (signal.profile(found.result.position[slide][own]) == 0.0).all()
+
+
+def test_a_wish_beyond_what_a_sticking_pad_gives_waits_for_full_slip(jump):
+    felt = apparent_friction(jump.result)
+    wish = FollowForce(felt.position, 1.2 * felt.tangential_force, 10_000.0)
+    found = replay(jump, Display(friction=0.3), Kaczmarek(), wish)
+    slide = np.array(found.result.motion) == "slide"
+    voltage, force = found.result.voltage[slide], found.result.applied_tangential_force[slide]
+    sticks = found.result.position[slide] < jump.full_slip
+    assert sticks.any()
+    assert voltage[sticks].max() == 0.0
+    np.testing.assert_allclose(force[~sticks], 1.2 * felt.tangential_force[1:][~sticks], rtol=1e-7)
+    assert voltage[~sticks].min() > 500.0
+    unmet = compare(jump.result, found.result).unmet(0.05 * felt.tangential_force.max())
+    assert not unmet[sticks].any()  # the same friction, so the same force as the reference
+    assert unmet[~sticks].all()
+
+
+def test_a_limited_voltage_reproduces_as_much_as_it_can(jump):
+    free = exact(jump, Display(friction=0.3), Kaczmarek())
+    most = 0.5 * free.result.voltage.max()
+    found = exact(jump, Display(friction=0.3), Kaczmarek(), largest_voltage=most)
+    assert found.result.voltage.max() == pytest.approx(most, rel=1e-12)
+    limited = compare(jump.result, found.result)
+    there = free.result.voltage[2:] < 0.999 * most
+    assert np.abs(limited.error[there]).max() < 1e-9
+    assert (limited.error[~there] < 0.0).all()
+
+
+def test_exact_encoding_reproduces_a_texture(texture):
+    wish = apparent_friction(texture.result)
+    lowest = wish.minimum(after=texture.full_slip)
+    assert 0.1 < lowest < 0.12 < wish.friction.max()
+    found = exact(texture, Display(friction=lowest), Kaczmarek())
+    assert compare(texture.result, found.result).relative_l2 < 1e-6
+    assert found.result.voltage.max() > 1000.0
+    # the reference held its indentation; the display is pressed to the load that this took
+    assert found.scene.motion[0] == Press(force=texture.result.applied_force[2], steps=3)
+    assert found.scene.motion[1] == texture.scene.motion[1]
+
+
+def test_pearson_against_numpy_and_a_constant():
+    random = np.random.default_rng(1)
+    a, b = random.normal(size=(2, 30))
+    assert pearson(a, b) == pytest.approx(np.corrcoef(a, b)[0, 1], rel=1e-13)
+    assert np.isnan(pearson(a, np.ones(30)))
+
+
+def test_slides_that_cannot_be_rendered_are_refused(jump):
+    pressed = record(Scene(PAD, Flat(), motion=MOTION[:1]))
+    with pytest.raises(InputError, match="0 rows of slides"):
+        apparent_friction(pressed.result)
+    assert pressed.full_slip is None
+    back = record(replace(jump.scene, motion=(MOTION[0], Slide(-0.1, steps=2))))
+    with pytest.raises(InputError, match=r"towards \+x"):
+        apparent_friction(back.result)
+    with pytest.raises(InputError, match="same slide"):
+        compare(jump.result, back.result)
+    with pytest.raises(InputError, match="position up to 2 mm"):
+        felt([0.1, 0.2, 0.3]).minimum(after=3.0)
+    with pytest.raises(InputError, match="above zero all along"):
+        felt([0.1, 0.1], force=-0.05)

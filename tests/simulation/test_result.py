@@ -1,0 +1,210 @@
+"""Results and checkpoints come back from disk as they were, and damaged files get a sentence."""
+
+import csv
+import io
+import json
+import zipfile
+
+import numpy as np
+import pytest
+from tools.fakes import KINDS, fake_result, fake_row
+
+from evfem.errors import InputError, StorageError
+from evfem.simulation.result import COLUMNS, Checkpoint, Result, csv_header, csv_line, load, versions
+
+CONTRACT = (
+    "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
+    "applied_tangential_force, normal_force, tangential_force, electrostatic_force, electrostatic_force_x, "
+    "contact_width, real_contact_width, min_gap, external_work, electrostatic_work, stored_energy, "
+    "friction_dissipation, viscous_dissipation, kinetic_energy, substeps, newton_iterations, seconds"
+)
+
+
+def test_columns_are_those_of_the_contract_in_its_order():
+    assert ", ".join(COLUMNS) == CONTRACT
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_saved_result_comes_back_bit_by_bit(kind, tmp_path):
+    result = fake_result(kind)
+    result.save(tmp_path / "run.npz")
+    back = load(tmp_path / "run.npz")
+    assert back.rows == result.rows
+    assert back.provenance == result.provenance
+    assert back.mesh.kind == kind
+    assert back.mesh.region_names == {"soft": 0, "hard": 1}
+    np.testing.assert_array_equal(back.mesh.points, result.mesh.points)
+    np.testing.assert_array_equal(back.mesh.cells, result.mesh.cells)
+    np.testing.assert_array_equal(back.mesh.node_sets["pad"], result.mesh.node_sets["pad"])
+    assert [frame.step for frame in back.frames] == [2, 4]
+    for old, new in zip(result.frames, back.frames, strict=True):
+        for name in vars(old):
+            np.testing.assert_array_equal(getattr(new, name), getattr(old, name))
+
+
+def test_a_result_without_frames_comes_back(tmp_path):
+    result = Result.from_rows([], [], fake_result().mesh, {})
+    result.save(tmp_path / "empty.npz")
+    back = load(tmp_path / "empty.npz")
+    assert (back.frames, back.rows, back.summary()["steps"]) == ([], [], 0)
+
+
+def test_saving_under_any_ending_keeps_the_name(tmp_path):
+    fake_result().save(tmp_path / "run.data")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.data"]
+    assert len(load(tmp_path / "run.data").step) == 4
+
+
+def test_the_file_holds_no_pickled_objects(tmp_path):
+    fake_result().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz", allow_pickle=False) as archive:
+        assert not any(archive[name].dtype.hasobject for name in archive.files)
+
+
+def test_rows_with_a_missing_or_unknown_column_are_refused():
+    row = fake_row(1)
+    with pytest.raises(InputError, match="'time'"):
+        Result.from_rows([{k: v for k, v in row.items() if k != "time"}], [], fake_result().mesh, {})
+    with pytest.raises(InputError, match="'extra'"):
+        Result.from_rows([row | {"extra": 1}], [], fake_result().mesh, {})
+
+
+def damaged(tmp_path, how):
+    """A file that is no result: `how` says in which way."""
+    path = tmp_path / "run.npz"
+    fake_result().save(path)
+    whole = path.read_bytes()
+    if how == "cut off":
+        path.write_bytes(whole[: len(whole) // 2])
+    elif how == "empty":
+        path.write_bytes(b"")
+    elif how == "text":
+        path.write_text("step,motion\n1,press\n")
+    elif how == "flipped":
+        middle = whole.index(b"NUMPY") + 130  # inside the text of the first array
+        path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 255]) + whole[middle + 1 :])
+    elif how == "one array":
+        with open(path, "wb") as file:
+            np.save(file, np.ones(3))
+    elif how == "foreign archive":
+        np.savez(path, a=np.ones(3))
+    elif how == "pickle":
+        np.savez(path, format=np.array([{"a": 1}], dtype=object))
+    elif how == "zip of text":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("format.npy", "evfem-result-1")
+    return path
+
+
+HOWS = ("cut off", "empty", "text", "flipped", "one array", "foreign archive", "pickle", "zip of text")
+
+
+@pytest.mark.parametrize("how", HOWS)
+def test_files_that_are_no_results_get_a_sentence(how, tmp_path):
+    path = damaged(tmp_path, how)
+    with pytest.raises(InputError) as caught:
+        load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_files_and_missing_arrays_get_a_sentence(tmp_path):
+    with pytest.raises(InputError, match="does not exist"):
+        load(tmp_path / "nothing.npz")
+    fake_result().save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "history/time"})
+    with pytest.raises(InputError, match="history/time"):
+        load(tmp_path / "less.npz")
+    arrays["frames/gap"] = arrays["frames/gap"][:, :-1]
+    np.savez(tmp_path / "short.npz", **arrays)
+    with pytest.raises(InputError, match="gap of shape"):
+        load(tmp_path / "short.npz")
+
+
+def test_a_disk_that_refuses_leaves_the_old_file_alone(tmp_path, monkeypatch):
+    path = tmp_path / "run.npz"
+    fake_result().save(path)
+    before = path.read_bytes()
+
+    def full(*arguments, **more):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np.lib.format, "write_array", full)
+    with pytest.raises(StorageError, match="No space left"):
+        fake_result(steps=6).save(path)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["run.npz"]
+    monkeypatch.undo()
+    with pytest.raises(StorageError, match="cannot write"):
+        fake_result().save(tmp_path / "no folder" / "run.npz")
+
+
+def test_history_csv_keeps_every_digit():
+    result = fake_result()
+    text = csv_header() + "".join(map(csv_line, result.rows))
+    assert text.splitlines()[0] == CONTRACT.replace(" ", "")
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert len(rows) == 4
+    for read, row in zip(rows, result.rows, strict=True):
+        assert read["step"] == str(row["step"])
+        assert read["motion"] == row["motion"]
+        assert all(float(read[name]) == row[name] for name in COLUMNS if name != "motion")
+
+
+def test_csv_numbers_are_plain_also_from_numpy_scalars():
+    row = fake_row(3) | {"normal_force": np.float64(0.1), "step": np.int64(3), "min_gap": np.nan}
+    values = dict(zip(COLUMNS, csv_line(row).strip().split(","), strict=True))
+    assert (values["normal_force"], values["step"], values["min_gap"]) == ("0.1", "3", "nan")
+
+
+def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
+    result = fake_result()
+    result.min_gap[-1] = np.inf
+    summary = json.loads(json.dumps(result.summary(), allow_nan=False))
+    assert summary["last"]["min_gap"] is None
+    assert (summary["steps"], summary["requested_steps"], summary["complete"]) == (4, 4, True)
+    assert summary["last"]["normal_force"] == result.normal_force[-1]
+    assert summary["largest"]["tangential_force"] == result.tangential_force.max()
+    assert summary["newton_iterations"] == 12
+    assert (summary["nodes"], summary["cells"], summary["kind"]) == (9, 4, "quad")
+
+
+def test_versions_name_what_computes():
+    assert {"evfem", "python", "numpy", "scipy", "scikit-fem"} <= set(versions())
+
+
+def state():
+    return {"displacement": np.arange(6.0) / 7, "history": np.array([1, 2])}
+
+
+def test_a_checkpoint_comes_back_for_its_own_scene_alone(tmp_path):
+    point = Checkpoint(tmp_path / "checkpoint.npz")
+    rows = [fake_row(1) | {"voltage": np.float64(0.1), "substeps": np.int64(2)}, fake_row(2)]
+    point.write("a" * 64, state(), rows)
+    saved = point.read("a" * 64)
+    assert saved.rows == rows
+    assert list(saved.arrays) == ["displacement", "history"]
+    np.testing.assert_array_equal(saved.arrays["displacement"], np.arange(6.0) / 7)
+    with pytest.raises(InputError, match="another scene"):
+        point.read("b" * 64)
+
+
+def test_a_checkpoint_that_is_damaged_or_no_checkpoint_gets_a_sentence(tmp_path):
+    point = Checkpoint(tmp_path / "checkpoint.npz")
+    with pytest.raises(InputError, match="does not exist"):
+        point.read("a" * 64)
+    point.write("a" * 64, state(), [fake_row(1)])
+    point.path.write_bytes(point.path.read_bytes()[:-100])
+    with pytest.raises(InputError, match="cut off"):
+        point.read("a" * 64)
+    fake_result().save(point.path)
+    with pytest.raises(InputError, match="another format"):
+        point.read("a" * 64)
+
+
+def test_objects_do_not_get_into_a_checkpoint(tmp_path):
+    with pytest.raises(InputError, match="objects"):
+        Checkpoint(tmp_path / "c.npz").write("a", {"x": np.array([{}], dtype=object)}, [])
+    assert not list(tmp_path.iterdir())

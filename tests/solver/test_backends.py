@@ -1,0 +1,59 @@
+"""With and without the extra packages of `evfem[fast]`: the same converged numbers."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tools.builders import block, finger
+
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import simulate
+
+HERE = Path(__file__).parent
+NAMES = (
+    "applied_force",
+    "normal_force",
+    "tangential_force",
+    "electrostatic_force",
+    "stored_energy",
+    "min_gap",
+)
+
+#: runs in a process of its own, in which the packages cannot be imported
+WITHOUT = """
+import json, sys
+for name in ("pypardiso", "numba"):
+    sys.modules[name] = None
+sys.path[:0] = json.loads(sys.argv[1])
+import test_backends
+print(json.dumps(test_backends.numbers(sys.argv[2])))
+"""
+
+
+def numbers(element):
+    """Columns of a press and a slide under a voltage, and which solver found them."""
+    motion = [Press(indentation=0.2, steps=3), Press(force=0.03, steps=2), Slide(0.4, steps=4)]
+    body, solver = finger(block(8, 3, sag=0.4)), Solver(element=element, tolerance=1e-11)
+    scene = Scene(body, Display(), Kaczmarek(), 2000.0, motion, solver=solver)
+    result = simulate(scene)
+    found = {name: getattr(result, name).tolist() for name in NAMES}
+    return found | {"backend": result.provenance["solver"]["backend"], "modules": sorted(sys.modules)}
+
+
+@pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
+def test_the_same_numbers_without_the_fast_extra(element):
+    path = json.dumps([str(HERE), *sys.path])
+    command = [sys.executable, "-c", WITHOUT, path, element]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    slow, here = json.loads(done.stdout), numbers(element)
+    assert slow["backend"] == "SuperLU"
+    assert "evfem.tissue.kernels.elastic" not in slow["modules"]
+    for name in NAMES:
+        np.testing.assert_allclose(slow[name], here[name], rtol=1e-8, atol=1e-11)
+    assert max(here["tangential_force"]) > 1e-3

@@ -1,0 +1,246 @@
+"""Condensing factorisations against dense algebra; both back ends on the same problems."""
+
+import importlib.util
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tools.grids import rectangle
+
+from evfem.solver.condensation import Pardiso, Singular, SuperLU, make_condensation, mkl_library
+from evfem.tissue.body import Body, Pattern
+from evfem.tissue.laws import NeoHookean
+
+#: PARDISO is part of evfem[fast]; without it there is one back end to test
+BACK_ENDS = [Pardiso, SuperLU] if importlib.util.find_spec("pypardiso") else [SuperLU]
+every_back_end = pytest.mark.parametrize("back_end", BACK_ENDS)
+KEPT = np.array([17, 3, 39, 0, 22, 8])  # in no order, first and last unknown among them
+
+
+@dataclass
+class Problem:
+    """Cell matrices (E, d, d) on unknowns (E, d) and the same matrix dense."""
+
+    unknowns: np.ndarray
+    cells: np.ndarray
+    size: int
+
+    @property
+    def dense(self):
+        A = np.zeros((self.size, self.size))
+        for unknowns, cell in zip(self.unknowns, self.cells, strict=True):
+            A[np.ix_(unknowns, unknowns)] += cell
+        return A
+
+    def condensed(self, kept, b):
+        """S and g by dense elimination."""
+        A = self.dense
+        i = np.setdiff1d(np.arange(self.size), kept)
+        X = np.linalg.solve(A[np.ix_(i, i)], np.column_stack([A[np.ix_(i, kept)], b[i]]))
+        return A[np.ix_(kept, kept)] - A[np.ix_(kept, i)] @ X[:, :-1], b[kept] - A[np.ix_(kept, i)] @ X[:, -1]
+
+
+def random_problem(signs=1.0, seed=4, size=40, count=70):
+    """Random positive definite cells of five unknowns, each times its sign."""
+    rng = np.random.default_rng(seed)
+    unknowns = np.array([rng.choice(size, 5, replace=False) for _ in range(count)])
+    roots = rng.normal(size=(count, 5, 5))
+    return Problem(
+        unknowns, np.broadcast_to(signs, (count,))[:, None, None] * (roots @ roots.swapaxes(1, 2)), size
+    )
+
+
+def indefinite_problem():
+    """Every fourth cell negative: the interior has eigenvalues of both signs, safely away from zero."""
+    problem = random_problem(np.where(np.arange(70) % 4, 1.0, -1.0))
+    i = np.setdiff1d(np.arange(40), KEPT)
+    values = np.linalg.eigvalsh(problem.dense[np.ix_(i, i)])
+    assert values[0] < -0.1 and values[-1] > 0.1 and np.abs(values).min() > 1e-3  # noqa: PT018
+    return problem
+
+
+def compare(factor, problem, kept, rtol):
+    """Schur complement, both halves of a solve and the whole of it against dense elimination."""
+    b = np.random.default_rng(9).normal(size=problem.size)
+    S, g = problem.condensed(kept, b)
+    given = b.copy()
+    np.testing.assert_allclose(factor.schur, S, atol=rtol * np.abs(S).max())
+    state, condensed = factor.forward(b)
+    np.testing.assert_allclose(condensed, g, atol=rtol * np.abs(g).max())
+    np.testing.assert_array_equal(b, given)
+    x = factor.backward(state, np.linalg.solve(S, g))
+    exact = np.linalg.solve(problem.dense, b)
+    np.testing.assert_allclose(x, exact, atol=rtol * np.abs(exact).max())
+    # the second half for kept unknowns that something else decides, as contact does
+    state, _ = factor.forward(b)
+    forced = np.linspace(-1.0, 2.0, kept.size)
+    x = factor.backward(state, forced)
+    np.testing.assert_allclose(x[kept], forced, atol=rtol)
+    i = np.setdiff1d(np.arange(problem.size), kept)
+    np.testing.assert_allclose((problem.dense @ x)[i], b[i], atol=rtol * np.abs(problem.dense).max())
+
+
+def test_pattern_adds_cells_up():
+    """Both triangles and an added diagonal equal the dense sum; empty rows keep a diagonal."""
+    problem = random_problem(size=45, count=20)
+    pattern = Pattern(problem.unknowns, problem.size)
+    diagonal = np.linspace(0.0, 1.0, problem.size)
+    upper = pattern.upper(problem.cells, diagonal)
+    expected = problem.dense + np.diag(diagonal)
+    np.testing.assert_allclose(pattern.full(upper).toarray(), expected, atol=1e-13)
+    assert (np.diff(pattern.indptr) >= 1).all()
+    row = np.repeat(np.arange(problem.size), np.diff(pattern.indptr))
+    assert (pattern.indices >= row).all()
+    # cells that hold an unknown twice, as those with two bone nodes do
+    twice = Pattern(np.array([[0, 1, 1]]), 2)
+    cell = np.array([[[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]]])
+    np.testing.assert_allclose(twice.full(twice.upper(cell)).toarray(), [[1.0, 5.0], [5.0, 20.0]])
+
+
+@every_back_end
+@pytest.mark.parametrize("kept", [KEPT, np.sort(KEPT), KEPT[:1]], ids=["any order", "sorted", "one"])
+def test_condensation_equals_dense_elimination(back_end, kept):
+    problem = random_problem()
+    pattern = Pattern(problem.unknowns, problem.size)
+    factor = back_end(pattern, kept)
+    factor.factorise(pattern.upper(problem.cells))
+    compare(factor, problem, kept, 1e-12)
+
+
+@every_back_end
+def test_indefinite_interior(back_end):
+    problem = indefinite_problem()
+    pattern = Pattern(problem.unknowns, problem.size)
+    factor = back_end(pattern, KEPT)
+    factor.factorise(pattern.upper(problem.cells))
+    compare(factor, problem, KEPT, 1e-10)
+
+
+@every_back_end
+def test_singular_condensed_matrix_is_no_obstacle(back_end):
+    """A bone free to move: the whole matrix is singular, its interior is not, and S has the rigid motion."""
+    unknowns = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
+    problem = Problem(unknowns, np.tile([[1.0, -1.0], [-1.0, 1.0]], (4, 1, 1)), 5)
+    pattern, kept = Pattern(unknowns, 5), np.array([4, 0])
+    factor = back_end(pattern, kept)
+    factor.factorise(pattern.upper(problem.cells))
+    np.testing.assert_allclose(factor.schur, 0.25 * np.array([[1.0, -1.0], [-1.0, 1.0]]), atol=1e-14)
+
+
+@every_back_end
+def test_one_analysis_many_factorisations(back_end):
+    """Definite, indefinite and definite again: each answer belongs to the last matrix given."""
+    definite, other = random_problem(), indefinite_problem()
+    pattern = Pattern(definite.unknowns, definite.size)
+    factor = back_end(pattern, KEPT)
+    for scale, problem in ((1.0, definite), (1.0, other), (2.5, definite), (1e-6, other)):
+        scaled = Problem(problem.unknowns, scale * problem.cells, problem.size)
+        factor.factorise(pattern.upper(scaled.cells))
+        compare(factor, scaled, KEPT, 1e-10)
+
+
+@every_back_end
+@pytest.mark.parametrize("case", ["rigid", "empty", "nan"])
+def test_singular_interior_is_reported_and_survived(back_end, case):
+    """An interior without an answer raises, and the next good matrix is factorised as if nothing had been."""
+    unknowns = np.array([[0, 1, 2], [2, 3, 4]])
+    cell = {
+        "rigid": np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),
+        "empty": np.zeros((3, 3)),
+        "nan": np.full((3, 3), np.nan),
+    }[case]
+    pattern = Pattern(unknowns, 5)
+    factor = back_end(pattern, np.array([4, 3]))
+    with pytest.raises(Singular):
+        factor.factorise(pattern.upper(np.array([cell, np.eye(3)])))
+    good = Problem(unknowns, np.array([np.eye(3) + 1.0, 2.0 * np.eye(3) - 0.5]), 5)
+    factor.factorise(pattern.upper(good.cells))
+    compare(factor, good, np.array([4, 3]), 1e-12)
+
+
+@every_back_end
+def test_zero_pivots_give_no_wrong_answer(back_end):
+    """Zeros on the interior's diagonal need pivots from elsewhere: the right answer or `Singular`."""
+    unknowns = np.array([[0, 1, 4], [2, 3, 5], [1, 2, 4], [0, 3, 5]])
+    cells = np.zeros((4, 3, 3))
+    cells[0] = [[0.0, 1.0, 0.5], [1.0, 0.0, 3.0], [0.5, 3.0, 9.0]]
+    cells[1] = [[0.0, 2.0, 0.2], [2.0, 0.0, 7.0], [0.2, 7.0, 8.0]]
+    cells[2, 0, 1] = cells[2, 1, 0] = 0.3
+    cells[3, 0, 1] = cells[3, 1, 0] = 0.1
+    problem, kept = Problem(unknowns, cells, 6), np.array([5, 4])
+    pattern = Pattern(unknowns, 6)
+    factor = back_end(pattern, kept)
+    try:
+        factor.factorise(pattern.upper(cells))
+    except Singular:
+        return
+    compare(factor, problem, kept, 1e-10)
+
+
+def test_back_ends_agree_on_tissue():
+    """Deformed skin on nearly incompressible tissue, pad and bone kept: equal to 1e-10."""
+    space = rectangle("q2p1", (8, 8), split=lambda x, y: y > 0.25)
+    mesh = space.mesh
+    sets = {"bone": mesh.node_sets["top"], "pad": mesh.node_sets["bottom"]}
+    object.__setattr__(mesh, "node_sets", sets)
+    body = Body(space, {"lower": NeoHookean(E=1.0, nu=0.3), "upper": NeoHookean(E=0.034, nu=0.4999)})
+    x, y = mesh.points.T
+    u = 0.1 * np.column_stack([x * y, -y * (1 + x)])
+    assert body.tissue.smallest_J(u) > 0.5
+    upper = body.tangent(u)
+    kept = np.concatenate([body.bone, body.unknowns[sets["pad"]].ravel()])
+    b = np.sin(np.arange(body.size))
+    answers = []
+    for back_end in BACK_ENDS:
+        factor = back_end(body.pattern, kept)
+        factor.factorise(upper)
+        state, g = factor.forward(b)
+        answers.append((factor.schur, g, factor.backward(state, np.full(kept.size, 0.1))))
+    dense = body.pattern.full(upper).toarray()
+    i = np.setdiff1d(np.arange(body.size), kept)
+    S = dense[np.ix_(kept, kept)] - dense[np.ix_(kept, i)] @ np.linalg.solve(
+        dense[np.ix_(i, i)], dense[np.ix_(i, kept)]
+    )
+    answers.append((S, answers[0][1], answers[0][2]))
+    for other in answers[1:]:
+        for ours, theirs in zip(answers[0], other, strict=True):
+            np.testing.assert_allclose(ours, theirs, atol=1e-10 * np.abs(theirs).max())
+
+
+def test_fastest_back_end_is_chosen():
+    problem = random_problem()
+    pattern = Pattern(problem.unknowns, problem.size)
+    assert type(make_condensation(pattern, KEPT)) is BACK_ENDS[0]
+
+
+def test_the_library_is_the_first_runtime_that_is_there(monkeypatch, tmp_path):
+    """Of the files that a package lists: no import library, nothing that is not on the disk."""
+    listed = ["mkl/mkl_rt.h.txt", "lib/libmkl_core.so.2", "lib/mkl_rt.lib", "lib/mkl_rt.2.lib"]
+    listed += ["lib/libmkl_rt.so.9", "lib/libmkl_rt.so.2", "lib/libmkl_rt.so"]
+    for name in listed[1:4] + listed[5:]:
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(b"")
+    files = [metadata.PackagePath(name) for name in listed]
+    for file in files:
+        file.dist = metadata.PathDistribution(tmp_path / "mkl-1.0.dist-info")
+    monkeypatch.setattr(metadata, "files", lambda package: {"mkl": files}[package])
+    assert mkl_library() == str(tmp_path / "lib/libmkl_rt.so.2")
+    monkeypatch.setattr(metadata, "files", lambda package: None)  # installed without a list of files
+    assert mkl_library() is None
+
+
+def test_no_library_without_its_package(monkeypatch):
+    def missing(package):
+        raise metadata.PackageNotFoundError(package)
+
+    monkeypatch.setattr(metadata, "files", missing)
+    assert mkl_library() is None
+
+
+def test_the_library_of_this_installation_is_found_where_its_package_is():
+    installed = any(True for _ in metadata.distributions(name="mkl"))
+    place = mkl_library()
+    assert (place is not None) == installed
+    assert place is None or Path(place).is_file()

@@ -1,0 +1,273 @@
+"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is renewed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import INSULATOR, block, finger
+
+from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.surfaces import Display, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.solver.condensation import Singular
+from evfem.solver.state import StepFailed
+from evfem.solver.strategy import Strategy
+
+SAG = 0.4
+ROUND = finger(block(8, 3, sag=SAG))
+#: with so many nodes that candidates are only some of them
+FINE = finger(block(40, 2, sag=SAG))
+
+
+def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
+    """A linearisation at rest, its model and its state."""
+    surface = Display(y=-0.1, insulator=INSULATOR) if surface is None else surface
+    law = Kaczmarek() if voltage and law is None else law
+    model = make_model(Scene(body, surface, law, voltage, motion=[Press(indentation=0.1)], **options))
+    state = model.equilibrium.rest(np.zeros(2), voltage)
+    model.equilibrium.body.linearisation.begin(state, False)
+    return model.equilibrium.body.linearisation, model, state
+
+
+def gaps(model, surface_y=-0.1):
+    """Gaps of the pad at rest: a parabola at the corners of cells, straight between them."""
+    corner = np.unique(model.mesh.points[model.mesh.cells[:, :4], 0])
+    x = model.mesh.points[model.pad.nodes, 0]
+    return np.interp(x, corner, SAG * (0.5 * corner) ** 2) - surface_y
+
+
+# -- candidates ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reach", [0.12, 0.2, 0.6])
+def test_every_node_within_reach_is_a_candidate(reach):
+    linear, model, state = made(body=FINE)
+    linear.choose_candidates(state, reach)
+    assert set(np.flatnonzero(gaps(model) <= reach)) <= set(linear.candidates)
+    # the others are farther than any
+    others = np.setdiff1d(np.arange(model.pad.nodes.size), linear.candidates)
+    assert gaps(model)[others].min(initial=np.inf) >= gaps(model)[linear.candidates].max()
+
+
+def test_the_nearest_node_is_a_candidate_where_none_is_within_reach():
+    linear, model, state = made(Display(y=-5.0), body=FINE)
+    linear.choose_candidates(state, 0.1)
+    assert np.argmin(gaps(model)) in linear.candidates
+    assert gaps(model)[linear.candidates].max() < gaps(model).min() + 0.01
+
+
+def test_touching_nodes_and_steep_attractions_are_candidates_at_any_gap():
+    linear, model, state = made(Display(y=-5.0), body=FINE)
+    far = int(np.argmax(gaps(model)))
+    touching = replace(state, status=np.where(np.arange(state.status.size) == far, STICK, OPEN))
+    linear.choose_candidates(touching, 0.1)
+    assert far in linear.candidates
+    # 1e6 V pull from 5 mm as hard as a kilovolt from 5 um
+    linear, model, state = made(Display(y=-5.0, insulator=INSULATOR), voltage=1e6, body=FINE)
+    linear.choose_candidates(state, 0.1)
+    inner = model.pad.length(model.mesh.points[model.pad.nodes, 0]) > 0.0
+    assert set(np.flatnonzero(inner)) <= set(linear.candidates)
+
+
+def test_candidates_only_grow_and_the_factorisation_is_kept_while_they_do():
+    linear, _, state = made(body=FINE)
+    linear.choose_candidates(state, 0.12)
+    first, linear.factor = linear.candidates, "a factorisation"
+    linear.choose_candidates(state, 0.11)
+    assert linear.factor == "a factorisation"
+    linear.choose_candidates(state, 0.5)
+    assert set(first) < set(linear.candidates)
+    assert linear.factor is None
+
+
+def test_a_candidate_stays_one_when_it_has_let_go():
+    linear, model, state = made(body=finger(block(40, 2, sag=1.2)))
+    far = int(np.argmax(model.mesh.points[model.pad.nodes, 1]))
+    status = np.where(np.arange(state.status.size) == far, STICK, OPEN)
+    linear.choose_candidates(replace(state, status=status), 0.11)
+    known = len(linear.candidates)
+    linear.choose_candidates(state, 0.5)
+    assert len(linear.candidates) > known
+    assert far in linear.candidates
+
+
+# -- the condensed body ----------------------------------------------------------------------------------
+
+
+def bent(model, state):
+    """The state with a smooth deformation, the bone at rest."""
+    x, y = model.mesh.points.T
+    return replace(state, u=0.03 * np.column_stack([np.sin(x) * (2.0 - y), np.cos(2.0 * x) * (2.0 - y)]))
+
+
+def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
+    linear, model, state = made()
+    state = bent(model, state)
+    linear.choose_candidates(state, 0.2)
+    linear.factorise(state)
+    body = model.body
+    K = body.pattern.full(body.tangent(state.u)).toarray()
+    kept = body.unknowns[model.pad.nodes[linear.candidates]].ravel()
+    C = np.linalg.inv(K[:-2, :-2])
+    found = linear.tangent.compliance
+    np.testing.assert_allclose(found, C[np.ix_(kept, kept)], atol=1e-10 * np.abs(found).max())
+    assert linear.made_at(state)
+    assert not linear.made_at(replace(state, u=state.u.copy()))
+    assert linear.stiffest == pytest.approx(np.diagonal(K).max(), rel=1e-14)
+
+
+def test_a_force_on_a_candidate_arrives_whole_at_the_bone():
+    """Undeformed tissue may be translated for nothing: K_bf K_ff^-1 is minus the identity, node by node."""
+    linear, _, state = made()
+    linear.choose_candidates(state, 0.2)
+    linear.factorise(state)
+    rows = linear.tangent.bone_rows
+    np.testing.assert_allclose(rows, np.tile(-np.eye(2), linear.candidates.size), atol=1e-10)
+
+
+def test_a_singular_tangent_is_a_failed_step():
+    linear, _, state = made()
+    linear.choose_candidates(state, 0.2)
+    linear.factorise(state)
+
+    def refuse(upper):
+        raise Singular("as told")
+
+    linear.factor.factorise = refuse
+    with pytest.raises(StepFailed, match="singular \\(as told\\)"):
+        linear.factorise(state)
+
+
+# -- how long it is kept ---------------------------------------------------------------------------------
+
+#: relative residuals, tolerance 1e-8, and whether patience 8 wants a new factorisation
+HISTORIES = [
+    ([1.0], False),
+    ([1e-2, 1e-3], False),  # five more tenths
+    ([1e-2, 4e-3], True),  # fourteen more
+    ([1e-3, 6e-4], True),  # stalls
+    ([1e-3, 2e-3], True),  # grows
+    ([10.0, 0.2], True),  # still far away, however quick
+    ([2e-8, 9e-9], False),  # there
+]
+
+
+@pytest.mark.parametrize(("history", "anew"), HISTORIES)
+def test_a_factorisation_is_kept_while_few_iterations_are_left(history, anew):
+    linear, _, state = made(solver=Solver(tolerance=1e-8))
+    linear.choose_candidates(state, 0.2)
+    assert linear.refactorise_if_needed(state, history)  # there is none
+    assert linear.refactorise_if_needed(state, history) == anew
+    assert linear.record.factorisations == 1 + anew
+    linear.forget()
+    assert linear.reusable is None
+    assert linear.refactorise_if_needed(state, history)
+
+
+def test_patience_is_the_number_of_iterations_left():
+    """From 4e-3 at 0.4 per iteration to 1e-8: 14.08."""
+    for patience, anew in ((14.0, True), (14.1, False)):
+        linear, _, state = made(solver=Solver(tolerance=1e-8, strategy=Strategy(patience=patience)))
+        linear.choose_candidates(state, 0.2)
+        linear.factorise(state)
+        assert linear.refactorise_if_needed(state, [1e-2, 4e-3]) == anew
+
+
+@pytest.mark.parametrize(("factor", "anew"), [(0.6, True), (0.7, False), (1.4, False), (1.6, True)])
+def test_another_time_step_asks_for_a_new_factorisation(factor, anew):
+    body = replace(ROUND, viscosity=0.01)
+    scene = Scene(
+        body, Display(y=-0.1), motion=[Press(indentation=0.1, speed=1.0)], solver=Solver(dynamics="viscous")
+    )
+    model = make_model(scene)
+    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear.choose_candidates(state, 0.2)
+    linear.start_clock(state, 1e-3)
+    linear.factorise(state)
+    linear.start_clock(state, factor * 1e-3)
+    assert model.body.dynamics.step == factor * 1e-3
+    assert linear.refactorise_if_needed(state, [1.0]) == anew
+
+
+def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_longer():
+    body = replace(ROUND, viscosity=0.01)
+    motion = [Press(indentation=0.1, speed=1.0)]
+    scene = Scene(body, Display(y=-0.1), motion=motion, solver=Solver(dynamics="viscous"))
+    model = make_model(scene)
+    linear, state = model.equilibrium.body.linearisation, model.equilibrium.rest(np.zeros(2), 0.0)
+    linear.choose_candidates(state, 0.2)
+    linear.start_clock(state, 1e-3)
+    linear.factorise(state)
+    renewed = []
+    for factor in (1.4, 1.4**2):
+        linear.start_clock(state, factor * 1e-3)
+        renewed.append(linear.refactorise_if_needed(state, [1.0]))
+    assert renewed == [False, True]
+
+
+@pytest.mark.parametrize("how", ["air", "no air", "frozen"])
+def test_a_resumed_run_makes_the_same_factorisation_again(how):
+    """To the last bit, although the state it goes on from is another one; who touched then carries the
+    attraction where there is no air."""
+    options = {"voltage": 2e5, "air_layer": how != "no air"}
+    linear, model, state = made(**options)
+    state = bent(model, state)
+    linear.begin(
+        replace(state, status=np.where(np.arange(state.status.size) % 2, STICK, OPEN)), how == "frozen"
+    )
+    linear.choose_candidates(state, 0.6)
+    linear.factorise(state)
+    at, before = linear.reusable, linear.tangent
+    again, _, rest = made(**options)
+    again.candidates = linear.candidates
+    again.restore(replace(rest, u=0.5 * state.u, voltage=10.0), at)
+    np.testing.assert_array_equal(again.tangent.schur, before.schur)
+    np.testing.assert_array_equal(again.tangent.compliance, before.compliance)
+    # which is that of the voltage, but where it is frozen
+    again.restore(rest, replace(at, voltage=1e5))
+    assert np.array_equal(again.tangent.compliance, before.compliance) == (how == "frozen")
+
+
+# -- the attraction's part -------------------------------------------------------------------------------
+
+THIN = Layer(1e-3, 3.35)
+attracted = pytest.mark.parametrize("law", [Kaczmarek(), StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
+
+
+@attracted
+@pytest.mark.parametrize(
+    "surface", [Display(THIN, y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1, insulator=THIN)]
+)
+def test_fall_and_closing_are_those_of_the_law(law, surface):
+    """Per node: -dp/dg A by central differences, and (p(0) - p(g)) A; touching nodes have neither."""
+    linear, model, state = made(surface, voltage=500.0, law=law)
+    state = replace(state, status=np.where(np.arange(state.status.size) % 4 == 1, STICK, OPEN))
+    x, y = model.mesh.points[model.pad.nodes].T
+    gap, A, layers = y - surface.y - surface.height(x), model.pad.length(x), model.attraction.layers
+
+    def pull(g):
+        return law.traction(g, 500.0, layers) * A
+
+    free = state.status == OPEN
+    fall, closing = linear.negative_stiffness(state), linear.gain_on_closing(state)
+    np.testing.assert_allclose(fall[free], -((pull(gap + 1e-5) - pull(gap - 1e-5)) / 2e-5)[free], rtol=1e-6)
+    np.testing.assert_allclose(closing[free], (pull(0.0 * gap) - pull(gap))[free], rtol=1e-12)
+    assert closing[free].max() > 10.0 * pull(gap).max()
+    assert not fall[~free].any()
+    assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
+
+
+@pytest.mark.parametrize("how", ["no law", "no voltage", "frozen"])
+def test_an_attraction_that_does_not_change_has_no_part(how):
+    linear, _, state = made() if how == "no law" else made(voltage=500.0)
+    if how == "no voltage":
+        state = replace(state, voltage=0.0)
+    linear.begin(state, how == "frozen")
+    assert not linear.negative_stiffness(state).any()
+    assert not linear.gain_on_closing(state).any()
+    linear.choose_candidates(state, 0.6)
+    linear.factorise(state)
+    np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)

@@ -1,0 +1,118 @@
+"""How hard steps are tried: limits of the numbers, and what each of them changes."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from tools.builders import block, finger
+
+from evfem.contact.surfaces import Flat
+from evfem.errors import InputError
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import simulate
+from evfem.solver.state import Record, StepFailed
+from evfem.solver.stepping import Stepper
+from evfem.solver.strategy import Strategy
+
+WRONG = {
+    "iterations": (0, -1, 10_001, 2.5, "many", True, np.nan),
+    "patience": (-0.1, np.nan, np.inf, None),
+    "smallest_part": (0.0, 1.1, -0.5, np.nan),
+    "easy": (0, 10_001, 1.5),
+    "growth": (0.99, 10.1, np.inf),
+    "reach": (-0.1, 10.1, np.nan),
+}
+ENDS = {
+    "iterations": (1, 10_000),
+    "patience": (0.0, 1e6),
+    "smallest_part": (1e-12, 1.0),
+    "easy": (1, 10_000),
+    "growth": (1.0, 10.0),
+    "reach": (0.0, 10.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, value) for name, values in WRONG.items() for value in values]
+)
+def test_numbers_beyond_their_limits_are_refused(name, value):
+    with pytest.raises(InputError, match=f"^{name}: given"):
+        Strategy(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [(name, value) for name, values in ENDS.items() for value in values]
+)
+def test_the_limits_themselves_are_allowed(name, value):
+    assert getattr(Strategy(**{name: value}), name) == value
+
+
+@dataclass
+class Steps:
+    """An equilibrium that is found wherever the way is at most `longest`, in so many iterations."""
+
+    strategy: Strategy
+    longest: float
+    takes: int = 5
+    attraction = None
+    record: Record = field(default_factory=Record)
+    ways: list = field(default_factory=list)
+
+    def step(self, old, target):
+        self.record.iterations += self.takes
+        if target - old > self.longest:
+            raise StepFailed("too far", [1.0])
+        self.ways.append(target - old)
+        return target
+
+
+def ways(strategy, longest, takes=5):
+    steps = Steps(strategy, longest, takes)
+    Stepper(steps).follow(0.0, lambda _, share: share, lambda old, new: None)
+    assert sum(steps.ways) == pytest.approx(1.0, rel=1e-14)
+    return steps.ways
+
+
+def test_parts_are_halved_until_they_hold_and_grow_by_the_factor():
+    """1 and 1/2 fail, 1/4 holds; then each part is 1.25 times the last one, the end is met exactly."""
+    assert ways(Strategy(), 0.3) == pytest.approx([0.25, 0.15625, 0.1953125, 0.244140625, 0.154296875])
+    assert ways(Strategy(growth=1.0), 0.3) == [0.25] * 4
+    # no part is easy
+    assert ways(Strategy(easy=4), 0.3) == [0.25] * 4
+
+
+def test_the_smallest_part_is_the_last_one_tried():
+    assert ways(Strategy(smallest_part=0.25, growth=1.0), 0.3) == [0.25] * 4
+    with pytest.raises(StepFailed):
+        ways(Strategy(smallest_part=0.26), 0.3)
+
+
+def work(*motion, body=None, friction=0.3, **numbers):
+    """Iterations and factorisations of a smooth motion, and its last normal force."""
+    solver = Solver(strategy=Strategy(**numbers))
+    body = body or finger(block(8, 3, sag=0.4))
+    result = simulate(Scene(body, Flat(friction=friction), motion=motion, solver=solver))
+    done = result.provenance["solver"]
+    return done["iterations"], done["factorisations"], result.normal_force[-1]
+
+
+def test_a_step_begins_ahead_on_the_last_ones_way():
+    """A sticking block sheared in ten equal steps, a fresh tangent each time: where the guess is the last
+    state, its error is of first order in the step, along the trend of second, as after one iteration. So
+    each step but the first, which comes from a press, saves one.
+    """
+    motion, body = [Press(indentation=0.4, steps=2), Slide(0.5, steps=10)], finger(block(8, 3))
+    ahead, _, force = work(*motion, body=body, friction=10.0, patience=0.0)
+    behind, _, same = work(*motion, body=body, friction=10.0, patience=0.0, reach=0.0)
+    assert ahead <= behind - 8
+    assert force == pytest.approx(same, rel=1e-7)
+
+
+def test_patience_trades_factorisations_for_iterations():
+    motion = [Press(indentation=0.3, steps=6), Slide(1.2, steps=12)]
+    iterations, few, force = work(*motion, patience=1e6)
+    fewer, factorisations, same = work(*motion, patience=0.0)
+    assert few < factorisations
+    assert fewer < iterations
+    assert force == pytest.approx(same, rel=1e-7)

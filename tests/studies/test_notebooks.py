@@ -1,0 +1,89 @@
+"""The notebooks, run as scripts in a folder of their own: what they find, and what they leave behind."""
+
+import json
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from evfem import data
+
+NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
+NAMES = ("compare_participants", "design_a_voltage_signal", "explore_a_scene")
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """name -> what the notebook leaves in its namespace, and its folder; each is run once."""
+    found = {}
+
+    def run(name):
+        if name not in found:
+            folder = tmp_path_factory.mktemp(name)
+            with pytest.MonkeyPatch.context() as patch:
+                patch.chdir(folder)
+                patch.setenv("MPLBACKEND", "Agg")
+                patch.setitem(sys.modules, "ipywidgets", None)  # as where it is not installed
+                found[name] = runpy.run_path(str(NOTEBOOKS / f"{name}.py")), folder
+        return found[name]
+
+    return run
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_notebook_is_cells_with_a_title_and_no_output(name):
+    text = (NOTEBOOKS / f"{name}.py").read_text(encoding="utf-8")
+    cells = re.split(r"^# %%", text, flags=re.M)
+    assert "format_name: percent" in cells[0]
+    assert cells[1].startswith(" [markdown]\n# # ")
+    assert len(cells) > 8
+    assert f"`{name}.py`" in (NOTEBOOKS / "README.md").read_text(encoding="utf-8")
+
+
+def test_all_notebooks_are_here_as_text():
+    assert sorted(p.stem for p in NOTEBOOKS.glob("*.py")) == sorted(NAMES)
+    assert not list(NOTEBOOKS.glob("*.ipynb"))
+
+
+def test_the_explored_scene_balances(ran):
+    found, _ = ran("explore_a_scene")
+    result = found["result"]
+    assert np.abs(found["balance"]).max() < 1e-8 * result.normal_force.max()
+    assert result.tangential_force[-1] == pytest.approx(0.3 * result.normal_force[-1], rel=1e-6)
+    assert found["controls"] is None
+    more = found["slide"](voltage=2000.0, distance=0.2)
+    assert more.electrostatic_force[2] > 3.5 * result.electrostatic_force[2]  # about U^2, and the pad follows
+
+
+def test_the_designed_signal_does_what_was_wished(ran):
+    found, folder = ran("design_a_voltage_signal")
+    closed, exact = (found["comparisons"][name] for name in ("closed form", "exact"))
+    assert closed.pearson > 0.99
+    assert exact.relative_l2 < 0.5 * closed.relative_l2
+    # in full slip there is a voltage for every wish
+    slipping = exact.position > max(found["real"].full_slip, 1.0)
+    assert np.abs(exact.error[slipping]).max() < 1e-8
+    assert found["felt"].friction[-1] == pytest.approx(0.6, rel=1e-6)
+    assert found["rounding"] <= 0.5 * 2500.0 / 32767 * (1 + 1e-9)
+    assert sorted(path.name for path in folder.iterdir()) == ["signal.csv", "signal.hjif", "signal.wav"]
+    assert json.loads((folder / "signal.hjif").read_text())["perceptions"]
+
+
+def test_the_compared_participants_are_those_of_fig_5(ran):
+    """The closed forms of three fingers by hand, and what ridges and deformation may change."""
+    found, folder = ran("compare_participants")
+    table, chosen = data.load("table1"), found["chosen"]
+    t = (np.arange(800) + 0.5) / 800 * np.pi / 2
+    for i in chosen:
+        a, b, c = (table[key][i] for key in "abc")
+        gap = 0.25 + b / 2 * (2 - np.cos(t)[:, None] - np.cos(t))
+        weight = a * c * np.cos(np.pi / 6) * np.cos(t)[:, None] * np.cos(t) * (np.pi / 1600) ** 2
+        pull = 8.8541878128e-12 * 2000.0**2 / 2 / ((gap + 0.38 / 1650 + 0.09 / 3.35) * (gap + 0.47))
+        assert found["closed"]["kaczmarek"][i] == pytest.approx(1e3 * np.sum(weight * pull), rel=1e-5)
+    for name in ("kaczmarek", "strong_troxel"):
+        change = found["computed"][name] / found["closed"][name][chosen] - 1.0
+        assert -0.07 < change.min() <= change.max() < 0.0
+    assert not list(folder.iterdir())

@@ -1,0 +1,343 @@
+"""Sweeps run: the numbers of single runs, failures in the table, kills, resuming, processes and Dask."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from tools.builders import block
+from tools.workers import work_or_die
+
+import evfem as ev
+from evfem import cli
+from evfem.errors import InputError, StorageError
+from evfem.mesh import file as meshfile
+from evfem.scene import file as scenefile
+from evfem.sweeps import file as sweepfile
+from evfem.sweeps import folder as sweepfolder
+from evfem.sweeps import pools
+from evfem.sweeps.run import compute
+
+SWEEP = """
+version = 1
+outputs = ["normal_force.last", "normal_force.mean", "tangential_force.min.1", "indentation.min"]
+[scene.finger]
+mesh = "block.vtu"
+[scene.finger.materials.tissue]
+law = "neo_hookean"
+E = 0.1
+nu = 0.4
+[scene.surface]
+kind = "flat"
+[[scene.motion]]
+kind = "press"
+indentation = 0.2
+steps = 2
+[[scene.motion]]
+kind = "slide"
+distance = 0.2
+steps = 2
+[grid]
+surface.friction = [0.2, 0.4, -1.0]
+motion.0.indentation = [0.1, 0.2]
+"""
+
+
+@pytest.fixture
+def plan(tmp_path):
+    """Six points on a block of 45 nodes, two of them with a friction that cannot be."""
+    meshfile.write(block(), tmp_path / "block.vtu")
+    (tmp_path / "many.toml").write_text(SWEEP)
+    return tmp_path / "many.toml"
+
+
+def table(folder):
+    with (folder / "sweep.csv").open(newline="") as lines:
+        return list(csv.DictReader(lines))
+
+
+def test_the_table_has_the_numbers_of_single_runs(plan):
+    result = ev.sweep(plan, workers=1)
+    assert result.columns[:3] == ("point", "surface.friction", "motion.0.indentation")
+    assert [row["status"] for row in result.rows] == ["done"] * 4 + ["refused"] * 2
+    for point in sweepfile.load(plan).points()[:4]:
+        run = ev.simulate(scenefile.loads(point.text, plan.parent))
+        row = result.rows[point.index]
+        assert row["normal_force.last"] == run.normal_force[-1]
+        assert row["normal_force.mean"] == pytest.approx(run.normal_force.mean(), rel=1e-14)
+        assert row["tangential_force.min.1"] == run.tangential_force[2:].min()
+        assert row["indentation.min"] == run.indentation.min()
+    assert result.rows[4]["message"].startswith("surface.friction: given -1.0; allowed: a number")
+    assert np.isnan(result["normal_force.last"][4:]).all()
+    assert result["status"][-1] == "refused"
+    with pytest.raises(InputError, match="column: given force"):
+        result["force"]
+    assert repr(result) == "SweepResult(6 points: 4 done, 2 refused)"
+
+
+def test_the_folder_has_table_parquet_and_provenance(plan, tmp_path):
+    from pyarrow import parquet
+
+    result = ev.sweep(plan, tmp_path / "out", workers=1)
+    rows = table(tmp_path / "out")
+    assert [float(row["normal_force.last"]) for row in rows[:4]] == result["normal_force.last"][:4].tolist()
+    assert rows[5]["normal_force.last"] == ""
+    read = parquet.read_table(tmp_path / "out" / "sweep.parquet")
+    assert read.column_names == list(result.columns)
+    assert read["normal_force.last"].to_pylist() == [row["normal_force.last"] for row in result.rows]
+    assert read["message"].to_pylist() == [row["message"] for row in result.rows]
+    made = json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert made["points"] == {"requested": 6, "done": 4, "refused": 2, "not_converged": 0, "failed": 0}
+    assert made["scene"]["tables"]["finger"]["materials"]["tissue"]["E"] == 0.1
+    assert made["grid"] == {"surface.friction": [0.2, 0.4, -1.0], "motion.0.indentation": [0.1, 0.2]}
+    assert made["versions"]["evfem"] == ev.__version__
+    assert made["complete"]
+
+
+def test_samples_are_in_the_provenance(plan, tmp_path):
+    samples = (
+        "[samples]\ncount = 2\nseed = 9\n[samples.parameters]\nsurface.friction = {uniform = [0.1, 0.2]}"
+    )
+    plan.write_text(SWEEP.replace("surface.friction = [0.2, 0.4, -1.0]", "") + samples)
+    result = ev.sweep(plan, tmp_path / "out", workers=1)
+    made = json.loads((tmp_path / "out" / "sweep.json").read_text())["samples"]
+    assert made["of"] == {"surface.friction": "Uniform(low=0.1, high=0.2)"}
+    assert (made["seed"], made["count"], made["method"]) == (9, 2, "latin_hypercube")
+    drawn = sweepfile.load(plan).samples.draw()["surface.friction"]
+    np.testing.assert_array_equal(result["surface.friction"], np.tile(drawn, 2))
+
+
+def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
+    out, computed = tmp_path / "out", []
+    ev.sweep(plan, out, workers=1)
+    before = table(out)
+    evaluate = ev.sweep.__globals__["evaluate"]
+    monkeypatch.setitem(
+        ev.sweep.__globals__, "evaluate", lambda job: computed.append(job[0]) or evaluate(job)
+    )
+    again = ev.sweep(plan, out, workers=1, resume=True)
+    assert computed == []
+    assert again.provenance["reused"] == 4
+    assert table(out) == before
+    # one point lost, one damaged, one of another format, and one that is new
+    lost, damaged, foreign, kept = sorted((out / "points").iterdir())
+    lost.unlink()
+    damaged.write_text(damaged.read_text()[:-9])
+    foreign.write_text(foreign.read_text().replace("point-1", "point-0"))
+    stamp = kept.stat().st_mtime_ns
+    plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.05, 0.1, 0.2]\n"))
+    third = ev.sweep(plan, out, workers=1, resume=True)
+    assert len(computed) == 3 + 2
+    assert kept.stat().st_mtime_ns == stamp
+    for row in before[:4]:
+        same = [r for r in third.rows if str(r["surface.friction"]) == row["surface.friction"]]
+        same = [r for r in same if str(r["motion.0.indentation"]) == row["motion.0.indentation"]]
+        assert [str(r["normal_force.last"]) for r in same] == [row["normal_force.last"]]
+    # with other outputs every point is another
+    plan.write_text(SWEEP.replace('"indentation.min"', '"indentation.max"'))
+    fourth = ev.sweep(plan, out, workers=1, resume=True)
+    assert fourth.provenance["reused"] == 0
+    np.testing.assert_allclose(fourth["indentation.max"][:4], [0.1, 0.2] * 2, rtol=1e-12)
+    # and so with another mesh
+    meshfile.write(block(height=1.9), tmp_path / "block.vtu")
+    assert ev.sweep(plan, out, workers=1, resume=True).provenance["reused"] == 0
+
+
+def test_equal_points_are_computed_once(plan, monkeypatch):
+    computed, evaluate = [], ev.sweep.__globals__["evaluate"]
+    monkeypatch.setitem(
+        ev.sweep.__globals__, "evaluate", lambda job: computed.append(job[0]) or evaluate(job)
+    )
+    plan.write_text(SWEEP.replace("[0.2, 0.4, -1.0]", "[0.2, 0.2]"))
+    result = ev.sweep(plan, workers=1)
+    assert len(computed) == 2
+    assert result.rows[0]["normal_force.last"] == result.rows[2]["normal_force.last"]
+
+
+def test_points_that_fail_are_rows_with_their_message(plan, tmp_path, monkeypatch):
+    def failing(scene):
+        friction = scene.surface.friction
+        if friction == 0.2:
+            raise ev.NotConverged(3, [1.0, 0.5], "try smaller steps")
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setitem(ev.sweep.__globals__, "simulate", failing)
+    result = ev.sweep(plan, tmp_path / "out", workers=1)
+    assert result["status"] == ["not_converged"] * 2 + ["failed"] * 2 + ["refused"] * 2
+    assert result.rows[0]["message"].startswith("step 3 did not converge")
+    assert result.rows[2]["message"] == "ZeroDivisionError: by nothing"
+    # what failed for an unknown reason is tried again, what did not converge is not
+    monkeypatch.undo()
+    again = ev.sweep(plan, tmp_path / "out", workers=1, resume=True)
+    assert again["status"] == ["not_converged"] * 2 + ["done"] * 2 + ["refused"] * 2
+
+
+def test_a_sweep_without_a_valid_point_writes_nothing(plan, tmp_path):
+    plan.write_text(SWEEP.replace("surface.friction = [0.2, 0.4, -1.0]", "surface.fricton = [0.2]"))
+    with pytest.raises(InputError, match=r"no valid point: surface\.fricton: given an unknown key"):
+        ev.sweep(plan, tmp_path / "out", workers=1)
+    assert not (tmp_path / "out").exists()
+
+
+def test_files_of_others_are_never_touched(plan, tmp_path):
+    out = tmp_path / "out"
+    (out / "points").mkdir(parents=True)
+    with pytest.raises(InputError, match="points was not written by a sweep"):
+        ev.sweep(plan, out, workers=1)
+    (out / "points").rmdir()
+    ev.sweep(plan, out, workers=1)
+    for name in ("mine.csv", "points/mine.json", f"points/.{64 * 'a'}.json.123.tmp"):
+        (out / name).write_text("mine")
+    plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.15]\n"))
+    ev.sweep(plan, out, workers=1)
+    assert {p.name for p in out.iterdir()} == {
+        ".evfem-sweep", "mine.csv", "points", "sweep.csv", "sweep.json", "sweep.parquet"
+    }  # fmt: skip
+    assert len(list((out / "points").iterdir())) == 3  # two points of the new sweep, and mine
+
+
+def test_a_folder_that_cannot_be_used(plan, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StorageError, match="cannot use"):
+        ev.sweep(plan, tmp_path / "file", workers=1)
+
+
+# -- processes -------------------------------------------------------------------------------------------
+
+
+def test_processes_give_the_same_numbers(plan):
+    alone, beside = ev.sweep(plan, workers=1), ev.sweep(plan, workers=2)
+    for one, two in zip(alone.rows, beside.rows, strict=True):
+        assert {k: v for k, v in one.items() if k != "seconds"} == {
+            k: v for k, v in two.items() if k != "seconds"
+        }
+
+
+def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
+    words = {"a": "1", "b": "die", "c": "333", "d": "4444", "e": "55555", "f": "666666"}
+    jobs = {key: (str(tmp_path / "died"), word) for key, word in words.items()}
+    kept = {}
+    compute(work_or_die, jobs, pools.open_pool(2, None), kept.__setitem__)
+    assert {key: answer.outputs.get("length") for key, answer in kept.items()} == {
+        "a": 1.0, "b": None, "c": 3.0, "d": 4.0, "e": 5.0, "f": 6.0
+    }  # fmt: skip
+    assert (kept["b"].status, kept["b"].message[:16]) == ("failed", "its process died")
+
+
+def test_a_script_without_guard_is_told_so(tmp_path):
+    script = "from evfem.sweeps import pools\nwith pools.open_pool(2, None)(): pass\n"
+    (tmp_path / "script.py").write_text(script)
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert "workers: given 2, and no process can start; allowed: workers=1, or the call of sweep below" in (
+        done.stderr.replace("\n", " ")
+    )
+
+
+LONG = SWEEP.replace("[0.1, 0.2]\n", f"{[round(0.1 + 0.002 * i, 6) for i in range(12)]}\n")
+
+
+def started(plan, out, *options):
+    words = [sys.executable, "-m", "evfem.cli", "sweep", str(plan), "--out", str(out), *options]
+    return subprocess.Popen(words, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def until(true, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.02)
+
+
+def children(pid):
+    """Processes whose parent is `pid`."""
+    found = []
+    for name in os.listdir("/proc"):
+        if name.isdecimal():
+            try:
+                with open(f"/proc/{name}/stat") as file:
+                    fields = file.read().rsplit(")", 1)[1].split()
+            except OSError:
+                continue
+            if int(fields[1]) == pid and fields[0] != "Z":
+                found.append(int(name))
+    return found
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
+    plan.write_text(LONG)
+    out = tmp_path / "out"
+    run = started(plan, out, "--workers", "2")
+    until(lambda: (out / "points").is_dir() and len(list((out / "points").glob("[!.]*"))) >= 3)
+    workers = children(run.pid)
+    os.kill(run.pid, number)
+    message = run.communicate(timeout=60)[1]
+    assert run.returncode == (130 if number == signal.SIGINT else -signal.SIGKILL), message
+    assert workers
+    until(lambda: not any(os.path.exists(f"/proc/{pid}/fd/0") for pid in workers))  # no orphans
+    kept = {p.name: p.stat().st_mtime_ns for p in (out / "points").glob("[!.]*")}
+    assert 3 <= len(kept) < 24
+    for name in kept:
+        assert sweepfolder.SweepFolder(out).read(name.removesuffix(".json")).status == "done"
+    if number == signal.SIGINT:
+        assert "interrupted; finished points are in" in message
+        assert len(table(out)) == len(kept) + 12
+    assert cli.main(["sweep", str(plan), "--out", str(out), "--resume", "--workers", "1"]) == 3
+    assert len(table(out)) == 36
+    now = {p.name: p.stat().st_mtime_ns for p in (out / "points").iterdir()}
+    assert len(now) == 24
+    assert {name: now[name] for name in kept} == kept
+
+
+# -- Dask ------------------------------------------------------------------------------------------------
+
+
+def test_a_dask_cluster_gives_the_same_numbers(plan):
+    from distributed import LocalCluster
+
+    alone = ev.sweep(plan, workers=1)
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
+    ) as cluster:
+        beside = ev.sweep(plan, scheduler=cluster.scheduler_address)
+    started_for_it = ev.sweep(plan, scheduler="local", workers=1)
+    for other in (beside, started_for_it):
+        for name in alone.columns[:-2]:
+            np.testing.assert_array_equal(other[name], alone[name])
+
+
+@pytest.mark.parametrize(
+    ("options", "sentence"),
+    [
+        ({"workers": 0}, "workers: given 0"),
+        ({"workers": 2, "scheduler": "tcp://127.0.0.1:1"}, "allowed: no workers beside the address"),
+        ({"scheduler": "nowhere"}, "allowed: the address of a running Dask scheduler"),
+    ],
+)
+def test_pools_that_cannot_be(plan, tmp_path, options, sentence):
+    with pytest.raises(InputError, match=sentence):
+        ev.sweep(plan, tmp_path / "out", **options)
+
+
+# -- the command -----------------------------------------------------------------------------------------
+
+
+def test_the_command_says_what_became_of_the_points(plan, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["sweep", str(plan), "--workers", "1"]) == 3
+    shown = capsys.readouterr()
+    assert shown.out == "6 points: 4 done, 2 refused; table in many-out/sweep.csv\n"
+    lines = shown.err.splitlines()
+    assert lines[0] == "evfem: 2 of 6 points are no valid scene"
+    assert lines[1:-2] == ["point 3 of 6", "point 4 of 6", "point 5 of 6", "point 6 of 6"]
+    assert lines[-1].startswith("evfem: point 5: surface.friction: given -1.0")
+    plan.write_text(SWEEP.replace(", -1.0]", "]"))
+    assert cli.main(["sweep", str(plan), "--workers", "1", "--resume"]) == 0
+    assert capsys.readouterr().out == "4 points: 4 done; table in many-out/sweep.csv\n"
+    assert cli.main(["sweep", "missing.toml"]) == 2

@@ -1,0 +1,304 @@
+"""Viscous and inertial forces: objectivity, tangents, what they dissipate and carry, and motions in time."""
+
+import numpy as np
+import pytest
+from tools.grids import assembled, fine_points, rectangle, solve
+
+from evfem.scene.terms import form
+from evfem.tissue.body import Body
+from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
+from evfem.tissue.forms import make_term
+from evfem.tissue.laws import LinearElastic, NeoHookean
+from evfem.tissue.space import ELEMENTS
+from evfem.tissue.weakform import Tissue
+
+every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+STEP = 2e-3
+
+
+def bend(x, y):
+    """A warp that curves every edge."""
+    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
+
+
+def wavy(points, size=0.08, phase=0.0):
+    """A smooth displacement field."""
+    x, y = points.T
+    return size * np.column_stack([np.sin(2 * x + y + phase) + y * y, np.cos(3 * x - y) + x * y])
+
+
+def dynamics_on(space, viscous=True, inertial=False, compiled=True):
+    """Different viscosities and densities in every cell; one cell without viscosity."""
+    E = len(space.nodes)
+    eta = np.linspace(0.0, 0.3, E) if viscous else None
+    term = Dynamics(space, eta, np.linspace(1.0, 2.0, E) * 1e-6 if inertial else None)
+    if not compiled:
+        term.kernels = None
+    return term
+
+
+class Sum:
+    """Tissue with further terms, as `solve` wants it."""
+
+    def __init__(self, tissue, *terms):
+        self.space, self.smallest_J, self.tissue, self.terms = tissue.space, tissue.smallest_J, tissue, terms
+
+    def forces(self, u):
+        return self.tissue.forces(u) + sum(term.forces(u) for term in self.terms)
+
+    def tangent(self, u):
+        cells = self.tissue.tangent(u)
+        for term in self.terms:
+            term.add_tangent(u, cells)
+        return cells
+
+
+# -- viscosity -------------------------------------------------------------------------------------------
+
+
+@every_element
+@pytest.mark.parametrize("compiled", [True, False])
+def test_rotation_is_not_resisted(element, compiled):
+    """A deformed body turned by 40 degrees within the step feels nothing; a straining one turned with its
+    frame feels the turned forces (objectivity)."""
+    space = rectangle(element, (2, 2), warp=bend)
+    X = space.mesh.points
+    term = dynamics_on(space, compiled=compiled)
+    start = wavy(X)
+    c, s = np.cos(0.7), np.sin(0.7)
+    R = np.array([[c, -s], [s, c]])
+
+    def turned(u):
+        return (X + u) @ R.T + [3.0, -1.0] - X
+
+    term.begin(start, np.zeros_like(X), STEP)
+    strained = term.forces(wavy(X, phase=0.3))
+    assert np.abs(strained).max() > 0.1
+    assert np.abs(term.forces(turned(start))).max() < 1e-12
+    np.testing.assert_allclose(term.forces(turned(wavy(X, phase=0.3))), strained @ R.T, atol=1e-12)
+
+
+@every_element
+@pytest.mark.parametrize("kind", ["viscous", "compiled viscous", "inertial", "both"])
+def test_tangent_is_the_derivative_of_the_forces(element, kind):
+    """Central differences of every unknown; the terms add to what the cell matrices held before."""
+    space = rectangle(element, (2, 2), warp=bend)
+    X = space.mesh.points
+    term = dynamics_on(space, kind != "inertial", kind in ("inertial", "both"), kind != "viscous")
+    term.begin(wavy(X), 5.0 * wavy(X, phase=1.0), STEP)
+    u = wavy(X, phase=0.3)
+    before = np.random.default_rng(1).normal(
+        size=Tissue(space, {"lower": NeoHookean(E=1.0, nu=0.3)}).tangent(u).shape
+    )
+    cells = before.copy()
+    term.add_tangent(u, cells)
+    K = assembled(space, cells - before).toarray()
+    columns = np.empty_like(K)
+    for i in range(u.size):
+        step = np.zeros(u.size)
+        step[i] = 1e-5
+        step = step.reshape(u.shape)
+        columns[:, i] = (term.forces(u + step) - term.forces(u - step)).ravel() / 2e-5
+    np.testing.assert_allclose(K, columns, atol=1e-7 * np.abs(K).max())
+    np.testing.assert_allclose(K, K.T, atol=1e-11 * np.abs(K).max())
+
+
+def test_simple_shear_by_hand():
+    """F = [[1, g], [0, 1]]: dE = [[0, g], [g, g^2]]/2, so P_v12 = eta g (1 + g^2)/dt on the lid, and
+    dissipated is eta (g^2 + g^4/2)/dt times the area."""
+    space = rectangle("q2", (2, 2), size=(3.0, 2.0))
+    eta, g = 0.2, 0.25
+    term = Dynamics(space, np.full(4, eta), None)
+    u = space.mesh.points[:, 1:] * [g, 0.0]
+    term.begin(np.zeros_like(u), np.zeros_like(u), STEP)
+    lid = term.forces(u)[space.mesh.node_sets["top"]].sum(axis=0)
+    assert lid[0] == pytest.approx(3.0 * eta * g * (1 + g * g) / STEP, rel=1e-12)
+    assert term.dissipation(u) == pytest.approx(6.0 * eta * (g**2 + 0.5 * g**4) / STEP, rel=1e-12)
+
+
+@every_element
+def test_dissipation_is_the_work_of_the_viscous_forces(element):
+    """Never negative, whichever way the step goes; equal to f_v . du up to a share that is linear in du."""
+    space = rectangle(element, (2, 2), warp=bend)
+    X = space.mesh.points
+    term = dynamics_on(space, inertial=True)
+    bare = dynamics_on(space)
+    start = wavy(X)
+    away = []
+    for size in (1e-3, 5e-4, -5e-4):
+        u = start + size * np.sin(np.arange(X.size)).reshape(X.shape)
+        for t in (term, bare):
+            t.begin(start, np.zeros_like(u), STEP)
+        assert term.dissipation(u) == pytest.approx(bare.dissipation(u), rel=1e-12)
+        assert term.dissipation(u) > 0.0
+        away.append(np.sum(bare.forces(u) * (u - start)) / bare.dissipation(u) - 1.0)
+    assert abs(away[1]) < 0.05
+    assert away[0] / away[1] == pytest.approx(2.0, abs=0.1)
+    assert away[1] * away[2] < 0.0
+    assert term.dissipation(start) == 0.0
+
+
+# -- inertia ---------------------------------------------------------------------------------------------
+
+
+@every_element
+def test_mass_holds_area_momentum_and_energy(element):
+    """Total mass = density times area; a translation carries m v; turning at w has w^2/2 of int r^2."""
+    space = rectangle(element, (3, 2), size=(3.0, 2.0), jitter=0.2)
+    density = 1.7e-9
+    term = Dynamics(space, None, np.full(len(space.nodes), density))
+    assert term.mass.sum() == pytest.approx(6.0 * density, rel=1e-13)
+    X = space.mesh.points
+    velocity = np.broadcast_to([40.0, -10.0], X.shape)
+    term.begin(0 * X, np.zeros_like(X), 1.0)
+    momentum = term.forces(np.array(velocity)).sum(axis=0)  # from rest to v within a second
+    np.testing.assert_allclose(momentum, 6.0 * density * velocity[0], rtol=1e-12)
+    assert term.kinetic_energy(velocity) == pytest.approx(0.5 * 6.0 * density * 1700.0, rel=1e-12)
+    spin = 7.0 * X @ np.array([[0.0, 1.0], [-1.0, 0.0]])
+    polar = 3.0 * 2.0 * (3.0**2 + 2.0**2) / 3.0  # int x^2 + y^2 over 3 x 2 from its corner
+    assert term.kinetic_energy(spin) == pytest.approx(0.5 * density * 49.0 * polar, rel=1e-12)
+
+
+@every_element
+def test_mass_matrices_equal_finer_quadrature(element):
+    """int N_a N_b with many more points, on straight cells."""
+    space = rectangle(element, (2, 2), jitter=0.2)
+    _, dx, value, _, nodes = fine_points(space, 12)
+    ours, theirs = np.zeros((2, space.size, space.size))
+    for e, cell in enumerate(mass_matrices(space)):
+        ours[np.ix_(space.nodes[e], space.nodes[e])] += cell
+        theirs[np.ix_(nodes[e], nodes[e])] += np.einsum("aq,bq,q->ab", value[:, e], value[:, e], dx[e])
+    np.testing.assert_allclose(ours, theirs, atol=1e-14)
+
+
+def test_free_fall():
+    """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere, unstrained."""
+    space = rectangle("q1_fbar", (2, 2), jitter=0.2)
+    law, gravity, dt = NeoHookean(E=0.05, nu=0.48), -9810.0, 1e-3
+    term = make_dynamics(space, {"lower": law}, viscosity=1e-3, inertia=True)
+    body = Sum(Tissue(space, {"lower": law}), term)
+    weight = np.zeros((space.size, 2))
+    np.add.at(weight[:, 1], space.nodes, gravity * law.density * mass_matrices(space).sum(axis=2))
+    u = velocity = np.zeros((space.size, 2))
+    for n in range(1, 6):
+        term.begin(u, velocity, dt)
+        u = solve(body, u, np.ones(u.shape, dtype=bool), weight)
+        velocity = term.velocity(u)
+        np.testing.assert_allclose(velocity, np.broadcast_to([0.0, n * gravity * dt], u.shape), atol=1e-9)
+        expected = [0.0, 0.5 * n * (n + 1) * gravity * dt**2]
+        np.testing.assert_allclose(u, np.broadcast_to(expected, u.shape), atol=1e-12)
+        assert term.dissipation(u) < 1e-20
+
+
+def shear_oscillation(steps, viscosity=0.0):
+    """Top of a block sheared in its first mode and let go, after an eighth of the period: u/u0."""
+    height, law = 2.0, LinearElastic(E=0.26, nu=0.3, density=1e-6)  # mu = 0.1 MPa
+    frequency = 0.5 * np.pi / height * np.sqrt(law.mu / law.density)
+    space = rectangle("q2", (1, 6), size=(0.5, height))
+    X, sets = space.mesh.points, space.mesh.node_sets
+    term = make_dynamics(space, {"lower": law}, viscosity, inertia=True)
+    body = Sum(Tissue(space, {"lower": law}), term)
+    free = np.zeros(X.shape, dtype=bool)
+    free[:, 0] = True
+    free[sets["bottom"]] = False
+    u = np.column_stack([1e-4 * np.sin(0.5 * np.pi * X[:, 1] / height), 0.0 * X[:, 0]])
+    velocity, dt = np.zeros_like(u), 0.25 * np.pi / frequency / steps
+    for _ in range(steps):
+        term.begin(u, velocity, dt)
+        u = solve(body, u, free)
+        velocity = term.velocity(u)
+    return u[sets["top"][0], 0] / 1e-4, frequency * dt
+
+
+def test_free_oscillation_converges_in_time():
+    """omega = pi/(2 h) sqrt(mu/rho), u(T/8) = cos(pi/4): error of first order in dt, and backward Euler's own
+    recurrence (1 + (omega dt)^2) u_{n+1} = 2 u_n - u_{n-1} to 1e-5 at every dt."""
+    errors = []
+    for steps in (16, 32, 64):
+        found, phase = shear_oscillation(steps)
+        old, now = 1.0, 1.0
+        for _ in range(steps):
+            old, now = now, (2.0 * now - old) / (1.0 + phase**2)
+        assert found == pytest.approx(now, rel=2e-5)
+        errors.append(abs(found - np.sqrt(0.5)))
+    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.12)
+    assert errors[1] / errors[2] == pytest.approx(2.0, abs=0.06)
+
+
+def test_creep_takes_the_relaxation_time():
+    """A constant shear sigma: g = sigma/mu (1 - exp(-t/tau)), and backward Euler's (g + r g_end)/(1 + r),
+    r = dt/tau, step by step; the law's own time wins over the finger's."""
+    space = rectangle("q1", (1, 1))
+    X, sets = space.mesh.points, space.mesh.node_sets
+    sigma, dt = 1e-7, 0.25  # so small that g^2 does not count
+    for law, default, tau in (
+        (NeoHookean(E=0.26, nu=0.3), 2.0, 2.0),
+        (NeoHookean(E=0.26, nu=0.3, viscosity=0.5), 2.0, 0.5),
+    ):
+        term = make_dynamics(space, {"lower": law}, default, inertia=False)
+        body = Sum(Tissue(space, {"lower": law}), term)
+        free = np.zeros(X.shape, dtype=bool)
+        free[sets["top"], 0] = True
+        load = np.zeros(X.shape)
+        load[sets["top"], 0] = 0.5 * sigma
+        u, g = np.zeros(X.shape), 0.0
+        for _ in range(4):
+            term.begin(u, np.zeros_like(u), dt)
+            u = solve(body, u, free, load)
+            g = (g + dt / tau * sigma / law.mu) / (1.0 + dt / tau)
+            assert u[sets["top"][0], 0] == pytest.approx(g, rel=1e-6)
+
+
+# -- which terms there are -------------------------------------------------------------------------------
+
+
+def test_only_what_is_asked_for():
+    """No time, no forces; no relaxation time, no viscosity; neither viscosity nor inertia, no term at all."""
+    space = rectangle("q1", (2, 2), split=lambda x, y: y > 0.5)
+    laws = {
+        "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),
+        "upper": NeoHookean(E=2.6, nu=0.3),
+    }
+    assert make_dynamics(space, laws, 0.0, inertia=False) is None
+    viscous = make_dynamics(space, laws, 0.5, inertia=False)
+    np.testing.assert_allclose(viscous.viscosity, [0.0, 0.0, 0.5, 0.5])  # tau times mu = 1 MPa
+    assert viscous.mass is None
+    inertial = make_dynamics(space, laws, 0.0, inertia=True)
+    assert inertial.viscosity is None
+    np.testing.assert_allclose(inertial.mass.sum(axis=(1, 2)), 0.25 * np.array([2e-9, 2e-9, 1e-9, 1e-9]))
+    both = make_dynamics(space, laws, 0.5, inertia=True)
+    u = wavy(space.mesh.points)
+    both.begin(0 * u, 0 * u, 0.0)
+    cells = np.zeros((4, 8, 8))
+    both.add_tangent(u, cells)
+    assert not both.forces(u).any() and not cells.any() and not both.velocity(u).any()  # noqa: PT018
+    assert both.dissipation(u) == 0.0
+
+
+def test_body_adds_tissue_forms_and_time():
+    """Forces are the sum of all terms, and the reduced tangent is their derivative, bone included."""
+    space = rectangle("q2p1", (2, 2), jitter=0.2)
+    mesh = space.mesh
+    mesh.node_sets["bone"] = mesh.node_sets["top"]
+    law = NeoHookean(E=1.0, nu=0.4)
+    spring = make_term(
+        space, form(lambda u, v, w: (1.0 + w.x[0]) * (u[0] * v[0] + u[1] ** 3 * v[1])), "lower", False
+    )
+    term = make_dynamics(space, {"lower": law}, 1e-2, inertia=True)
+    body = Body(space, {"lower": law}, [spring], term)
+    reduced = 0.05 * np.sin(1.0 + np.arange(body.size))
+    start = body.expand(0.03 * np.cos(np.arange(body.size)))
+    term.begin(start, start, STEP)
+    u = body.expand(reduced)
+    np.testing.assert_array_equal(u[mesh.node_sets["bone"]], np.tile(reduced[-2:], (5, 1)))
+    total = Tissue(space, {"lower": law}).forces(u) + spring.forces(u) + term.forces(u)
+    np.testing.assert_allclose(body.forces(u), total, rtol=1e-14)
+    K = body.pattern.full(body.tangent(u)).toarray()
+    columns = np.empty_like(K)
+    for i in range(body.size):
+        step = np.zeros(body.size)
+        step[i] = 1e-6
+        ends = [body.reduce(body.forces(body.expand(reduced + s * step))) for s in (1, -1)]
+        columns[:, i] = (ends[0] - ends[1]) / 2e-6
+    np.testing.assert_allclose(K, columns, atol=1e-7 * np.abs(K).max())
+    np.testing.assert_allclose(body.velocity(u), (u - start) / STEP)

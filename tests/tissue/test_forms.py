@@ -1,0 +1,252 @@
+"""A user's weak forms: forces by hand, tangents, the tissue as a form; forms and laws in runs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.grids import assembled, quarter_ring, rectangle
+
+import evfem as ev
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.tissue.forms import make_term
+from evfem.tissue.weakform import Tissue
+
+MU, LMBDA = 0.7, 1.9
+NEO_HOOKEAN = ev.NeoHookean(E=MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU), nu=LMBDA / (2 * (LMBDA + MU)))
+#: one element per kind of cell; the shares of an edge's nodes (start, end, middle)
+SHARES = {"q1": [1 / 2, 1 / 2], "q2p1": [1 / 6, 1 / 6, 4 / 6], "p2": [1 / 6, 1 / 6, 4 / 6]}
+every_kind = pytest.mark.parametrize("element", list(SHARES))
+
+
+@ev.form
+def nail_bed(u, v, w):
+    return 0.02 * ev.dot(u, v)
+
+
+@ev.form
+def tissue_again(u, v, w):
+    """mu (F - F^-T) + lambda ln J F^-T : grad v."""
+    F = ev.grad(u) + np.eye(2)[:, :, None, None]
+    P = MU * F + (LMBDA * np.log(ev.det(F)) - MU) * ev.transpose(ev.inv(F))
+    return ev.ddot(P, ev.grad(v))
+
+
+@ev.form
+def crooked(u, v, w):
+    """Nonlinear, without potential, with values, gradients and places."""
+    H = ev.grad(u)
+    return (
+        np.sin(3 * u[0]) * v[1]
+        + u[1] ** 2 * H[0, 1] * ev.grad(v)[1, 0]
+        + w.x[0] * ev.trace(H) * ev.dot(u, v)
+        + np.exp(H[1, 1]) * v[0]
+    )
+
+
+def bend(x, y):
+    """A warp that curves every edge."""
+    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
+
+
+def wavy(points, size=0.08):
+    """A smooth displacement field."""
+    x, y = points.T
+    return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
+
+
+# -- forces ----------------------------------------------------------------------------------------------
+
+
+@every_kind
+def test_nail_bed_by_hand(element):
+    """A bed of 0.02 MPa/mm moved by (0.3, -0.1) mm: every edge of 0.5 mm shares 0.01 (0.3, -0.1) N/mm among
+    its nodes, by halves or 1/6, 4/6, 1/6, and no other node feels it."""
+    space = rectangle(element, (4, 3), size=(2.0, 1.0))
+    term = make_term(space, nail_bed, "top", boundary=True)
+    u = np.tile([0.3, -0.1], (space.size, 1))
+    expected = np.zeros_like(u)
+    for edge in space.mesh.edges_of("top"):
+        expected[edge] += 0.5 * 0.02 * np.outer(SHARES[element], [0.3, -0.1])
+    np.testing.assert_allclose(term.forces(u), expected, atol=1e-16)
+    # a linear field: work 0.02 int u^2 over the edge, u = (x, 1), from 0 to 2
+    u = np.column_stack([space.mesh.points[:, 0], np.ones(space.size)])
+    assert np.sum(term.forces(u) * u) == pytest.approx(0.02 * (8.0 / 3.0 + 2.0), rel=1e-13)
+
+
+@pytest.mark.parametrize(("element", "error"), [("q2p1", 2e-6), ("p2", 2e-6), ("q1", 4e-3)])
+def test_bed_on_a_curved_edge(element, error):
+    """A quarter of a circle of radius 1 mm is pi/2 long."""
+    space = rectangle(element, (4, 8), warp=quarter_ring(1.0, 2.0))
+    u = np.tile([1.0, 0.0], (space.size, 1))
+    length = make_term(space, nail_bed, "left", boundary=True).forces(u)[:, 0].sum() / 0.02
+    assert length == pytest.approx(0.5 * np.pi, rel=error)
+
+
+@every_kind
+def test_forms_know_place_and_outward_normal(element):
+    """A pressure p(x) on the lid pushes down on it with the integral of p; all around it sums to nothing."""
+    space = rectangle(element, (4, 3), size=(2.0, 1.0))
+    zero = np.zeros((space.size, 2))
+
+    @ev.form
+    def pressure(u, v, w):
+        return (1.0 + w.x[0] + w.x[1]) * ev.dot(w.n, v)
+
+    lid = make_term(space, pressure, "top", boundary=True).forces(zero)
+    np.testing.assert_allclose(lid.sum(axis=0), [0.0, 2.0 * (1.0 + 1.0 + 1.0)], atol=1e-14)
+    uniform = make_term(space, ev.form(lambda u, v, w: ev.dot(w.n, v)), "outline", boundary=True).forces(zero)
+    np.testing.assert_allclose(uniform.sum(axis=0), 0.0, atol=1e-14)
+    assert np.abs(uniform).max() > 0.1
+
+
+@every_kind
+def test_region_form_acts_on_its_region_only(element):
+    """Weight of the upper half of 2 x 1 mm: f = rho g times its area, spread over its cells' nodes."""
+    space = rectangle(element, (2, 4), size=(2.0, 1.0), split=lambda x, y: y > 0.5)
+    weight = ev.form(lambda u, v, w: 9.81e-3 * v[1])
+    forces = make_term(space, weight, "upper", boundary=False).forces(np.zeros((space.size, 2)))
+    np.testing.assert_allclose(forces.sum(axis=0), [0.0, 9.81e-3], rtol=1e-12, atol=1e-18)
+    assert not forces[space.mesh.points[:, 1] < 0.5 - 1e-9].any()
+
+
+@pytest.mark.parametrize("element", ["q1", "q2", "p2"])
+def test_tissue_written_as_a_form_is_the_tissue(element):
+    """The neo-Hookean residual as the user's own form: same forces and tangents as the built-in element."""
+    space = rectangle(element, (3, 3), warp=bend, split=lambda x, y: y > 0.5)
+    u = wavy(space.mesh.points)
+    tissue = Tissue(space, {"lower": NEO_HOOKEAN, "upper": NEO_HOOKEAN})
+    terms = [make_term(space, tissue_again, name, boundary=False) for name in ("lower", "upper")]
+    np.testing.assert_allclose(sum(t.forces(u) for t in terms), tissue.forces(u), atol=1e-14)
+    K = tissue.tangent(u)
+    cells = np.zeros_like(K)
+    for term in terms:
+        term.add_tangent(u, cells)
+    np.testing.assert_allclose(cells, K, atol=1e-12 * np.abs(K).max())
+
+
+@every_kind
+@pytest.mark.parametrize(("on", "boundary"), [("upper", False), ("left", True)])
+def test_tangent_is_the_derivative_of_the_forces(element, on, boundary):
+    """Complex step against central differences for a form that is neither linear nor symmetric."""
+    space = rectangle(element, (2, 2), warp=bend, split=lambda x, y: y > 0.5)
+    term = make_term(space, crooked, on, boundary)
+    u = wavy(space.mesh.points)
+    cells = np.zeros((len(space.nodes), *[2 * space.nodes.shape[1]] * 2))
+    term.add_tangent(u, cells)
+    K = assembled(space, cells).toarray()
+    columns = np.empty_like(K)
+    for i in range(u.size):
+        step = np.zeros(u.size)
+        step[i] = 1e-5
+        step = step.reshape(u.shape)
+        columns[:, i] = (term.forces(u + step) - term.forces(u - step)).ravel() / 2e-5
+    np.testing.assert_allclose(K, columns, atol=1e-8 * np.abs(K).max())
+    assert np.abs(K - K.T).max() > 1e-2 * np.abs(K).max()
+
+
+def test_unknown_places_are_refused():
+    space = rectangle("q1", (2, 2))
+    space.mesh.node_sets["corners"] = np.array([0, 8])
+    for on, boundary, said in (
+        ("nail", True, "bottom"),
+        ("skin", False, "lower"),
+        ("corners", True, "outer edge"),
+    ):
+        with pytest.raises(InputError, match=said):
+            make_term(space, nail_bed, on, boundary)
+
+
+# -- in a run --------------------------------------------------------------------------------------------
+
+
+def block_scene(law=NEO_HOOKEAN, element="q2", friction=0.0, **motion):
+    """A block of 2 x 1 mm of one law, pressed onto a plane (by 0.1 mm, unless `motion` says otherwise)."""
+    base = rectangle("q1", (6, 3), size=(2.0, 1.0)).mesh
+    sets = {"pad": base.node_sets["bottom"], "bone": base.node_sets["top"], "side": base.node_sets["left"]}
+    mesh = Mesh(base.points, base.cells, "quad", base.region, {"tissue": 0}, sets)
+    press = ev.Press(steps=2, **(motion or {"indentation": 0.1}))
+    solver = ev.Solver(element=element, tolerance=1e-10)
+    return ev.Scene(
+        ev.MeshedFinger(mesh, {"tissue": law}), ev.Flat(friction=friction), motion=(press,), solver=solver
+    )
+
+
+class EnergyOnly:
+    """The user's law: a multiple of the neo-Hookean energy."""
+
+    def __init__(self, factor=1.0):
+        self.factor = factor
+
+    def psi(self, F):
+        lnJ = np.log(ev.det(F))
+        return self.factor * (0.5 * MU * (ev.ddot(F, F) - 3.0 - 2.0 * lnJ) + 0.5 * LMBDA * lnJ**2)
+
+
+class StressOnly:
+    """The same law, stress only."""
+
+    def P(self, F):
+        return MU * F + (LMBDA * np.log(ev.det(F)) - MU) * ev.transpose(ev.inv(F))
+
+
+@pytest.mark.parametrize("law", [EnergyOnly(), StressOnly()], ids=["psi", "P"])
+def test_users_law_equals_the_built_in_one(law):
+    """Forces, energies and stresses of a press agree where theta is ln J of the point."""
+    ours, theirs = (ev.simulate(block_scene(law)) for law in (NEO_HOOKEAN, law))
+    np.testing.assert_allclose(theirs.normal_force, ours.normal_force, rtol=1e-8)
+    np.testing.assert_allclose(theirs.stored_energy, ours.stored_energy, rtol=1e-7)
+    np.testing.assert_allclose(theirs.frames[-1].cauchy_stress, ours.frames[-1].cauchy_stress, atol=1e-7)
+
+
+def test_users_law_in_the_default_element_and_its_stiffness():
+    """Q2-P1 splits a user's law in its own way: within 3e-3 of the built-in one on 6 x 3 cells
+    (measured 1.8e-3); 2.5 times as stiff, 2.5 times the force."""
+    built_in, once, more = (
+        ev.simulate(block_scene(law, "q2p1", friction=0.2)).applied_force
+        for law in (NEO_HOOKEAN, EnergyOnly(), EnergyOnly(2.5))
+    )
+    np.testing.assert_allclose(once, built_in, rtol=3e-3)
+    np.testing.assert_allclose(more, 2.5 * once, rtol=1e-7)
+
+
+def test_weight_of_the_tissue_reaches_the_plane():
+    """Held force: the plane carries the applied force and the block's weight rho g A, exactly."""
+    weight = 0.03 * 2.0
+    heavy = block_scene(force=0.1).with_term(ev.form(lambda u, v, w: 0.03 * v[1]), on=ev.Region("tissue"))
+    result = ev.simulate(heavy)
+    np.testing.assert_allclose(result.applied_force, [0.05, 0.1], rtol=1e-9)
+    np.testing.assert_allclose(result.normal_force, result.applied_force + weight, rtol=1e-8)
+
+
+def test_springs_on_a_side_carry_their_share():
+    """Applied force = contact + k int u_y over the side, from the displacements; more than without."""
+    plain = block_scene()
+    held = plain.with_term(ev.form(lambda u, v, w: 0.2 * u[1] * v[1]), on=ev.Boundary("side"))
+    free, result = ev.simulate(plain), ev.simulate(held)
+    frame, mesh = result.frames[-1], result.mesh
+    edges = mesh.edges_of("side")
+    length = np.abs(mesh.points[edges[:, 1], 1] - mesh.points[edges[:, 0], 1])
+    springs = 0.2 * np.sum(length[:, None] * np.array([1, 1, 4]) / 6 * -frame.displacement[edges, 1])
+    assert springs > 0.005
+    assert result.applied_force[-1] == pytest.approx(result.normal_force[-1] + springs, rel=1e-8)
+    assert result.applied_force[-1] > free.applied_force[-1]
+
+
+def test_form_without_a_potential():
+    """A sideways force 0.05 u_y: its tangent is not symmetric, the answer holds all the same."""
+    pushed = block_scene().with_term(ev.form(lambda u, v, w: 0.05 * u[1] * v[0]), on=ev.Region("tissue"))
+    result = ev.simulate(pushed)
+    u, mesh = result.frames[-1].displacement, result.mesh
+    mean = np.array([1, 1, 1, 1, 4, 4, 4, 4, 16]) / 36  # Simpson on rectangles
+    force = 0.05 * np.sum(u[mesh.cells, 1] @ mean) * 2.0 / len(mesh.cells)
+    assert abs(force) > 1e-3
+    assert result.applied_tangential_force[-1] == pytest.approx(force, rel=1e-8)
+    assert result.tangential_force[-1] == 0.0
+
+
+def test_terms_leave_the_scene_they_are_added_to_alone():
+    scene = block_scene()
+    assert scene.with_term(nail_bed, on=ev.Boundary("side")).forms and not scene.forms  # noqa: PT018
+    with pytest.raises(InputError, match="nowhere"):
+        ev.simulate(replace(scene, forms=scene.with_term(nail_bed, on=ev.Boundary("nowhere")).forms))
