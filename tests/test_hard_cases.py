@@ -4,9 +4,9 @@ in a converged state whose physics is known; most are cases of the study of stab
 
 import numpy as np
 import pytest
-from evfem.studies.stability import CASES
-from evfem.studies.stability_case import judge
-from evfem.studies.stability_scenes import pad, scene
+from evfem.studies.stability.case import judge
+from evfem.studies.stability.scenes import pad, scene
+from evfem.studies.stability.study import CASES
 
 from evfem.contact import friction
 from evfem.contact.surfaces import Display, Flat

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evfem.studies import killing
+from evfem.studies.stability import killing
 
 import evfem
 from evfem import cli, export, runfolder

@@ -3,6 +3,8 @@
 import importlib
 import importlib.util
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -139,3 +141,12 @@ def test_unknown_study_and_unusable_folder(tmp_path):
     with pytest.raises(StorageError, match="folder"):
         studies.run("section321", quick=True, out=tmp_path / "file" / "inside")
     assert data.load("table1").units["c"] == "mm"
+
+
+def test_every_folder_of_studies_is_packed_into_the_wheel():
+    top = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").exists())
+    packed = tomllib.loads((top / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    folders = (path.parent.relative_to(top) for path in (top / "studies").rglob("__init__.py"))
+    assert {f"evfem.{'.'.join(folder.parts)}" for folder in folders} == {
+        name for name in packed if name.startswith("evfem.studies")
+    }
