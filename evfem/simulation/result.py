@@ -26,7 +26,7 @@ from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.common.views import called, curves, table
 from evfem.errors import InputError
-from evfem.mesh.mesh import KINDS, Mesh
+from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.scene.scene import Scene
 
 Row = Mapping[str, Any]
@@ -64,7 +64,10 @@ class Frame:
 
 POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
 CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
-_SHAPES: dict[str, tuple[str | int, ...]] = {"displacement": ("N", 2), **dict.fromkeys(POINT_FIELDS, ("N",))}
+_SHAPES: dict[str, tuple[str | int, ...]] = {
+    "displacement": ("N", "dim"),
+    **dict.fromkeys(POINT_FIELDS, ("N",)),
+}
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 
@@ -378,15 +381,13 @@ def _mesh_from(arrays: Mapping[str, np.ndarray]) -> Mesh:
     kind = str(arrays["mesh/kind"])
     if kind not in KINDS:
         raise ValueError("cells of an unknown kind")
-    corners, order = KINDS[kind]
-    nodes_of_cell = corners if order == 1 else {3: 6, 4: 9}[corners]
     points, cells, region = (arrays[f"mesh/{name}"] for name in ("points", "cells", "region"))
     prefix = "mesh/set/"
     sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
     names = json.loads(str(arrays["mesh/region_names"]))
     if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
         raise ValueError("points of the mesh")
-    if region.ndim != 1 or cells.shape != (len(region), nodes_of_cell) or region.dtype.kind not in "iu":
+    if region.ndim != 1 or cells.shape != (len(region), CELLS[kind].nodes) or region.dtype.kind not in "iu":
         raise ValueError("cells of the mesh")
     if not isinstance(names, dict) or not all(type(number) is int for number in names.values()):
         raise ValueError("names of regions")
@@ -400,7 +401,7 @@ def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     if "frames/step" not in arrays:
         return []
     columns = {spec.name: arrays[f"frames/{spec.name}"] for spec in fields(Frame)}
-    size: dict[str | int, int] = {"N": len(mesh.points), "E": len(mesh.cells)}
+    size: dict[str | int, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
     count = len(columns["step"])
     for name, shape in _SHAPES.items():
         expected = (count, *(size.get(n, n) for n in shape))
