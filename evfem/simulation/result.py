@@ -5,8 +5,6 @@ Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz 
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -24,6 +22,7 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.tables import csv_text
 from evfem.common.views import called, curves, table
 from evfem.errors import InputError
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
@@ -231,24 +230,18 @@ def csv_line(row: Row) -> str:
     >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
     '1,0,press,0.0,0.0,0.0,0.1'
     """
-    return _csv_text([_text(name, row[name]) for name in COLUMNS])
+    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
 
 
 def csv_header() -> str:
     """The first line of history.csv."""
-    return _csv_text(COLUMNS)
+    return csv_text([COLUMNS])
 
 
-def _csv_text(values: Sequence[str]) -> str:
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(values)
-    return buffer.getvalue()
-
-
-def _text(name: str, value: Any) -> str:
+def _plain_value(name: str, value: Any) -> str | int | float:
     if name == "motion":
         return str(value)
-    return str(int(value)) if name in INTEGERS else repr(float(value))
+    return int(value) if name in INTEGERS else float(value)
 
 
 def _column(name: str, values: list[Any]) -> Any:
@@ -278,6 +271,11 @@ def versions() -> dict[str, str]:
     return found
 
 
+def origin() -> dict[str, Any]:
+    """Versions and date, for the provenance of whatever is computed now."""
+    return {"versions": dict(versions()), "date": datetime.now(UTC).isoformat(timespec="seconds")}
+
+
 def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
     """Versions, parameters, fingerprints and the solver's own record, in plain values ready for JSON.
 
@@ -290,7 +288,7 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
     except InputError:
         parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
     return {
-        "versions": dict(versions()),
+        **origin(),
         "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
         "parameters": parameters,
         "mesh": {
@@ -300,7 +298,6 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
             "kind": mesh.kind,
         },
         "solver": dict(solver),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
