@@ -9,14 +9,13 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from evfem.common.storage import replacing, write_text
-from evfem.errors import InputError, StorageError
+from evfem.common.storage import disk, names_in, refuse_others, replacing, write_names, write_text
+from evfem.errors import InputError
 from evfem.export import ParaViewSeries
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
@@ -60,11 +59,7 @@ class RunFolder:
         self.mesh = mesh
         self.rows = list(self.resume.rows) if self.resume else []
         self._digest = self.scene.digest()
-        listed = _listed(self.path)
-        foreign = [name for name in _present(self.path) if name not in listed]
-        if foreign:
-            given = f"{self.path}, where {foreign[0]} was not written by evfem"
-            raise InputError("--out", given, "another folder, for files of others are never touched")
+        refuse_others(self.path / MANIFEST, _present(self.path), "evfem")
 
     def step(self, row: Row, frame: Frame | None, checkpoint: Callable[[], dict[str, Any]]) -> None:
         """A step has converged: fields, checkpoint and history go to disk.
@@ -119,7 +114,7 @@ class RunFolder:
 
     def _open(self) -> None:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
-        with _storing(self.path):
+        with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
             old = [p.name for p in self.path.iterdir() if LEFT.fullmatch(p.name)]
             for name in old if self.resume else [*old, *_present(self.path)]:
@@ -128,8 +123,8 @@ class RunFolder:
         self._series = ParaViewSeries(self.path / FIELDS, self.rows) if self.fields else None
         series = [self._series.frame_path(n).name for n in steps] if self._series else []
         names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
-        names = sorted({*names, *(_listed(self.path) if self.resume else ())})
-        write_text(self.path / MANIFEST, "".join(f"{name}\n" for name in names))
+        names = sorted({*names, *(names_in(self.path / MANIFEST) if self.resume else ())})
+        write_names(self.path / MANIFEST, names)
         self._write_history()
         self.opened = True
 
@@ -148,30 +143,14 @@ def saved(path: Path, scene: Scene) -> Saved | None:
 
 
 def _without_a_row(history: Path) -> bool:
-    with _storing(history):
+    with disk(f"use {history}"):
         return not history.exists() or history.stat().st_size <= len(csv_header())
 
 
 def _present(path: Path) -> list[str]:
     """Names in the folder that a run writes."""
-    with _storing(path):
+    with disk(f"use {path}"):
         return sorted(p.name for p in path.iterdir() if OURS.fullmatch(p.name)) if path.exists() else []
-
-
-def _listed(path: Path) -> Sequence[str]:
-    """Names that an earlier run listed as its own."""
-    with suppress(OSError, UnicodeDecodeError):
-        return (path / MANIFEST).read_text(encoding="utf-8").split("\n")
-    return ()
-
-
-@contextmanager
-def _storing(path: Path) -> Iterator[None]:
-    """Disk errors inside the block become StorageError with the path."""
-    try:
-        yield
-    except OSError as error:
-        raise StorageError(f"cannot use {path}: {error.strerror or error}") from error
 
 
 def _picture(result: Result, path: Path) -> None:

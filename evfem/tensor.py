@@ -108,26 +108,6 @@ def positive_part(x: Array) -> Array:
     return np.where(np.real(x) > 0.0, x, 0.0)
 
 
-def magnitude(a: Array) -> Array:
-    """Euclidean length sqrt(a_i a_i) of a vector (n, ...).
-
-    >>> float(magnitude(np.array([3.0, 4.0])))
-    5.0
-    """
-    return np.sqrt(dot(a, a))
-
-
-def ball_projection(a: Array, radius: Array | float) -> Array:
-    """The point nearest to the vector a (n, ...) in the ball abs(a) <= radius, radius (...) >= 0.
-
-    >>> ball_projection(np.array([3.0, 4.0]), 2.5).tolist()
-    [1.5, 2.0]
-    """
-    length = magnitude(a)
-    outside = np.real(length) > np.real(radius)
-    return a * np.where(outside, radius / np.where(outside, length, 1.0), 1.0)
-
-
 def symmetric_power(C: Array, exponent: float) -> Array:
     """C^exponent of symmetric positive definite C (n, n, ...), by its eigenvalues and eigenvectors.
 

@@ -27,6 +27,8 @@ NAMES = (
     "work_precision",
     "peers",
 )
+#: studies that have a folder of their own, and the module in it that runs them
+MODULES = {"stability": "stability.study", "work_precision": "precision.study", "peers": "peers.study"}
 
 
 def run(name: str, quick: bool = False, out: Path | None = None) -> dict[str, Any]:
@@ -36,4 +38,4 @@ def run(name: str, quick: bool = False, out: Path | None = None) -> dict[str, An
     """
     if name not in NAMES:
         raise InputError("study", name, ", ".join(NAMES))
-    return import_module(f".{name}", __package__).main(quick=quick, out=out)
+    return import_module(f".{MODULES.get(name, name)}", __package__).main(quick=quick, out=out)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evfem import data
-from evfem.common.storage import replacing, write_text
+from evfem.common.storage import disk, replacing, write_text
+from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.errors import StorageError
-from evfem.simulation.result import versions
+from evfem.simulation.result import origin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -74,7 +73,7 @@ class Study:
         if out is not None:
             folder = make_folder(out)
             write_text(folder / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
-            write_text(folder / f"{self.name}.csv", csv_text(self.series))
+            write_text(folder / f"{self.name}.csv", series_text(self.series))
             with replacing(folder / f"{self.name}.png") as temporary:
                 self.draw().savefig(temporary, format="png", dpi=160)
         return result
@@ -83,37 +82,33 @@ class Study:
 def make_folder(out: str | Path) -> Path:
     """`out` as an existing folder; StorageError where the disk refuses."""
     folder = Path(out)
-    try:
+    with disk(f"create the folder {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"cannot create the folder {folder}: {error.strerror or error}") from error
     return folder
 
 
 def provenance(parameters: Mapping[str, Any], quick: bool) -> dict[str, Any]:
     """Versions, date, eps_0 and parameters behind a study's numbers."""
     return {
-        "versions": versions(),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        **origin(),
         "eps_0_F_per_m": eps_0,
         "quick": quick,
         "parameters": dict(parameters),
     }
 
 
-def csv_text(series: Iterable[Series]) -> str:
+def series_text(series: Iterable[Series]) -> str:
     """Every point of every series as a line ``series,x,y,unit``."""
-    lines = ["series,x,y,unit"]
+    rows: list[list[Any]] = [["series", "x", "y", "unit"]]
     for one in series:
-        if "," in one.name or "," in one.unit:
-            raise ValueError(f"a comma in {one.name!r} or {one.unit!r}")
-        for x, y in zip(np.atleast_1d(one.x), np.atleast_1d(one.y), strict=True):
-            lines.append(f"{one.name},{_cell(x)},{_cell(y)},{one.unit}")
-    return "\n".join(lines) + "\n"
+        points = zip(_plain(one.x), _plain(one.y), strict=True)
+        rows += [[one.name, x, y, one.unit] for x, y in points]
+    return csv_text(rows)
 
 
-def _cell(value: Any) -> str:
-    return str(value) if isinstance(value, str) else repr(float(value))
+def _plain(values: Any) -> list[float] | list[str]:
+    array = np.atleast_1d(values)
+    return (array if array.dtype.kind == "U" else array.astype(float)).tolist()
 
 
 @cache

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
-from evfem.studies import fuzzing
+from evfem.studies.stability import fuzzing
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from tools.fakes import fake_result, square_mesh

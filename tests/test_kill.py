@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from evfem.studies import killing
+from evfem.studies.stability import killing
 from tools.commands import called
 
 import evfem

@@ -117,25 +117,3 @@ def test_positive_part_has_the_slopes_of_max():
     x = np.array([-2.0, -1e-9, 1e-9, 3.0])
     assert tensor.positive_part(x).tolist() == [0.0, 0.0, 1e-9, 3.0]
     assert tensor.complex_step(tensor.positive_part, x).tolist() == [0.0, 0.0, 1.0, 1.0]
-
-
-def test_magnitude_has_the_direction_as_its_slope():
-    a = np.array([[3.0, -1.0], [4.0, 0.0]])
-    np.testing.assert_allclose(tensor.magnitude(a), [5.0, 1.0])
-    slope = tensor.complex_step(tensor.magnitude, a, rank=1)
-    np.testing.assert_allclose(slope, [[0.6, -1.0], [0.8, 0.0]], atol=1e-15)
-
-
-def test_ball_projection_keeps_the_inside_and_shortens_the_outside():
-    a = np.array([[0.3, 3.0], [0.4, 4.0]])
-    np.testing.assert_allclose(tensor.ball_projection(a, np.array([1.0, 1.0])), [[0.3, 0.6], [0.4, 0.8]])
-    # slope inside: the unit matrix; outside: (I - n n) / 5 with n = (0.6, 0.8)
-    slope = tensor.complex_step(tensor.ball_projection, a, 1.0, rank=1)
-    np.testing.assert_allclose(slope[..., 0], np.eye(2), atol=1e-15)
-    np.testing.assert_allclose(slope[..., 1], np.array([[0.64, -0.48], [-0.48, 0.36]]) / 5.0, atol=1e-15)
-
-
-def test_ball_projection_onto_the_point_zero():
-    # no friction: the ball has radius zero, also for a vector of length zero
-    a = np.array([[0.0, 1.0], [0.0, 1.0]])
-    assert not tensor.ball_projection(a, 0.0).any()

@@ -1,12 +1,14 @@
 """Checks of a user's input; each returns the clean value or raises InputError.
 
-`real`, `count` and `choice` take single values; `above`, `at_least` and `finite` also arrays of numbers.
+First checks of single values (`real`, `count`, `choice`), then of numbers or arrays of numbers (`above`,
+`at_least`, `finite`), then rules that the fields of a dataclass carry and `check_fields` applies.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import fields
 from numbers import Integral, Real
 from typing import Any
 
@@ -15,6 +17,7 @@ import numpy as np
 from evfem.errors import InputError
 
 MOST_STEPS = 1_000_000
+Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
 
 def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = lambda x: True) -> float:
@@ -51,15 +54,6 @@ def choice(key: str, value: object, names: tuple[str, ...]) -> str:
     if not isinstance(value, str) or value not in names:
         raise InputError(key, value, " | ".join(names))
     return value
-
-
-def set_frozen(target: object, **values: object) -> None:
-    """Store checked values in a frozen dataclass under construction."""
-    for name, value in values.items():
-        object.__setattr__(target, name, value)
-
-
-Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
 
 def plain(value: Values) -> Values:
@@ -106,3 +100,46 @@ def finite(key: str, given: Values, allowed: str) -> Values:
 def _worst(given: Values) -> Values:
     """The smallest of the values, so that a long array does not flood the message."""
     return float(np.min(np.real(given)))
+
+
+def set_frozen(target: object, **values: object) -> None:
+    """Store checked values in a frozen dataclass under construction."""
+    for name, value in values.items():
+        object.__setattr__(target, name, value)
+
+
+def number(allowed: str, test: Callable[[float], bool]) -> dict[str, Any]:
+    """Metadata of a field that is a finite float and passes `test`; `allowed` says so in words."""
+    return {"allowed": allowed, "check": lambda key, value: real(key, value, allowed, test)}
+
+
+def whole(most: int = MOST_STEPS) -> dict[str, Any]:
+    """Metadata of a field that is a whole number from 1 to `most`."""
+    return {"allowed": "a whole number, at least 1", "check": lambda key, value: count(key, value, most)}
+
+
+def one_of(*names: str) -> dict[str, Any]:
+    """Metadata of a field that is one of `names`."""
+    return {"allowed": " | ".join(names), "check": lambda key, value: choice(key, value, names)}
+
+
+def check_fields(target: Any) -> None:
+    """Check and store every field of a frozen dataclass that has a rule; a default None may stay None.
+
+    >>> from dataclasses import dataclass, field
+    >>> @dataclass(frozen=True)
+    ... class Hover:
+    ...     gap: float = field(metadata=number("a gap in mm, not negative", lambda gap: gap >= 0))
+    ...
+    ...     def __post_init__(self):
+    ...         check_fields(self)
+    >>> Hover(1).gap
+    1.0
+    >>> Hover(-1)
+    Traceback (most recent call last):
+    evfem.errors.InputError: gap: given -1; allowed: a gap in mm, not negative
+    """
+    for spec in fields(target):
+        value = getattr(target, spec.name)
+        if "check" in spec.metadata and not (value is None and spec.default is None):
+            set_frozen(target, **{spec.name: spec.metadata["check"](spec.name, value)})

@@ -11,7 +11,7 @@ import os
 import re
 import struct
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Literal
@@ -36,7 +36,8 @@ DAMAGE = (
 )
 #: largest archive that is read, in bytes, and the most arrays in it
 LARGEST_ARCHIVE, MOST_ARRAYS = 4 * 2**30, 10_000
-#: the only header of an array that is read: plain numbers, truth values or text
+#: the only header of an array that is read: plain numbers, truth values or text, as numpy writes it. numpy's
+#: own reader would take it for Python, mend it and warn: too much to do with a file from anywhere
 HEADER = re.compile(
     rb"\x93NUMPY\x01\x00..\{'descr': '([<>|][biufU]\d{1,9})', 'fortran_order': (True|False), "
     rb"'shape': \(((?:\d{1,15}, ?)*\d{0,15})\), \} *\n",
@@ -74,6 +75,37 @@ def write_text(path: str | Path, text: str) -> None:
     """Write `text` to `path` in one step (UTF-8)."""
     with replacing(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+@contextmanager
+def disk(doing: str) -> Iterator[None]:
+    """Inside, errors of the disk become StorageError("cannot DOING: reason")."""
+    try:
+        yield
+    except StorageError:
+        raise
+    except OSError as error:
+        raise StorageError(f"cannot {doing}: {error.strerror or error}") from error
+
+
+def write_names(manifest: str | Path, names: Iterable[str]) -> None:
+    """List the names that the owner of a folder may replace or remove in it."""
+    write_text(manifest, "".join(f"{name}\n" for name in names))
+
+
+def names_in(manifest: Path) -> list[str]:
+    """The names in such a list; none where there is no list that can be read."""
+    with suppress(OSError, UnicodeDecodeError):
+        return manifest.read_text(encoding="utf-8").split("\n")
+    return []
+
+
+def refuse_others(manifest: Path, present: Iterable[str], owner: str) -> None:
+    """InputError where one of the names `present` in the folder is not in its list."""
+    foreign = [name for name in present if name not in names_in(manifest)]
+    if foreign:
+        given = f"{manifest.parent}, where {foreign[0]} was not written by {owner}"
+        raise InputError("--out", given, "another folder, for files of others are never touched")
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:

@@ -1,10 +1,12 @@
-"""Tables of numbers: columns of a csv file, and piecewise linear functions that may jump."""
+"""Tables of numbers: csv files in and out, and piecewise linear functions that may jump."""
 
 from __future__ import annotations
 
 import csv
+import io
 import math
 from array import array
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +65,17 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
         place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(key, f"a value that is not finite, number {place}", allowed)
     return array.astype(float)
+
+
+def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as lines of a csv file: floats with every digit that counts, nothing for None.
+
+    >>> csv_text([["x", "label"], [0.1, "a, b"], [None, "c"]])
+    'x,label\\n0.1,"a, b"\\n,c\\n'
+    """
+    buffer = io.StringIO()
+    csv.writer(buffer, lineterminator="\n").writerows(rows)
+    return buffer.getvalue()
 
 
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:

@@ -19,18 +19,17 @@ import numpy as np
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
-from evfem.mesh import formats as meshioread
-from evfem.mesh import msh as mshread
-from evfem.mesh import vtu as vturead
+from evfem.mesh import formats, msh, vtu
 from evfem.mesh.formats import LARGEST, Parts, Unreadable
-from evfem.mesh.mesh import KINDS, Mesh
+from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.mesh.msh import PHYSICAL
 from evfem.mesh.quality import check
 
-#: Cells that are no part of the body: kept only for the nodes of a physical group.
-LOWER = {"vertex", "line", "line3"}
 #: Prefix of the field data that carry the names of regions in a `.vtu` file.
 PREFIX = "region:"
+
+#: Dimension of the body's cells; those below it are kept only for the nodes of a physical group.
+BODY = 2
 
 _Names = dict[tuple[int, int], str]
 
@@ -47,7 +46,7 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
     raw = _parts(path)
     blocks = raw.blocks
     names = raw.names
-    solid = [k for k, (kind, cells) in enumerate(blocks) if kind not in LOWER and len(cells)]
+    solid = [k for k, (kind, cells) in enumerate(blocks) if _dimension(kind) >= BODY and len(cells)]
     kind = _one_kind(path, [blocks[k][0] for k in solid])
     cells = np.vstack([blocks[k][1] for k in solid]).astype(np.int64)
     if names:
@@ -68,7 +67,7 @@ def _parts(path: Path) -> Parts:
     try:
         if path.stat().st_size > LARGEST:
             raise Unreadable(f"more than {LARGEST // 2**20} MB")
-        return meshioread.read(path) if reader is None else reader(path.read_bytes())
+        return formats.read(path) if reader is None else reader(path.read_bytes())
     except (Unreadable, MemoryError) as error:
         reason = " ".join(str(error).split())[:200] or "not enough memory"
         allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
@@ -88,7 +87,13 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
     raise InputError("finger.mesh", given, allowed)
 
 
+def _dimension(kind: str) -> int:
+    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused there."""
+    return CELLS[kind].dimension if kind in CELLS else BODY
+
+
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
+    """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
     points = np.asarray(points, dtype=float)
     if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
         given = f"{path} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
@@ -98,7 +103,7 @@ def _plane(path: Path, points: np.ndarray) -> np.ndarray:
 
 def _groups(path: Path, raw: Parts, solid: list[int], names: _Names) -> tuple[Ints, dict[str, int]]:
     tag = np.concatenate([raw.cell_data[PHYSICAL][k] for k in solid])
-    region_names = {name: number for (dimension, number), name in names.items() if dimension == 2}
+    region_names = {name: number for (dimension, number), name in names.items() if dimension == BODY}
     lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
     if lost:
         given = f"{path} with {int(np.isin(tag, lost).sum())} cells outside every named group"
@@ -110,9 +115,8 @@ def _groups(path: Path, raw: Parts, solid: list[int], names: _Names) -> tuple[In
 def _group_sets(raw: Parts, names: _Names) -> dict[str, Ints]:
     sets: dict[str, Ints] = {}
     for (kind, cells), tag in zip(raw.blocks, raw.cell_data[PHYSICAL], strict=True):
-        dimension = {"vertex": 0, "line": 1, "line3": 1}.get(kind, 2)
         for (d, number), name in names.items():
-            if dimension < 2 and d == dimension and len(nodes := np.unique(cells[tag == number])):
+            if d == _dimension(kind) < BODY and len(nodes := np.unique(cells[tag == number])):
                 sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
     return sets
 
@@ -222,7 +226,10 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
 
 
 def add_region_names(path: Path, mesh: Mesh) -> None:
-    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number."""
+    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number.
+
+    The bytes are patched because meshio reads field data of this format but does not write them.
+    """
     form = '<DataArray type="Int32" Name="{}{}" NumberOfTuples="1" format="ascii">{}</DataArray>'
     arrays = "".join(form.format(PREFIX, name, number) for name, number in mesh.region_names.items())
     tag = b"<UnstructuredGrid>"
@@ -230,6 +237,11 @@ def add_region_names(path: Path, mesh: Mesh) -> None:
 
 
 def _write_msh(mesh: Mesh, path: Path) -> None:
+    """Gmsh's 2.2, with a physical group for each region and for each set of outer edges.
+
+    The names are patched into the bytes because meshio keeps one group per name, while `nail` is both a
+    region and a boundary.
+    """
     import meshio
 
     lines = "line3" if mesh.order == 2 else "line"
@@ -260,5 +272,5 @@ def _all_edges(mesh: Mesh, name: str) -> Ints:
     return edges
 
 
-READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vturead.read, ".msh": mshread.read}
+READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vtu.read, ".msh": msh.read}
 WRITERS: Mapping[str, Callable[[Mesh, Path], None]] = {".vtu": _write_vtu, ".msh": _write_msh}

@@ -11,7 +11,6 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -24,19 +23,6 @@ from evfem.common.arrays import Floats, Ints
 LARGEST = 128 * 2**20
 #: most elements and attributes of an XML file, and most physical names
 MOST_ELEMENTS, MOST_NAMES = 100_000, 1_000
-#: nodes of each kind of cell that is known by name
-NODES: Mapping[str, int] = {
-    "vertex": 1,
-    "line": 2,
-    "line3": 3,
-    "triangle": 3,
-    "triangle6": 6,
-    "quad": 4,
-    "quad8": 8,
-    "quad9": 9,
-    "tetra": 4,
-    "hexahedron": 8,
-}
 
 
 class Unreadable(ValueError):
@@ -45,8 +31,9 @@ class Unreadable(ValueError):
 
 @dataclass
 class Parts:
-    """Points (N, 3), blocks (kind, cells (E, n)) in the order of the file, data of points, data of cells as
-    one array per block, named numbers, and gmsh's physical names by (dimension, number).
+    """Points (N, 3) as these formats have them, whose third column `evfem.mesh.file` checks and cuts off;
+    blocks (kind, cells (E, n)) in the order of the file; data of points; data of cells as one array per
+    block; named numbers; Gmsh's physical names by (dimension, number).
     """
 
     points: Floats

@@ -8,24 +8,48 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 
-#: kind -> (number of corners, order); the local edges of a cell are (corner i, corner i+1[, mid-node i])
-KINDS: Mapping[str, tuple[int, int]] = {
-    "quad": (4, 1),
-    "quad9": (4, 2),
-    "triangle": (3, 1),
-    "triangle6": (3, 2),
+
+class CellKind(NamedTuple):
+    """A kind of cell: dimension, numbers of corners and nodes, order, and its numbers in VTK and in Gmsh.
+
+    The local edges of a triangle or quad are (corner i, corner i+1[, mid-node i]).
+    """
+
+    dimension: int
+    corners: int
+    nodes: int
+    order: int
+    vtk: int
+    gmsh: int
+
+
+#: every kind of cell that the readers of mesh files know
+CELLS: Mapping[str, CellKind] = {
+    "vertex": CellKind(0, 1, 1, 1, vtk=1, gmsh=15),
+    "line": CellKind(1, 2, 2, 1, vtk=3, gmsh=1),
+    "line3": CellKind(1, 2, 3, 2, vtk=21, gmsh=8),
+    "triangle": CellKind(2, 3, 3, 1, vtk=5, gmsh=2),
+    "triangle6": CellKind(2, 3, 6, 2, vtk=22, gmsh=9),
+    "quad": CellKind(2, 4, 4, 1, vtk=9, gmsh=3),
+    "quad8": CellKind(2, 4, 8, 2, vtk=23, gmsh=16),
+    "quad9": CellKind(2, 4, 9, 2, vtk=28, gmsh=10),
+    "tetra": CellKind(3, 4, 4, 1, vtk=10, gmsh=4),
+    "hexahedron": CellKind(3, 8, 8, 1, vtk=12, gmsh=5),
 }
+#: the kinds that a finger can be made of
+KINDS = ("quad", "quad9", "triangle", "triangle6")
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Points (N, 2), cells (E, n) in VTK order, an integer region per cell, and named sets.
+    """Points (N, dim), cells (E, n) in VTK order, an integer region per cell, and named sets.
 
     `region_names` maps a name to its number in `region`; `node_sets` maps `pad`, `bone`, `nail` ... to sorted
     node numbers.
@@ -39,14 +63,19 @@ class Mesh:
     node_sets: Mapping[str, Ints] = field(default_factory=dict)
 
     @property
+    def dim(self) -> int:
+        """Number of coordinates of a point: 2 in the plane."""
+        return self.points.shape[1]
+
+    @property
     def order(self) -> int:
         """Polynomial order of the cells: 1 or 2."""
-        return KINDS[self.kind][1]
+        return CELLS[self.kind].order
 
     @property
     def corners(self) -> int:
         """Number of corners of a cell: 3 or 4."""
-        return KINDS[self.kind][0]
+        return CELLS[self.kind].corners
 
     def cells_of(self, name: str) -> Ints:
         """Numbers of the cells in the region `name`."""
@@ -138,8 +167,8 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
 
 
 def _parabolas(ends: Floats) -> Floats:
-    """Coefficients (3, K, 2) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle] (K, 2 or
-    3, 2).
+    """Coefficients (3, K, dim) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle], which
+    are (K, 2 or 3, dim).
     """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     centre = ends[:, 2] if ends.shape[1] == 3 else middle
@@ -147,7 +176,7 @@ def _parabolas(ends: Floats) -> Floats:
 
 
 def _distance(points: Floats, curves: Floats) -> Floats:
-    """Smallest distance of points (P, 2) from the curves: Newton's method on the six nearest of each."""
+    """Smallest distance of points (P, dim) from the curves: Newton's method on the six nearest of each."""
     places = np.array([-1.0, 0.0, 1.0])
     samples = curves[0] + places[:, None, None] * curves[1] + (places**2)[:, None, None] * curves[2]
     away = np.linalg.norm(points[:, None, None] - samples, axis=-1)

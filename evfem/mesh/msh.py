@@ -12,21 +12,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.mesh.formats import MOST_NAMES, NODES, Parts, Unreadable, integers, parsed
+from evfem.mesh.formats import MOST_NAMES, Parts, Unreadable, integers, parsed
+from evfem.mesh.mesh import CELLS
 
 #: Gmsh's numbers of the kinds of cells
-KINDS: Mapping[int, str] = {
-    15: "vertex",
-    1: "line",
-    8: "line3",
-    2: "triangle",
-    9: "triangle6",
-    3: "quad",
-    16: "quad8",
-    10: "quad9",
-    4: "tetra",
-    5: "hexahedron",
-}
+KINDS: Mapping[int, str] = {kind.gmsh: name for name, kind in CELLS.items()}
 PHYSICAL = "gmsh:physical"
 
 
@@ -122,7 +112,7 @@ def _elements_2(values: Floats) -> list[tuple[str, Ints, Ints]]:
             raise Unreadable("an element of an unknown type")
         starts.append(at)
         kinds.append(kind)
-        at += 3 + int(numbers[at + 2]) + NODES[kind]
+        at += 3 + int(numbers[at + 2]) + CELLS[kind].nodes
     if at != numbers.size or len(starts) != numbers[0]:
         raise Unreadable("another number of elements than announced")
     start, names = np.array(starts, dtype=np.int64), np.array(kinds)
@@ -130,7 +120,7 @@ def _elements_2(values: Floats) -> list[tuple[str, Ints, Ints]]:
     for kind in dict.fromkeys(kinds):
         begin = start[names == kind]
         tags = numbers[begin + 2]
-        nodes = numbers[(begin + 3 + tags)[:, None] + np.arange(NODES[kind])]
+        nodes = numbers[(begin + 3 + tags)[:, None] + np.arange(CELLS[kind].nodes)]
         blocks.append((kind, nodes, np.where(tags > 0, numbers[begin + 3], 0)))
     return blocks
 
@@ -192,7 +182,7 @@ def _elements_4(values: Floats, groups: Mapping[tuple[int, int], int]) -> list[t
         if number not in KINDS:
             raise Unreadable("an element of an unknown type")
         kind = KINDS[number]
-        table = integers(walk.take(count * (1 + NODES[kind]))).reshape(count, -1)
+        table = integers(walk.take(count * (1 + CELLS[kind].nodes))).reshape(count, -1)
         rows.append((kind, table[:, 1:], np.full(count, groups.get((dimension, entity), 0))))
     if len(rows) != blocks or sum(len(cells) for _, cells, _ in rows) != total:
         raise Unreadable("another number of elements than announced")

@@ -1,6 +1,7 @@
-"""What a mesh must fulfil before anything is computed on it, and the shape of its cells: the scaled Jacobian.
+"""What a mesh in the plane must fulfil before anything is computed on it.
 
-Every fault becomes one sentence.
+`check` asks one question after the other, in the order of the file, and every fault becomes one sentence; the
+shape of cells is their scaled Jacobian, at the end.
 """
 
 from __future__ import annotations
@@ -14,71 +15,13 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import KINDS, Mesh
 
-#: Corner, mid-edge and middle nodes of a quad in -1..1, and of a triangle in 0..1, in VTK order.
-SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0))
-TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
-
-
-def scaled_jacobian(mesh: Mesh) -> Floats:
-    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or equilateral
-    triangle.
-
-    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate lines at the
-    node; in triangles the longest two of the three directions count, and sin 60 degrees is divided out.
-    Zero or less: the cell is degenerate or turned inside out.
-
-    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    >>> square = Mesh(corners, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, dtype=int), {"skin": 0})
-    >>> scaled_jacobian(square).tolist()
-    [1.0]
-    """
-    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
-    x = mesh.points[mesh.cells]
-    smallest = np.full(len(x), np.inf)
-    for place in (SQUARE if mesh.corners == 4 else TRIANGLE)[: mesh.cells.shape[1]]:
-        t = slopes_at(place, mesh.order) @ x
-        det = t[:, 0, 0] * t[:, 1, 1] - t[:, 0, 1] * t[:, 1, 0]
-        first, second = np.hypot(t[:, 0, 0], t[:, 0, 1]), np.hypot(t[:, 1, 0], t[:, 1, 1])
-        lengths = first * second
-        if mesh.corners == 3:
-            third = np.hypot(*(t[:, 1] - t[:, 0]).T)
-            lengths = np.maximum(lengths, third * np.maximum(first, second)) * np.sqrt(0.75)
-        smallest = np.minimum(smallest, det / np.maximum(lengths, 1e-300))
-    return smallest
-
-
-def _square_slopes(place: tuple[float, float], order: int) -> Floats:
-    """Derivatives (2, nodes) of a quad's shape functions at a place."""
-    (f, df), (g, dg) = (_line(s, order) for s in place)
-    i, j = (np.array(SQUARE[: (order + 1) ** 2]).T + 1) // (3 - order)
-    return np.array([df[i] * g[j], f[i] * dg[j]])
-
-
-def _line(s: float, order: int) -> tuple[Floats, Floats]:
-    """Shape functions of a line at s, in rising order of their nodes, and their derivatives."""
-    if order == 1:
-        return np.array([1.0 - s, 1.0 + s]) / 2.0, np.array([-0.5, 0.5])
-    return np.array([s * (s - 1.0) / 2.0, 1.0 - s * s, s * (s + 1.0) / 2.0]), np.array(
-        [s - 0.5, -2.0 * s, s + 0.5]
-    )
-
-
-def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:
-    """Derivatives (2, nodes) of a triangle's shape functions at a place."""
-    d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
-    if order == 1:
-        return d
-    area = np.array([1.0 - place[0] - place[1], *place])
-    following = np.roll(np.arange(3), -1)
-    return np.hstack([d * (4.0 * area - 1.0), 4.0 * (d * area[following] + area * d[:, following])])
-
-
 #: Extent of a finger's outline in mm: other numbers mean other units.
 SMALLEST, LARGEST = 1.0, 200.0
 #: Two nodes closer than this part of the outline's extent are the same place.
 SAME_PLACE = 1e-7
 #: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
+Refuse = Callable[[str, str], None]  # (fault, what is allowed): raises InputError
 
 
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
@@ -99,9 +42,6 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     _connection(mesh, refuse)
     _outline(mesh, refuse)
     return _with_sets(mesh, refuse)
-
-
-Refuse = Callable[[str, str], None]
 
 
 def _some(numbers: Ints) -> str:
@@ -221,7 +161,7 @@ def _outline(mesh: Mesh, refuse: Refuse) -> None:
     pairs = _near_pairs(mesh.points[edges], refuse)
     apart = (edges[pairs[:, 0]][:, :, None] != edges[pairs[:, 1]][:, None, :]).all(axis=(1, 2))
     a, b = mesh.points[edges[pairs[:, 0]]], mesh.points[edges[pairs[:, 1]]]
-    (across, along), (back, _) = _frame(a, b), _frame(b, a)
+    (across, along), (back, _) = _across_and_along(a, b), _across_and_along(b, a)
     in_line = (across == 0.0).all(axis=1)
     overlapping = (along.max(axis=1) > 1e-9) & (along.min(axis=1) < 1.0 - 1e-9)
     crossing = apart & ~in_line & (across.prod(axis=1) <= 0.0) & (back.prod(axis=1) <= 0.0)
@@ -247,7 +187,7 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
     return pairs[distance <= half[pairs].sum(axis=1)]
 
 
-def _frame(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2) each."""
     direction = a[:, 1] - a[:, 0]
     away = b - a[:, :1]
@@ -270,3 +210,62 @@ def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
     if np.isin(pad, mesh.node_sets["bone"]).all():
         refuse("a pad that lies on the bone", "a pad with nodes that can move")
     return replace(mesh, node_sets={**mesh.node_sets, "pad": pad})
+
+
+#: Corner, mid-edge and middle nodes of a quad in -1..1, and of a triangle in 0..1, in VTK order.
+SQUARE = ((-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0))
+TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.5))
+
+
+def scaled_jacobian(mesh: Mesh) -> Floats:
+    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or equilateral
+    triangle.
+
+    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate lines at the
+    node; in triangles the longest two of the three directions count, and sin 60 degrees is divided out.
+    Zero or less: the cell is degenerate or turned inside out.
+
+    >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    >>> square = Mesh(corners, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, dtype=int), {"skin": 0})
+    >>> scaled_jacobian(square).tolist()
+    [1.0]
+    """
+    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
+    x = mesh.points[mesh.cells]
+    smallest = np.full(len(x), np.inf)
+    for place in (SQUARE if mesh.corners == 4 else TRIANGLE)[: mesh.cells.shape[1]]:
+        t = slopes_at(place, mesh.order) @ x
+        det = t[:, 0, 0] * t[:, 1, 1] - t[:, 0, 1] * t[:, 1, 0]
+        first, second = np.hypot(t[:, 0, 0], t[:, 0, 1]), np.hypot(t[:, 1, 0], t[:, 1, 1])
+        lengths = first * second
+        if mesh.corners == 3:
+            third = np.hypot(*(t[:, 1] - t[:, 0]).T)
+            lengths = np.maximum(lengths, third * np.maximum(first, second)) * np.sqrt(0.75)
+        smallest = np.minimum(smallest, det / np.maximum(lengths, 1e-300))
+    return smallest
+
+
+def _square_slopes(place: tuple[float, float], order: int) -> Floats:
+    """Derivatives (2, nodes) of a quad's shape functions at a place."""
+    (f, df), (g, dg) = (_line(s, order) for s in place)
+    i, j = (np.array(SQUARE[: (order + 1) ** 2]).T + 1) // (3 - order)
+    return np.array([df[i] * g[j], f[i] * dg[j]])
+
+
+def _line(s: float, order: int) -> tuple[Floats, Floats]:
+    """Shape functions of a line at s, in rising order of their nodes, and their derivatives."""
+    if order == 1:
+        return np.array([1.0 - s, 1.0 + s]) / 2.0, np.array([-0.5, 0.5])
+    return np.array([s * (s - 1.0) / 2.0, 1.0 - s * s, s * (s + 1.0) / 2.0]), np.array(
+        [s - 0.5, -2.0 * s, s + 0.5]
+    )
+
+
+def _triangle_slopes(place: tuple[float, float], order: int) -> Floats:
+    """Derivatives (2, nodes) of a triangle's shape functions at a place."""
+    d = np.array([[-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
+    if order == 1:
+        return d
+    area = np.array([1.0 - place[0] - place[1], *place])
+    following = np.roll(np.arange(3), -1)
+    return np.hstack([d * (4.0 * area - 1.0), 4.0 * (d * area[following] + area * d[:, following])])

@@ -18,7 +18,8 @@ from xml.etree import ElementTree
 import numpy as np
 
 from evfem.common.arrays import Ints
-from evfem.mesh.formats import LARGEST, MOST_ELEMENTS, NODES, Parts, Unreadable, integers, parsed
+from evfem.mesh.formats import LARGEST, MOST_ELEMENTS, Parts, Unreadable, integers, parsed
+from evfem.mesh.mesh import CELLS
 
 TYPES: Mapping[str, str] = {
     f"{name}{bits}": f"{code}{bits // 8}"
@@ -27,18 +28,7 @@ TYPES: Mapping[str, str] = {
     if name != "Float" or bits >= 32
 }
 #: VTK's numbers of the kinds of cells
-KINDS: Mapping[int, str] = {
-    1: "vertex",
-    3: "line",
-    21: "line3",
-    5: "triangle",
-    22: "triangle6",
-    9: "quad",
-    23: "quad8",
-    28: "quad9",
-    10: "tetra",
-    12: "hexahedron",
-}
+KINDS: Mapping[int, str] = {kind.vtk: name for name, kind in CELLS.items()}
 APPENDED = re.compile(rb"<AppendedData\b[^>]*>\s*_")
 Element = ElementTree.Element
 
@@ -122,7 +112,7 @@ class _Reader:
         for number in numbers[np.argsort(first)].tolist():
             if number not in KINDS:
                 raise Unreadable(f"cells of VTK's type {number}")
-            chosen, n = np.flatnonzero(types == number), NODES[KINDS[number]]
+            chosen, n = np.flatnonzero(types == number), CELLS[KINDS[number]].nodes
             begin = starts[chosen]
             if (ends[chosen] - begin != n).any() or (begin < 0).any() or (ends[chosen] > nodes.size).any():
                 raise Unreadable(f"offsets that do not fit cells of {n} nodes")

@@ -116,7 +116,7 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     )
 
 
-def _solver(table: SolverTable) -> Solver:
+def _solver(table: Any) -> Solver:
     key = "solver.strategy"
     strategy = _build(Strategy, parse(StrategyTable, table.strategy, key), key)
     return _build(Solver, table.model_copy(update={"strategy": strategy}), "solver")

@@ -6,14 +6,16 @@ import difflib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, Literal, TypeVar
+from dataclasses import MISSING, fields
+from typing import Any, Literal, TypeVar, get_type_hints
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
 from evfem.errors import InputError, readable
-from evfem.scene.motion import HOLDS, Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import CONTACTS, COUPLINGS, DIRECTIONS, DYNAMICS, ELEMENTS
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
+from evfem.solver.strategy import Strategy
 
 # A field's description is what an error says is allowed.
 
@@ -30,6 +32,20 @@ def _optional(allowed: str, default: Any = None) -> Any:
 
 def _required(allowed: str) -> Any:
     return Key(description=allowed)
+
+
+def derived(cls: type, **own: Any) -> type[Table]:
+    """The table of a dataclass: its fields' names, types and defaults, and what their rules allow.
+
+    `own`: keys that are not in the file what they are in the dataclass. A class with a `kind` is chosen by
+    that key, which the caller has looked at.
+    """
+    types = get_type_hints(cls)
+    keys: dict[str, Any] = {"kind": (str, _required("a kind"))} if hasattr(cls, "kind") else {}
+    for spec in fields(cls):
+        default = ... if spec.default is MISSING else spec.default
+        keys[spec.name] = types[spec.name], Key(default=default, description=spec.metadata.get("allowed"))
+    return create_model(f"{cls.__name__}Table", __base__=Table, **(keys | own))
 
 
 class SceneTable(Table):
@@ -102,76 +118,9 @@ class ElectrostaticsTable(Table):
     coupling: Literal[COUPLINGS] = _optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
 
 
-class SolverTable(Table):
-    """[solver]."""
-
-    element: str | None = _optional(" | ".join(ELEMENTS))
-    dynamics: str = _optional(" | ".join(DYNAMICS), "quasistatic")
-    contact: str = _optional(" | ".join(CONTACTS), "exact")
-    penalty_normal: float | None = _optional("a penalty in N/mm3, larger than 0")
-    penalty_tangential: float | None = _optional("a penalty in N/mm3, larger than 0")
-    tolerance: float = _optional("a relative residual from 1e-13 to 1e-3", 1e-8)
-    threads: int = _optional("a whole number, at least 1", 1)
-    strategy: dict[str, Any] = _optional("a table [solver.strategy]", {})
-
-
-class StrategyTable(Table):
-    """[solver.strategy]."""
-
-    iterations: int = _optional("a whole number, at least 1", 40)
-    patience: float = _optional("a number of iterations, not negative", 8.0)
-    smallest_part: float = _optional("a share of a step, above 0, at most 1", 1.0 / 1024.0)
-    easy: int = _optional("a whole number, at least 1", 8)
-    growth: float = _optional("a factor from 1 to 10", 1.25)
-    reach: float = _optional("a factor from 0 to 10", 1.5)
-
-
-class OutputTable(Table):
-    """[output]."""
-
-    every: int = _optional("a whole number, at least 1", 1)
-
-
-_STEPS = "a whole number, at least 1"
-_SPEED = "a speed in mm/s, larger than 0"
-
-
-class PressTable(Table):
-    """[[motion]] of the kind press."""
-
-    kind: Literal["press"]
-    force: float | None = _optional("a force in N/mm, not negative")
-    indentation: float | None = _optional("an indentation in mm between -200 and 200")
-    steps: int = _optional(_STEPS, 10)
-    speed: float | None = _optional(_SPEED)
-
-
-class SlideTable(Table):
-    """[[motion]] of the kind slide."""
-
-    kind: Literal["slide"]
-    distance: float = _required("a distance in mm, not 0")
-    steps: int = _optional(_STEPS, 100)
-    speed: float | None = _optional(_SPEED)
-    hold: Literal[HOLDS] = _optional(" | ".join(HOLDS), HOLDS[0])  # type: ignore[valid-type]
-
-
-class HoverTable(Table):
-    """[[motion]] of the kind hover."""
-
-    kind: Literal["hover"]
-    gap: float = _required("a gap in mm, not negative")
-    steps: int = _optional(_STEPS, 1)
-
-
-class VoltageTable(Table):
-    """[[motion]] of the kind voltage."""
-
-    kind: Literal["voltage"]
-    voltage: float = _required("a voltage in V")
-    steps: int = _optional(_STEPS, 10)
-    hold: Literal[HOLDS] = _optional(" | ".join(HOLDS), HOLDS[0])  # type: ignore[valid-type]
-
+SolverTable = derived(Solver, strategy=(dict[str, Any], _optional("a table [solver.strategy]", {})))
+StrategyTable = derived(Strategy)
+OutputTable = derived(Output)
 
 SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
@@ -179,10 +128,7 @@ SURFACES: Mapping[str, type[Table]] = {
     "profile": ProfileTable,
 }
 MOTIONS: Mapping[str, tuple[type[Table], type]] = {
-    "press": (PressTable, Press),
-    "slide": (SlideTable, Slide),
-    "hover": (HoverTable, Hover),
-    "voltage": (VoltageTable, VoltageRamp),
+    cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp)
 }
 
 T = TypeVar("T", bound=Table)

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Literal, get_args
 
-from evfem.common.checks import choice, count, real, set_frozen
+from evfem.common.checks import check_fields, number, one_of, whole
 from evfem.errors import InputError
 
-HOLDS = ("indentation", "force")
+Hold = Literal["indentation", "force"]
 
-
-def _speed(value: object) -> float | None:
-    return None if value is None else real("speed", value, "a speed in mm/s, larger than 0", lambda v: v > 0)
+# What a field may be, in words and as a check. Scene files take their keys from these fields too
+# (`evfem.scene.keys`).
+_FORCE = number("a force in N/mm, not negative", lambda f: f >= 0)
+_INDENTATION = number("an indentation in mm between -200 and 200", lambda d: abs(d) <= 200)
+_DISTANCE = number("a distance in mm, not 0, at most 1000 either way", lambda d: 0 < abs(d) <= 1000)
+_SPEED = number("a speed in mm/s, larger than 0", lambda v: v > 0)
+_GAP = number("a gap in mm from 0 to 200", lambda g: 0 <= g <= 200)
+_VOLTAGE = number("a voltage in V between -1e6 and 1e6", lambda u: abs(u) <= 1e6)
+_STEPS, _HOLD = whole(), one_of(*get_args(Hold))
 
 
 @dataclass(frozen=True)
@@ -28,30 +35,20 @@ class Press:
     evfem.errors.InputError: force: given neither force nor indentation; allowed: exactly one of the two
     """
 
-    force: float | None = None
-    indentation: float | None = None
-    steps: int = 10
-    speed: float | None = None
+    force: float | None = field(default=None, metadata=_FORCE)
+    indentation: float | None = field(default=None, metadata=_INDENTATION)
+    steps: int = field(default=10, metadata=_STEPS)
+    speed: float | None = field(default=None, metadata=_SPEED)
     kind = "press"
 
     def __post_init__(self) -> None:
         if (self.force is None) == (self.indentation is None):
             given = "neither force nor indentation" if self.force is None else "force and indentation"
             raise InputError("force", given, "exactly one of the two")
-        if self.force is not None:
-            set_frozen(
-                self, force=real("force", self.force, "a force in N/mm, not negative", lambda f: f >= 0)
-            )
-            if self.speed is not None:
-                raise InputError(
-                    "speed", self.speed, "no speed with a press to a force, only to an indentation"
-                )
-        else:
-            allowed = "an indentation in mm between -200 and 200"
-            set_frozen(
-                self, indentation=real("indentation", self.indentation, allowed, lambda d: abs(d) <= 200)
-            )
-        set_frozen(self, steps=count("steps", self.steps), speed=_speed(self.speed))
+        if self.force is not None and self.speed is not None:
+            allowed = "no speed with a press to a force, only to an indentation"
+            raise InputError("speed", self.speed, allowed)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -65,21 +62,14 @@ class Slide:
     100
     """
 
-    distance: float
-    steps: int = 100
-    speed: float | None = None
-    hold: str = "indentation"
+    distance: float = field(metadata=_DISTANCE)
+    steps: int = field(default=100, metadata=_STEPS)
+    speed: float | None = field(default=None, metadata=_SPEED)
+    hold: Hold = field(default="indentation", metadata=_HOLD)
     kind = "slide"
 
     def __post_init__(self) -> None:
-        allowed = "a distance in mm, not 0, at most 1000 either way"
-        set_frozen(
-            self,
-            distance=real("distance", self.distance, allowed, lambda d: 0 < abs(d) <= 1000),
-            steps=count("steps", self.steps),
-            speed=_speed(self.speed),
-            hold=choice("hold", self.hold, HOLDS),
-        )
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -89,13 +79,12 @@ class Hover:
     The tissue is free to move under the attraction. Going there takes no time.
     """
 
-    gap: float
-    steps: int = 1
+    gap: float = field(metadata=_GAP)
+    steps: int = field(default=1, metadata=_STEPS)
     kind = "hover"
 
     def __post_init__(self) -> None:
-        gap = real("gap", self.gap, "a gap in mm from 0 to 200", lambda g: 0 <= g <= 200)
-        set_frozen(self, gap=gap, steps=count("steps", self.steps))
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -105,17 +94,13 @@ class VoltageRamp:
     `hold` keeps the indentation or the applied force of the moment before.
     """
 
-    voltage: float
-    steps: int = 10
-    hold: str = "indentation"
+    voltage: float = field(metadata=_VOLTAGE)
+    steps: int = field(default=10, metadata=_STEPS)
+    hold: Hold = field(default="indentation", metadata=_HOLD)
     kind = "voltage"
 
     def __post_init__(self) -> None:
-        allowed = "a voltage in V between -1e6 and 1e6"
-        voltage = real("voltage", self.voltage, allowed, lambda u: abs(u) <= 1e6)
-        set_frozen(
-            self, voltage=voltage, steps=count("steps", self.steps), hold=choice("hold", self.hold, HOLDS)
-        )
+        check_fields(self)
 
 
 Motion = Press | Slide | Hover | VoltageRamp

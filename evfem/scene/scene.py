@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
-from evfem.common.checks import choice, count, real, set_frozen
+from evfem.common.checks import check_fields, choice, number, one_of, real, set_frozen, whole
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
@@ -27,6 +27,8 @@ DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
+_PENALTY = number("a penalty in N/mm3, larger than 0", lambda p: p > 0)
+_TOLERANCE = number("a relative residual from 1e-13 to 1e-3", lambda t: 1e-13 <= t <= 1e-3)
 
 
 @runtime_checkable
@@ -58,35 +60,25 @@ class Solver:
     alone. `strategy` says how hard steps are tried.
     """
 
-    element: str | None = None
-    dynamics: str = "quasistatic"
-    contact: str = "exact"
-    penalty_normal: float | None = None
-    penalty_tangential: float | None = None
-    tolerance: float = 1e-8
-    threads: int = 1
+    element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
+    dynamics: str = field(default="quasistatic", metadata=one_of(*DYNAMICS))
+    contact: str = field(default="exact", metadata=one_of(*CONTACTS))
+    penalty_normal: float | None = field(default=None, metadata=_PENALTY)
+    penalty_tangential: float | None = field(default=None, metadata=_PENALTY)
+    tolerance: float = field(default=1e-8, metadata=_TOLERANCE)
+    threads: int = field(default=1, metadata=whole(1024))
     strategy: Strategy = field(default_factory=Strategy)
 
     def __post_init__(self) -> None:
         if not isinstance(self.strategy, Strategy):
             raise InputError("strategy", self.strategy, "a Strategy")
-        if self.element is not None:
-            choice("element", self.element, ELEMENTS)
-        choice("dynamics", self.dynamics, DYNAMICS)
-        choice("contact", self.contact, CONTACTS)
         for key in ("penalty_normal", "penalty_tangential"):
-            value = getattr(self, key)
-            if value is None:
-                continue
-            if self.contact != "penalty":
-                raise InputError(key, value, 'only with contact = "penalty"')
-            set_frozen(self, **{key: real(key, value, "a penalty in N/mm3, larger than 0", lambda p: p > 0)})
+            if self.contact == "exact" and getattr(self, key) is not None:
+                raise InputError(key, getattr(self, key), 'only with contact = "penalty"')
+        check_fields(self)
         if self.contact == "penalty" and self.penalty_normal is None:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
             raise InputError("penalty_normal", "nothing", allowed)
-        allowed = "a relative residual from 1e-13 to 1e-3"
-        tolerance = real("tolerance", self.tolerance, allowed, lambda t: 1e-13 <= t <= 1e-3)
-        set_frozen(self, tolerance=tolerance, threads=count("threads", self.threads, 1024))
 
     def element_on(self, corners: int) -> str:
         """The element used on cells with that many corners (3 or 4).
@@ -110,10 +102,10 @@ class Solver:
 class Output:
     """Fields are kept of every `every`-th step, and of the last one."""
 
-    every: int = 1
+    every: int = field(default=1, metadata=whole())
 
     def __post_init__(self) -> None:
-        set_frozen(self, every=count("every", self.every))
+        check_fields(self)
 
 
 class Motions:

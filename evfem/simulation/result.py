@@ -5,8 +5,6 @@ Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz 
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 from collections.abc import Mapping, Sequence
@@ -24,9 +22,10 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.tables import csv_text
 from evfem.common.views import called, curves, table
 from evfem.errors import InputError
-from evfem.mesh.mesh import KINDS, Mesh
+from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.scene.scene import Scene
 
 Row = Mapping[str, Any]
@@ -64,7 +63,10 @@ class Frame:
 
 POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
 CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
-_SHAPES: dict[str, tuple[str | int, ...]] = {"displacement": ("N", 2), **dict.fromkeys(POINT_FIELDS, ("N",))}
+_SHAPES: dict[str, tuple[str | int, ...]] = {
+    "displacement": ("N", "dim"),
+    **dict.fromkeys(POINT_FIELDS, ("N",)),
+}
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 
@@ -228,24 +230,18 @@ def csv_line(row: Row) -> str:
     >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
     '1,0,press,0.0,0.0,0.0,0.1'
     """
-    return _csv_text([_text(name, row[name]) for name in COLUMNS])
+    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
 
 
 def csv_header() -> str:
     """The first line of history.csv."""
-    return _csv_text(COLUMNS)
+    return csv_text([COLUMNS])
 
 
-def _csv_text(values: Sequence[str]) -> str:
-    buffer = io.StringIO()
-    csv.writer(buffer, lineterminator="\n").writerow(values)
-    return buffer.getvalue()
-
-
-def _text(name: str, value: Any) -> str:
+def _plain_value(name: str, value: Any) -> str | int | float:
     if name == "motion":
         return str(value)
-    return str(int(value)) if name in INTEGERS else repr(float(value))
+    return int(value) if name in INTEGERS else float(value)
 
 
 def _column(name: str, values: list[Any]) -> Any:
@@ -275,6 +271,11 @@ def versions() -> dict[str, str]:
     return found
 
 
+def origin() -> dict[str, Any]:
+    """Versions and date, for the provenance of whatever is computed now."""
+    return {"versions": dict(versions()), "date": datetime.now(UTC).isoformat(timespec="seconds")}
+
+
 def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
     """Versions, parameters, fingerprints and the solver's own record, in plain values ready for JSON.
 
@@ -287,7 +288,7 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
     except InputError:
         parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
     return {
-        "versions": dict(versions()),
+        **origin(),
         "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
         "parameters": parameters,
         "mesh": {
@@ -297,7 +298,6 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
             "kind": mesh.kind,
         },
         "solver": dict(solver),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
     }
 
 
@@ -378,15 +378,13 @@ def _mesh_from(arrays: Mapping[str, np.ndarray]) -> Mesh:
     kind = str(arrays["mesh/kind"])
     if kind not in KINDS:
         raise ValueError("cells of an unknown kind")
-    corners, order = KINDS[kind]
-    nodes_of_cell = corners if order == 1 else {3: 6, 4: 9}[corners]
     points, cells, region = (arrays[f"mesh/{name}"] for name in ("points", "cells", "region"))
     prefix = "mesh/set/"
     sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
     names = json.loads(str(arrays["mesh/region_names"]))
     if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
         raise ValueError("points of the mesh")
-    if region.ndim != 1 or cells.shape != (len(region), nodes_of_cell) or region.dtype.kind not in "iu":
+    if region.ndim != 1 or cells.shape != (len(region), CELLS[kind].nodes) or region.dtype.kind not in "iu":
         raise ValueError("cells of the mesh")
     if not isinstance(names, dict) or not all(type(number) is int for number in names.values()):
         raise ValueError("names of regions")
@@ -400,7 +398,7 @@ def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     if "frames/step" not in arrays:
         return []
     columns = {spec.name: arrays[f"frames/{spec.name}"] for spec in fields(Frame)}
-    size: dict[str | int, int] = {"N": len(mesh.points), "E": len(mesh.cells)}
+    size: dict[str | int, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
     count = len(columns["step"])
     for name, shape in _SHAPES.items():
         expected = (count, *(size.get(n, n) for n in shape))

@@ -10,9 +10,14 @@ strides. Ill-posed scenes (sliding over texture, brittle snap-through) need phys
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
-from evfem.common.checks import count, real, set_frozen
+from evfem.common.checks import check_fields, number, whole
+
+_PATIENCE = number("a number of iterations, not negative", lambda n: n >= 0)
+_PART = number("a share of a step, above 0, at most 1", lambda s: 0.0 < s <= 1.0)
+_GROWTH = number("a factor from 1 to 10", lambda f: 1.0 <= f <= 10.0)
+_REACH = number("a factor from 0 to 10", lambda f: 0.0 <= f <= 10.0)
 
 
 @dataclass(frozen=True)
@@ -31,21 +36,12 @@ class Strategy:
     evfem.errors.InputError: smallest_part: given 2.0; allowed: a share of a step, above 0, at most 1
     """
 
-    iterations: int = 40
-    patience: float = 8.0
-    smallest_part: float = 1.0 / 1024.0
-    easy: int = 8
-    growth: float = 1.25
-    reach: float = 1.5
+    iterations: int = field(default=40, metadata=whole(10_000))
+    patience: float = field(default=8.0, metadata=_PATIENCE)
+    smallest_part: float = field(default=1.0 / 1024.0, metadata=_PART)
+    easy: int = field(default=8, metadata=whole(10_000))
+    growth: float = field(default=1.25, metadata=_GROWTH)
+    reach: float = field(default=1.5, metadata=_REACH)
 
     def __post_init__(self) -> None:
-        part, waits = "a share of a step, above 0, at most 1", "a number of iterations, not negative"
-        set_frozen(
-            self,
-            iterations=count("iterations", self.iterations, 10_000),
-            patience=real("patience", self.patience, waits, lambda n: n >= 0),
-            smallest_part=real("smallest_part", self.smallest_part, part, lambda s: 0.0 < s <= 1.0),
-            easy=count("easy", self.easy, 10_000),
-            growth=real("growth", self.growth, "a factor from 1 to 10", lambda f: 1.0 <= f <= 10.0),
-            reach=real("reach", self.reach, "a factor from 0 to 10", lambda f: 0.0 <= f <= 10.0),
-        )
+        check_fields(self)

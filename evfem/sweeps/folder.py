@@ -7,8 +7,6 @@ changed in other points, finds it again. Every file is written whole or not at a
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -18,8 +16,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from evfem.common.storage import replacing, write_text
-from evfem.errors import InputError, StorageError
+from evfem.common.storage import disk, refuse_others, replacing, write_names, write_text
+from evfem.common.tables import csv_text
 
 POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
 MANIFEST = ".evfem-sweep"
@@ -57,23 +55,17 @@ class SweepFolder:
     def open(self) -> None:
         """Make the folder, or clear what an earlier sweep left in it; files of others are never touched."""
         ours = (TABLE, PARQUET, PROVENANCE, POINTS)
-        try:
+        with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
             present = [name for name in ours if (self.path / name).exists()]
-            if present and not (self.path / MANIFEST).is_file():
-                given = f"{self.path}, where {present[0]} was not written by a sweep"
-                raise InputError("--out", given, "another folder, for files of others are never touched")
-            write_text(self.path / MANIFEST, "".join(f"{name}\n" for name in ours))
+            refuse_others(self.path / MANIFEST, present, "a sweep")
+            write_names(self.path / MANIFEST, ours)
             (self.path / POINTS).mkdir(exist_ok=True)
             files = [p for folder in (self.path, self.path / POINTS) for p in folder.iterdir()]
             for file in files:
                 old = file.name in ours or POINT_FILE.fullmatch(file.name)
                 if LEFT.fullmatch(file.name) or (old and not self.resume and file.name != POINTS):
                     file.unlink()
-        except OSError as error:
-            if isinstance(error, StorageError):
-                raise
-            raise StorageError(f"cannot use {self.path}: {error.strerror or error}") from error
 
     def write(self, key: str, answer: Answer) -> None:
         """Keep a point, in one step."""
@@ -90,7 +82,8 @@ class SweepFolder:
 
     def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
         """The table of all points so far."""
-        write_text(self.path / TABLE, csv_text(columns, rows))
+        lines = [[_cell(row.get(name)) for name in columns] for row in rows]
+        write_text(self.path / TABLE, csv_text([columns, *lines]))
         if find_spec("pyarrow") is not None:
             with replacing(self.path / PARQUET) as temporary:
                 _write_parquet(temporary, columns, rows)
@@ -107,19 +100,6 @@ def _sound(answer: Answer) -> bool:
         and isinstance(answer.message, str)
         and all(type(number) in (int, float) for number in numbers)
     )
-
-
-def csv_text(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows as csv with every digit that counts; nothing stands for a number that is not there.
-
-    >>> csv_text(["a", "b", "c"], [{"a": 0.1, "b": None, "c": [[0.0, 0.3]]}])
-    'a,b,c\\n0.1,,"[[0.0, 0.3]]"\\n'
-    """
-    buffer = io.StringIO()
-    writer = csv.writer(buffer, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows([_cell(row.get(name)) for name in columns] for row in rows)
-    return buffer.getvalue()
 
 
 def _cell(value: Any) -> Any:

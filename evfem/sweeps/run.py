@@ -9,7 +9,6 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from evfem.common.digest import digest
 from evfem.common.notices import LOG
 from evfem.errors import InputError, NotConverged
 from evfem.scene.file import loads
-from evfem.simulation.result import versions
+from evfem.simulation.result import origin
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder
@@ -193,8 +192,7 @@ class _Run:
             "reused": self.reused,
             "complete": len(rows) == len(self.points),
             "wall_seconds": clock.perf_counter() - self.began,
-            "versions": dict(versions()),
-            "date": datetime.now(UTC).isoformat(timespec="seconds"),
+            **origin(),
             "scene": {"tables": plan.tables, "digest": digest(plan.tables)},
             "grid": plan.grid,
             "samples": drawn,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.mesh.mesh import Mesh, layer_thickness, raised
+from evfem.mesh.mesh import CELLS, Mesh, layer_thickness, raised
 from evfem.mesh.quality import scaled_jacobian
 
 
@@ -162,3 +162,14 @@ def test_scaled_jacobian_sees_a_mid_node_beyond_the_quarter_point():
         points[mesh.cells[0, 4], 0] += 2.0 * shift  # half width 2
         moved = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names)
         assert np.sign(scaled_jacobian(moved)[0]) == sign
+
+
+def test_the_table_of_cells_agrees_with_meshio():
+    import meshio
+    from meshio._vtk_common import vtk_to_meshio_type
+    from meshio.gmsh import gmsh_to_meshio_type
+
+    for name, kind in CELLS.items():
+        block = meshio.CellBlock(name, np.zeros((1, kind.nodes), dtype=int))
+        assert (block.dim, block.data.shape[1]) == (kind.dimension, kind.nodes)
+        assert (vtk_to_meshio_type[kind.vtk], gmsh_to_meshio_type[kind.gmsh]) == (name, name)

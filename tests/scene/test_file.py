@@ -10,6 +10,7 @@ from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh import file as meshfile
+from evfem.scene import keys
 from evfem.scene.file import dump, load, loads
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
@@ -444,3 +445,14 @@ def test_the_strategy_goes_to_a_file_and_back():
     assert loads(dump(scene)).solver == scene.solver
     with pytest.raises(InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"):
         loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))
+
+
+def test_every_key_that_comes_from_a_dataclass_says_what_is_allowed():
+    tables = [
+        keys.SolverTable,
+        keys.StrategyTable,
+        keys.OutputTable,
+        *(one for one, _ in keys.MOTIONS.values()),
+    ]
+    for table in tables:
+        assert all(field.description for field in table.model_fields.values()), table

@@ -3,6 +3,8 @@
 import importlib
 import importlib.util
 import json
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,12 +126,11 @@ def test_interval_of_the_median():
 
 
 def test_curves_of_a_study_as_csv():
-    text = common.csv_text(
+    text = common.series_text(
         [common.Series("a", [1.0, 2.0], [0.1, 1 / 3], "N over V"), common.Series("b", ["i"], [2.0], "mN")]
     )
     assert text == f"series,x,y,unit\na,1.0,0.1,N over V\na,2.0,{1 / 3!r},N over V\nb,i,2.0,mN\n"
-    with pytest.raises(ValueError, match="comma"):
-        common.csv_text([common.Series("a,b", [1.0], [1.0], "N")])
+    assert common.series_text([common.Series("a,b", [1], [1.0], "N")]).endswith('"a,b",1.0,1.0,N\n')
 
 
 def test_unknown_study_and_unusable_folder(tmp_path):
@@ -139,3 +140,12 @@ def test_unknown_study_and_unusable_folder(tmp_path):
     with pytest.raises(StorageError, match="folder"):
         studies.run("section321", quick=True, out=tmp_path / "file" / "inside")
     assert data.load("table1").units["c"] == "mm"
+
+
+def test_every_folder_of_studies_is_packed_into_the_wheel():
+    top = next(folder for folder in Path(__file__).parents if (folder / "pyproject.toml").exists())
+    packed = tomllib.loads((top / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    folders = (path.parent.relative_to(top) for path in (top / "studies").rglob("__init__.py"))
+    assert {f"evfem.{'.'.join(folder.parts)}" for folder in folders} == {
+        name for name in packed if name.startswith("evfem.studies")
+    }

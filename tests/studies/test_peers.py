@@ -14,8 +14,8 @@ import pytest
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 peers, numbers, hosts, shown, problem, apart = (
-    importlib.import_module(f"{studies.__name__}.{name}")
-    for name in ("peers", "peers_numbers", "peers_hosts", "peers_shown", "peers_problem", "peers_apart")
+    importlib.import_module(f"{studies.__name__}.peers.{name}")
+    for name in ("study", "evaluation", "hosts", "shown", "problem", "apart")
 )
 PRESENT = [name for name in numbers.PEERS if hosts.host(name)]
 FORCES = ("Fn_at_0.5", "Fn_at_1.0", "Fn_at_1.5")
@@ -103,11 +103,13 @@ def imports(path):
             yield from (alias.name.split(".")[0] for alias in node.names)
 
 
-@pytest.mark.parametrize("name", ["apart", "fenicsx", "getfem"])
+@pytest.mark.parametrize("name", ["apart", "with_fenicsx", "with_getfem"])
 def test_a_script_needs_its_package_and_numpy_only(name):
-    allowed = {"fenicsx": {"dolfinx", "ufl", "petsc4py", "mpi4py"}, "getfem": {"getfem"}}.get(name, set())
-    found = set(imports(Path(hosts.__file__).with_name(f"peers_{name}.py")))
-    assert found - set(sys.stdlib_module_names) <= allowed | {"numpy", "peers_apart"}
+    allowed = {"with_fenicsx": {"dolfinx", "ufl", "petsc4py", "mpi4py"}, "with_getfem": {"getfem"}}.get(
+        name, set()
+    )
+    found = set(imports(Path(hosts.__file__).with_name(f"{name}.py")))
+    assert found - set(sys.stdlib_module_names) <= allowed | {"numpy", "apart"}
 
 
 def test_the_first_interpreter_that_has_a_package_is_its_host(monkeypatch, tmp_path):

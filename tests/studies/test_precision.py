@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-work, numbers_of, runs_of, scenes, growth, plan, shares, ideas, models, benchmark = (
+work, numbers_of, runs_of, scenes, growth, plan, shares, models, benchmark = (
     importlib.import_module(f"{studies.__name__}.{name}")
     for name in (
-        "work_precision",
-        "precision_numbers",
-        "precision_runs",
-        "precision_scenes",
-        "precision_growth",
-        "precision_plan",
-        "precision_shares",
-        "precision_ideas",
-        "precision_models",
+        "precision.study",
+        "precision.evaluation",
+        "precision.runs",
+        "precision.scenes",
+        "precision.growth",
+        "precision.plan",
+        "precision.shares",
+        "precision.models",
         "benchmark",
     )
 )
@@ -163,17 +162,6 @@ def test_clocks_within_clocks(monkeypatch):
     assert outer() == 7
     assert parts.spent["solve"] == 3.0
     assert parts.spent["contact"] == 7.0
-
-
-def test_ideas_are_dated_and_say_what_became_of_them():
-    assert "2026-11-21" in ideas.MEASURED
-    assert all(idea.prediction and idea.measurement for idea in ideas.IDEAS)
-    worse = [one for one in ideas.IDEAS if one.before and one.after and one.after > one.before]
-    assert worse
-    assert not any(one.kept for one in worse)
-    assert ideas.numbers()["ideas.cells_in_blocks_of_16_lanes.after_over_before"] == pytest.approx(
-        0.271, abs=1e-3
-    )
 
 
 def test_all_includes_the_study():

@@ -13,8 +13,8 @@ from evfem.scene.motion import Press, Slide
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 stability, case, scenes, figure = (
-    importlib.import_module(f"{studies.__name__}.stability{name}")
-    for name in ("", "_case", "_scenes", "_figure")
+    importlib.import_module(f"{studies.__name__}.stability.{name}")
+    for name in ("study", "case", "scenes", "figure")
 )
 
 

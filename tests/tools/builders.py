@@ -2,7 +2,7 @@
 
 import numpy as np
 from evfem.studies.benchmark import benchmark_mesh
-from evfem.studies.stability_scenes import INSULATOR, SKIN, block, finger
+from evfem.studies.stability.scenes import INSULATOR, SKIN, block, finger
 
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek

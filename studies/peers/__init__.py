@@ -1,0 +1,1 @@
+"""The study `peers`: the same press-and-slide problem by evfem and by other packages."""

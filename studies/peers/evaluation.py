@@ -1,0 +1,163 @@
+"""The runs of the study `peers` and what follows from them: errors, ratios, cost of an error, curves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..common import Series
+from .problem import errors, quantities
+
+#: with whom evfem is compared
+PEERS = ("felupe", "fenicsx", "getfem")
+#: elements that are compared with each other: evfem's and the peers'
+ELEMENTS = {"q1": "q1", "q2p1": "q2"}
+#: package and element, in the order in which they take turns
+CONTENDERS = tuple(
+    who for own, its in ELEMENTS.items() for who in (("evfem", own), *((peer, its) for peer in PEERS))
+)
+#: what is measured of a run
+MEASURED = (
+    "cpu_s",
+    "slowest_cpu_s",
+    "wall_s",
+    "process_cpu_s",
+    "iterations",
+    "factorisations",
+    "imported_MB",
+    "peak_MB",
+)
+#: errors at which the fastest run is looked for, %
+GOALS = (1.0, 0.3, 0.1)
+#: what a scene is judged by there: the beginning of the names of its forces
+JUDGED = {"A": "Fn", "B": "Ft"}
+
+
+@dataclass(frozen=True)
+class Run:
+    """A contender in a scene on a level: its best round."""
+
+    package: str
+    element: str
+    scene: str
+    level: int
+    measured: Mapping[str, Any]
+
+    @property
+    def key(self) -> str:
+        """Begin of its names among the numbers."""
+        return f"{self.scene}.L{self.level}.{self.package}_{self.element}"
+
+    @property
+    def forces(self) -> dict[str, float]:
+        """What is compared, N/mm."""
+        return quantities(self.scene, self.measured["history"])
+
+    def error(self, of: str = "") -> float:
+        """The largest deviation of forces whose names begin so from the reference, in per cent."""
+        found = errors(self.scene, self.forces)
+        return max(abs(value) for key, value in found.items() if key.startswith(of))
+
+
+def numbers(runs: list[Run], cold: Mapping[str, Mapping[str, float]]) -> dict[str, float]:
+    """Cost, forces and errors of every run, ratios on the same nodes and at the same error.
+
+    `cold` is what first runs cost that had to compile, by the key of the run.
+    """
+    found: dict[str, float] = {}
+    for run in runs:
+        found |= {f"{run.key}.{name}": run.measured[name] for name in MEASURED}
+        found |= {f"{run.key}.{name}": value for name, value in run.forces.items()}
+        deviations = errors(run.scene, run.forces)
+        found |= {f"{run.key}.error_percent.{name}": value for name, value in deviations.items()}
+    found |= {f"{key}.{name}": value for key, costs in cold.items() for name, value in costs.items()}
+    return found | on_the_same_nodes(runs) | agreement(runs) | at_equal_error(runs)
+
+
+def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
+    """Each peer's CPU seconds, memory and iterations over evfem's, and the fastest peer's CPU seconds."""
+    found: dict[str, float] = {}
+    for own in (run for run in runs if run.package == "evfem"):
+        place, fastest = f"{own.scene}.L{own.level}", []
+        for run in runs:
+            same = (run.scene, run.level, run.element) == (own.scene, own.level, ELEMENTS[own.element])
+            if run.package == "evfem" or not same:
+                continue
+            for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):
+                ratio = run.measured[name] / own.measured[name]
+                found[f"{place}.{run.package}_over_evfem.{own.element}.{name}"] = ratio
+            fastest.append(run.measured["cpu_s"])
+        if fastest:
+            ratio = min(fastest) / own.measured["cpu_s"]
+            found[f"{place}.fastest_over_evfem.{own.element}.cpu_s"] = ratio
+    return found
+
+
+def agreement(runs: list[Run]) -> dict[str, float]:
+    """How far apart packages are that use the same element: the largest range of a force over its mean, %."""
+    found: dict[str, float] = {}
+    for scene, level, element in dict.fromkeys((run.scene, run.level, run.element) for run in runs):
+        same = [r.forces for r in runs if (r.scene, r.level, r.element) == (scene, level, element)]
+        if len(same) > 1:
+            forces = np.array([list(one.values()) for one in same])
+            apart = np.ptp(forces, axis=0) / np.abs(forces.mean(axis=0))
+            found[f"{scene}.L{level}.apart_percent.{element}"] = float(100.0 * apart.max())
+    return found
+
+
+def at_equal_error(runs: list[Run]) -> dict[str, float]:
+    """CPU seconds at which each package, with its better element, is as good as each goal."""
+    found: dict[str, float] = {}
+    for scene, judged in JUDGED.items():
+        for goal in GOALS:
+            key = f"{scene}.{judged}_to_{goal}_percent"
+            fastest: dict[str, float] = {}
+            for package, element in CONTENDERS:
+                its = [r for r in runs if (r.package, r.element, r.scene) == (package, element, scene)]
+                cost = cost_of(goal, [(r.measured["cpu_s"], r.error(judged)) for r in its])
+                if cost is not None:
+                    fastest[package] = min(cost, fastest.get(package, cost))
+            found |= {f"{key}.{package}.cpu_s": cost for package, cost in fastest.items()}
+            own = fastest.pop("evfem", None)
+            if own and fastest:
+                costs = fastest | {"fastest": min(fastest.values())}
+                found |= {f"{key}.{name}_over_evfem.cpu_s": cost / own for name, cost in costs.items()}
+    return found
+
+
+def cost_of(goal: float, curve: list[tuple[float, float]]) -> float | None:
+    """CPU seconds of an error on a curve of (CPU s, error %) from coarse to fine; None if it stays above."""
+    before: tuple[float, float] | None = None
+    for cpu, error in curve:
+        if error <= goal:
+            if before is None:
+                return cpu
+            share = np.log(before[1] / goal) / np.log(before[1] / error)
+            return float(before[0] * (cpu / before[0]) ** share)
+        before = (cpu, error)
+    return None
+
+
+def series(runs: list[Run]) -> list[Series]:
+    """Largest error against CPU seconds: a curve over the levels for each scene and contender."""
+    found = []
+    for scene in JUDGED:
+        for package, element in CONTENDERS:
+            mine = [r for r in runs if (r.package, r.element, r.scene) == (package, element, scene)]
+            if mine:
+                x, y = [r.measured["cpu_s"] for r in mine], [r.error() for r in mine]
+                found.append(Series(f"{scene} {package} {element}", x, y, "% over CPU s"))
+    return found
+
+
+def histories(runs: list[Run]) -> list[Series]:
+    """Every run's forces over its steps, so that other quantities can be read off without a new run."""
+    found = []
+    for run in runs:
+        forces = np.array(run.measured["history"]).T
+        for name, force in zip(("normal", "tangential", "electrostatic"), forces, strict=True):
+            found.append(Series(f"{run.key} {name}", np.arange(1, force.size + 1), force, "N/mm over step"))
+    return found

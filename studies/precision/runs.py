@@ -1,0 +1,104 @@
+"""The runs of the study `work_precision`: which, and how each is measured.
+
+Every run counts from the mesh to the last step, without imports, in CPU seconds of one process that has run
+everything once on the coarsest mesh; cheap runs are repeated and the least counts.
+"""
+
+from __future__ import annotations
+
+import gc
+import time
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from .apart import answer
+from .scenes import ELEMENTS, PADS, Case, build, forces
+
+#: N/mm3: soft, and about as stiff as penalty codes take it
+PENALTIES = (100.0, 10_000.0)
+#: steps of the slide in B, whose own limit is extrapolated from the last two
+STEPS = (10, 30, 60, 120)
+#: runs shorter than this are repeated (CPU s)
+SHORT, ROUNDS = 1.2, 3
+
+
+@dataclass(frozen=True)
+class Run:
+    """A case and what it took: CPU seconds, outer iterations, factorisations, nodes, and what it is judged
+    by.
+    """
+
+    case: Case
+    cpu_s: float
+    iterations: int
+    factorisations: int
+    nodes: int
+    forces: dict[str, float]
+
+
+def warm_up() -> None:
+    """Import and compile what the cases need, for every element."""
+    from evfem.simulation.run import simulate
+
+    for element in ELEMENTS:
+        simulate(build(Case("hover", 0, element)))
+
+
+def measure(case: Case, rounds: int = ROUNDS) -> Run:
+    """Run a case so many times, or until it takes long, and keep the least."""
+    from evfem.simulation.run import simulate
+
+    least = float("inf")
+    for _ in range(rounds):
+        gc.collect()
+        begin = time.process_time()
+        result = simulate(build(case))
+        least = min(least, time.process_time() - begin)
+        if least > SHORT:
+            break
+    record, nodes = result.provenance["solver"], len(result.mesh.points)
+    return Run(case, least, record["iterations"], record["factorisations"], nodes, forces(case, result))
+
+
+def measure_plain(given: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The same for another process: cases and runs as dictionaries."""
+    warm_up()
+    return [asdict(measure(Case(**one))) for one in given]
+
+
+def without_fast(cases: list[Case]) -> list[Run]:
+    """The cases in a process in which the packages of evfem[fast] cannot be imported."""
+    if not cases:
+        return []
+    found = answer("runs", [asdict(one) for one in cases], fast=False)
+    return [Run(**(one | {"case": Case(**one["case"])})) for one in found]
+
+
+def full() -> list[Case]:
+    """All cases, the coarsest meshes first, so that everything is compiled when times count."""
+    cases = [Case(problem, level, e) for level in (0, 1) for problem in _FINGERS for e in ELEMENTS]
+    cases += [Case("A", 2, "q1"), *(Case(problem, 2) for problem in _FINGERS)]
+    cases += [Case("hover", level, rigid=True) for level in (0, 1, 2)]
+    cases += [Case(problem, 1, penalty=penalty) for problem in "AB" for penalty in PENALTIES]
+    cases += [Case(problem, 1, coupling="staggered") for problem in ("C", "ramp")]
+    cases += [Case("ramp", 1, coupling="staggered_once")]
+    cases += [Case("B", 0, steps=steps) for steps in STEPS if steps != 30]
+    cases += [Case(pad, "coarse", e) for pad in PADS for e in ELEMENTS]
+    cases += [Case(pad, "medium", e) for pad in PADS for e in ("q1_fbar", "q2p1")]
+    cases += [Case(pad, preset) for preset in ("paper", "fine") for pad in PADS]
+    return cases + [replace(one, fast=False) for one in cases if _also_plain(one)]
+
+
+def _also_plain(case: Case) -> bool:
+    return case in [Case(problem, 0) for problem in _FINGERS] + [Case("A", 1)]
+
+
+def quick() -> list[Case]:
+    """What tests need: every kind of case, on the coarsest mesh."""
+    cases = [Case(problem, 0, element) for problem in ("A", "hover") for element in ("q1", "q2p1")]
+    cases += [Case("A", 1), Case("hover", 1), Case("C", 0), Case("C", 0, coupling="staggered")]
+    cases += [Case("A", 0, penalty=penalty) for penalty in PENALTIES]
+    return [*cases, Case("hover", 0, rigid=True), Case("hover", 0, fast=False)]
+
+
+_FINGERS = ("A", "B", "C", "hover", "ramp")

@@ -1,0 +1,1 @@
+"""The study `stability`: hard cases, hostile files and runs that are killed."""

@@ -1,0 +1,220 @@
+"""What a case of the study of stability is, how it is run, and what is recorded of it.
+
+A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances,
+and returns whether the physics is as expected and a sentence with the numbers. What it raises is recorded.
+"""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from evfem.errors import InputError, NotConverged
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+from evfem.simulation.run import simulate
+
+#: smallest scale of forces (N/mm) and of energies (N): what is smaller is rounding
+FORCE, ENERGY = 1e-6, 1e-9
+
+Verdict = tuple[bool, str]
+
+
+@dataclass
+class Log:
+    """Costs and balances of everything a case has simulated so far."""
+
+    steps: int = 0
+    substeps: int = 0
+    cuts: int = 0
+    iterations: int = 0
+    force_error: float = 0.0
+    energy_error: float = 0.0
+    refused: bool = False
+    stopped: bool = False
+
+    def simulate(self, scene: Scene) -> Result:
+        """The result of a scene; a step that does not converge is logged and raised again."""
+        try:
+            result = simulate(scene)
+        except NotConverged as error:
+            if isinstance(error.result, Result):
+                self._add(error.result, scene)
+            raise
+        self._add(result, scene)
+        return result
+
+    def refusal(self, make: Callable[[], object]) -> str:
+        """The sentence with which something is refused; raises AssertionError if it is not."""
+        try:
+            make()
+        except InputError as error:
+            self.refused = True
+            return str(error)
+        raise AssertionError("accepted, though it cannot be computed")
+
+    def stop(self, scene: Scene) -> NotConverged:
+        """The message of a scene that cannot be finished; raises AssertionError if it can."""
+        try:
+            self.simulate(scene)
+        except NotConverged as error:
+            self.stopped = True
+            return error
+        raise AssertionError("finished, though it should not have been possible")
+
+    def _add(self, result: Result, scene: Scene) -> None:
+        self.steps += len(result.step)
+        self.substeps += int(result.substeps.sum())
+        solver = result.provenance["solver"]
+        self.cuts += int(solver["cuts"])
+        self.iterations += int(solver["iterations"])
+        if len(result.step):
+            if scene.solver.dynamics != "inertial":  # there mass carries the difference
+                self.force_error = max(self.force_error, float(out_of_balance(result).max()))
+            self.energy_error = max(self.energy_error, abs(lost_energy(result)))
+
+
+def out_of_balance(result: Result) -> Any:
+    """Sum of all forces of every row (rows, 2), relative to its largest force (at least 1e-6 N/mm)."""
+    x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
+    y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
+    forces = np.array([x, y])
+    return np.abs(forces.sum(axis=1) / np.maximum(np.abs(forces).max(axis=(0, 1)), FORCE)).T
+
+
+def lost_energy(result: Result) -> float:
+    """Energy at the end that no column of the history has, relative to the largest of them at any time.
+
+    Second order in the step where the path is smooth; a snap loses what it sets free.
+    """
+    given = result.external_work + result.electrostatic_work
+    kept = [
+        result.stored_energy,
+        result.friction_dissipation,
+        result.viscous_dissipation,
+        result.kinetic_energy,
+    ]
+    scale = max(float(np.abs(column).max()) for column in (given, *kept))
+    return float((given - np.sum(kept, axis=0))[-1]) / max(scale, ENERGY)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A group and name, the expected physics in a sentence, and the function that finds out."""
+
+    group: str
+    name: str
+    expected: str
+    function: Callable[[Log], Verdict]
+    quick: bool = False
+
+    @property
+    def key(self) -> str:
+        """Its name among the numbers."""
+        return f"{self.group}.{self.name}".replace(" ", "_")
+
+
+@dataclass
+class Group:
+    """Cases of one kind, in the order in which they are declared."""
+
+    name: str
+    cases: list[Case] = field(default_factory=list)
+
+    def case(
+        self, name: str, expected: str, quick: bool = False
+    ) -> Callable[[Callable[[Log], Verdict]], Callable[[Log], Verdict]]:
+        """Decorator that adds a case."""
+
+        def add(function: Callable[[Log], Verdict]) -> Callable[[Log], Verdict]:
+            self.cases.append(Case(self.name, name, expected, function, quick))
+            return function
+
+        return add
+
+
+#: outcomes that count as passed, and the others
+PASSED = ("passed", "refused", "stopped")
+FAILED = ("wrong", "not converged", "error")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What became of a case; `said` is its sentence, or the message with which it ended."""
+
+    key: str
+    group: str
+    name: str
+    expected: str
+    outcome: str
+    said: str
+    cpu_s: float
+    steps: int
+    substeps: int
+    cuts: int
+    iterations: int
+    force_error: float
+    energy_error: float
+
+    @property
+    def good(self) -> bool:
+        """Whether the outcome is the expected one."""
+        return self.outcome in PASSED
+
+
+def judge(case: Case) -> Found:
+    """Run a case; nothing it raises gets lost."""
+    _warm_up()
+    log, begin = Log(), time.process_time()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            # walls and noise finer than the nodes are what some cases are about
+            warnings.filterwarnings("ignore", "the surface is (sharper|rougher) than the node spacing")
+            passed, said = case.function(log)
+        outcome = "passed" if passed else "wrong"
+        if passed and log.refused:
+            outcome = "refused"
+        elif passed and log.stopped:
+            outcome = "stopped"
+    except NotConverged as error:
+        outcome, said = "not converged", str(error)
+    except AssertionError as error:
+        outcome, said = "wrong", str(error)
+    except Exception as error:  # an outcome like others: the table names it, the other cases go on
+        outcome, said = "error", f"{type(error).__name__}: {error}"
+    spent = time.process_time() - begin
+    return Found(
+        key=case.key,
+        group=case.group,
+        name=case.name,
+        expected=case.expected,
+        outcome=outcome,
+        said=" ".join(said.split()),
+        cpu_s=spent,
+        steps=log.steps,
+        substeps=log.substeps,
+        cuts=log.cuts,
+        iterations=log.iterations,
+        force_error=log.force_error,
+        energy_error=log.energy_error,
+    )
+
+
+@cache
+def _warm_up() -> None:
+    """Load and compile what the first simulation of a process would have to pay for."""
+    from evfem.contact.surfaces import Display
+    from evfem.electrostatics.laws import Kaczmarek
+    from evfem.scene.motion import Hover, Motion, Press, Slide
+
+    from .scenes import block, finger
+
+    motion: list[Motion] = [Hover(0.1), Press(indentation=0.05, steps=1), Slide(0.1, steps=1)]
+    simulate(Scene(finger(block()), Display(), Kaczmarek(), 100.0, motion))

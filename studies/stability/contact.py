@@ -1,0 +1,353 @@
+"""Cases of contact and friction: reversals, jumps, texture, deep and light contact, steps too large."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.errors import NotConverged
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.result import Result
+from evfem.simulation.run import Run
+
+from .case import Group, Log, Verdict
+from .scenes import block, finger, pad, scene
+
+FRICTION = Group("friction")
+TEXTURE = Group("texture")
+MOTION = Group("motion")
+STEPS = Group("large steps")
+GROUPS = (FRICTION, TEXTURE, MOTION, STEPS)
+
+
+def _ratio(result: Result, row: int) -> float:
+    return float(result.tangential_force[row] / result.normal_force[row])
+
+
+# -- friction
+
+
+def _reversals(log: Log, mu: float, ridges: bool) -> Verdict:
+    """Two reversals, each leg long enough to slip everywhere."""
+    legs = (4.0 + 2.0 * mu) * np.array([1.0, -1.5, 1.5])
+    slides = [Slide(leg, steps=20) for leg in legs]
+    result = log.simulate(scene(pad(ridges), Flat(friction=mu), Press(indentation=0.3, steps=3), *slides))
+    ratios = [_ratio(result, row) for row in (22, 42, 62)]
+    off = max(abs(r - s * mu) for r, s in zip(ratios, (1.0, -1.0, 1.0), strict=True))
+    return off < 1e-6, f"F_t/F_n at the end of the legs {', '.join(f'{r:+.6f}' for r in ratios)}"
+
+
+for _mu in (0.0, 0.3, 1.0, 2.0):
+    FRICTION.case(
+        f"reversals mu {_mu:g}",
+        "full slip at the end of every leg: F_t = +mu, -mu, +mu F_n",
+        quick=_mu == 0.3,
+    )(partial(_reversals, mu=_mu, ridges=False))
+FRICTION.case("ridges that fold", "mu = 1.5 drags ridges over and back: F_t = +mu, -mu, +mu F_n")(
+    partial(_reversals, mu=1.5, ridges=True)
+)
+
+
+@FRICTION.case(
+    "start from stick", "F_t rises at most with the stuck stiffness, stick falls to zero, then mu F_n", True
+)
+def _stick(log: Log) -> Verdict:
+    slide = Slide(3.0, steps=30)
+    result = log.simulate(scene(pad(), Flat(friction=0.5), Press(force=0.05, steps=3), slide))
+    force = np.concatenate([[0.0], result.tangential_force[3:]])
+    rises = np.diff(force)
+    slowing = bool((rises[1:] < rises[:-1] + 1e-3 * rises[0]).all() and rises[0] > 0.0)
+    below = bool((force[1:] <= 0.5 * result.normal_force[3:] * (1.0 + 1e-7)).all())
+    end = _ratio(result, -1)
+    return slowing and below and abs(end - 0.5) < 1e-6, f"F_t rises ever more slowly to {end:.7f} F_n"
+
+
+def _jump(log: Log, table: list[list[float]]) -> Verdict:
+    """Coulomb's law with the coefficient of each node's accepted x, in every step."""
+    asked = scene(pad(), Flat(friction=table), Press(force=0.05, steps=5), Slide(4.0, steps=40))
+    result = log.simulate(asked)
+    going = Run(asked, None)
+    surface, equilibrium, worst = going.model.surface, going.model.equilibrium, 0.0
+    for request in going.requests():
+        going.advance(request)
+        normal, shear = going.state.contact_force.T
+        mu = surface.friction_coefficient(equilibrium.positions(going.state.u)[:, 0])
+        worst = max(worst, float((np.abs(shear) - mu * normal).max()))
+    end = _ratio(result, -1)
+    good = worst < 1e-9 and abs(end - table[-1][1]) < 1e-6
+    return good, f"cone exceeded by at most {worst:.0e} N/mm, F_t/F_n = {end:.7f} behind the jump"
+
+
+for _name, _table in {
+    "up": [[1.0, 0.2], [1.0, 1.0]],
+    "down": [[1.0, 1.0], [1.0, 0.2]],
+    "steep": [[0.4, 0.2], [0.41, 0.7]],
+}.items():
+    FRICTION.case(
+        f"jump {_name}", "Coulomb's law at every node's own place, mu F_n of the far side at the end"
+    )(partial(_jump, table=_table))
+
+
+@FRICTION.case(
+    "stop and go", "two rests change nothing without time: forces of the uninterrupted slide", True
+)
+def _stop_and_go(log: Log) -> Verdict:
+    flat, press, rest = Flat(friction=0.5), Press(indentation=0.3, steps=3), Press(indentation=0.3, steps=2)
+    parts: list[Motion] = [Slide(1.0, steps=5), rest, Slide(1.0, steps=5), rest, Slide(1.0, steps=5)]
+    stopping = log.simulate(scene(pad(), flat, press, *parts))
+    through = log.simulate(scene(pad(), flat, press, Slide(3.0, steps=15)))
+    error = abs(float(stopping.tangential_force[-1] / through.tangential_force[-1]) - 1.0)
+    idle = float(np.abs(np.diff(stopping.tangential_force[7:10])).max() / stopping.tangential_force[7])
+    return max(error, idle) < 1e-7, f"F_t changes by {idle:.0e} at rest, at the end it is {error:.0e} off"
+
+
+@FRICTION.case("20 mm", "full slip lasts: F_t = 0.3 F_n and the same F_n from 6 to 20 mm")
+def _far(log: Log) -> Verdict:
+    result = log.simulate(
+        scene(pad(True), Flat(friction=0.3), Press(force=0.1, steps=5), Slide(20.0, steps=80))
+    )
+    later = result.position > 6.0
+    off = float(np.abs(result.tangential_force[later] / result.normal_force[later] - 0.3).max())
+    spread = float(np.ptp(result.normal_force[later]) / result.normal_force[-1])
+    return off < 1e-6 and spread < 1e-6, f"F_t/F_n within {off:.0e}, F_n within {spread:.0e} from 6 to 20 mm"
+
+
+# -- texture
+
+
+def _textured(surface: Any, ridges: bool, dynamics: str, distance: float = 2.0, steps: int = 100) -> Scene:
+    """0.5 mm deep, slid at 20 mm/s with a relaxation time of 1 ms."""
+    motion = Press(indentation=0.3, steps=5), Slide(distance, steps=steps, speed=20.0)
+    return scene(pad(ridges, viscosity=1e-3), surface, *motion, solver=Solver(dynamics=dynamics))
+
+
+def _slides_over(log: Log, asked: Scene, mu: float, gain: float = 0.02) -> Verdict:
+    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not gained."""
+    result = log.simulate(asked)
+    later = result.position > 0.5 * result.position[-1]
+    mean = float(result.tangential_force[later].mean() / result.normal_force[later].mean())
+    deepest = float(result.min_gap.min())
+    balance = (
+        result.external_work - result.stored_energy - result.friction_dissipation
+        - result.viscous_dissipation - result.kinetic_energy
+    )  # fmt: skip
+    gained = float(-balance.min() / result.external_work.max())
+    good = mean > 0.98 * mu and deepest > -1e-6 and gained < gain
+    said = f"mean F_t/F_n {mean:.3f} with mu {mu:g}, deepest gap {deepest:.0e} mm"
+    return good, f"{said}, energy {'gained' if gained > 0.0 else 'lost'} {abs(gained):.1%}"
+
+
+def grating(pitch: float = 1.0, height: float = 0.1, wall: float = 0.02) -> Profile:
+    """Rectangular grooves with steep walls, sampled at their corners."""
+    start = np.arange(-12.0, 24.0, pitch)
+    corners = np.array([0.0, 0.5 * pitch, 0.5 * pitch + wall, pitch - wall])
+    return Profile(
+        (start[:, None] + corners).ravel(), np.tile([0.0, 0.0, -height, -height], len(start)), friction=0.2
+    )
+
+
+def rough(rms: float = 0.005, spacing: float = 0.05) -> Profile:
+    """Heights of a random walk that is pulled back to zero, sampled at `spacing` (mm)."""
+    x = np.arange(-12.0, 24.0, spacing)
+    noise = np.random.default_rng(11).normal(size=len(x))
+    height = np.zeros(len(x))
+    for i in range(1, len(x)):
+        height[i] = 0.8 * height[i - 1] + noise[i]
+    return Profile(x, rms * (height - height.mean()) / height.std(), friction=0.2)
+
+
+def wave(length: float, amplitude: float, mu: float = 0.2) -> Sinusoid:
+    """A sine of that wavelength and amplitude (mm)."""
+    return Sinusoid(terms=[[amplitude, 2.0 * np.pi / length, 0.0]], friction=mu)
+
+
+_OVER = "passes: mean F_t/F_n at least mu, no penetration, no energy gained"
+
+
+def _add(name: str, asked: Scene, gain: float = 0.02, physics: str = _OVER, quick: bool = False) -> None:
+    mu = float(np.max(asked.surface.friction))  # type: ignore[attr-defined]
+    TEXTURE.case(name, physics, quick)(partial(_slides_over, asked=asked, mu=mu, gain=gain))
+
+
+#: walls as wide as a step: works by the trapezoidal rule are coarse there
+_WALLS = _OVER + " beyond 10 % (walls of 0.1 mm within one step of 0.02 mm)"
+for _dynamics in ("viscous", "inertial"):
+    _eq25, _pitch = Sinusoid(friction=0.1), wave(0.5, 0.03)
+    _add(f"equation 25 {_dynamics}", _textured(_eq25, False, _dynamics))
+    _add(f"equation 25 {_dynamics} ridged", _textured(_eq25, True, _dynamics))
+    _add(f"wavelength of the ridges {_dynamics}", _textured(_pitch, True, _dynamics))
+    _add(f"sharp grating {_dynamics}", _textured(grating(), False, _dynamics, 1.0, 50), 0.1, _WALLS)
+_add("sharp grating ridged", _textured(grating(), True, "viscous", 1.0, 50), 0.1, _WALLS)
+_add("sampled rough profile", _textured(rough(), False, "viscous"))
+_add(
+    "gentle wave quasi-static",
+    scene(pad(), wave(4.0, 0.01), Press(indentation=0.3, steps=3), Slide(5.0, steps=25)),
+    physics="no snap: passes without time, mean F_t/F_n at least mu, no energy gained",
+    quick=True,
+)
+
+
+@TEXTURE.case(
+    "equation 25 quasi-static", "jumps from equilibrium to equilibrium and loses energy, or says what to try"
+)
+def _snap(log: Log) -> Verdict:
+    motion = Press(indentation=0.3, steps=5), Slide(2.0, steps=100)
+    asked = scene(pad(), Sinusoid(friction=0.1), *motion)
+    try:
+        return _slides_over(log, asked, 0.1)
+    except NotConverged as error:
+        log.stopped, kept = True, error.result
+        assert isinstance(kept, Result)
+        good = len(kept.step) == error.step - 1 and "viscous" in str(error)
+        return good, f"at x = {kept.position[-1]:.2f} mm: {error}"
+
+
+# -- near and far
+
+
+def _deep(log: Log, ridges: bool) -> Verdict:
+    motion = Press(indentation=3.0, steps=15), Slide(3.0, steps=15)
+    result = log.simulate(scene(pad(ridges), Flat(friction=0.3), *motion))
+    stiffness = np.diff(result.normal_force[:15])
+    least = float(result.frames[-1].J.min())
+    good = bool((np.diff(stiffness) > 0.0).all()) and least > 0.0
+    return (
+        good,
+        f"F_n {result.normal_force[14]:.3f} N/mm, stiffening all the way; smallest cell J {least:.2f}",
+    )
+
+
+MOTION.case("3 mm smooth", "every further 0.2 mm costs more than the one before; cells stay valid")(
+    partial(_deep, ridges=False)
+)
+MOTION.case("3 mm ridged", "every further 0.2 mm costs more than the one before; cells stay valid")(
+    partial(_deep, ridges=True)
+)
+
+
+def _first_touch(log: Log, voltage: float) -> Verdict:
+    """From a hover of 0.3 mm and from touch: the same state at the same load."""
+    ends = []
+    for first in ([Hover(0.3)], []):
+        options = {"law": Kaczmarek(), "voltage": voltage} if voltage else {}
+        asked = scene(pad(), Display(friction=0.0), *first, Press(force=0.05, steps=5), **options)
+        ends.append(log.simulate(asked))
+    off = max(
+        abs(float(getattr(ends[0], name)[-1] / getattr(ends[1], name)[-1]) - 1.0)
+        for name in ("indentation", "normal_force", "stored_energy")
+    )
+    return off < 1e-6, f"indentation, F_n and energy within {off:.0e} of a press from touch"
+
+
+MOTION.case("first touch under force", "from 0.3 mm above to 0.05 N/mm: as from touch", True)(
+    partial(_first_touch, voltage=0.0)
+)
+MOTION.case("first touch under force 1000 V", "from 0.3 mm above to 0.05 N/mm: as from touch")(
+    partial(_first_touch, voltage=1000.0)
+)
+
+
+@MOTION.case("loss of contact under force", "a load that vanishes: F_n follows it down to 1e-6 N/mm", True)
+def _unload(log: Log) -> Verdict:
+    loads = [Press(force=force, steps=3) for force in (0.05, 1e-4, 1e-6)]
+    result = log.simulate(scene(pad(), Flat(friction=0.0), *loads, Press(indentation=-0.1, steps=2)))
+    off = abs(float(result.normal_force[8]) - 1e-6)
+    good = off < 2e-8 and abs(result.normal_force[-1]) < 1e-12 and result.min_gap[-1] > 0.0999
+    return good, f"F_n within {off:.0e} N/mm of 1e-6, then open with {result.min_gap[-1]:.4f} mm"
+
+
+@MOTION.case("attraction fades under no load", "no load and no voltage left: F_n and F_e go to zero together")
+def _fades(log: Log) -> Verdict:
+    motion = Press(force=0.0, steps=2), VoltageRamp(0.0, steps=10, hold="force")
+    result = log.simulate(scene(pad(), Display(friction=0.0), *motion, law=Kaczmarek(), voltage=1000.0))
+    off = float(np.abs(result.normal_force - result.electrostatic_force).max())
+    left = float(result.normal_force[-1])
+    return off < 1e-8 and left < 1e-6, f"F_n = F_e within {off:.0e} N/mm, {left:.0e} N/mm at 0 V"
+
+
+@MOTION.case(
+    "over an edge under force", "the surface ends in a cliff of 0.3 mm: the load is carried throughout"
+)
+def _cliff(log: Log) -> Verdict:
+    cliff = Profile([-20.0, 3.0, 3.1, 30.0], [0.0, 0.0, -0.3, -0.3], friction=0.0)
+    motion = Press(force=0.05, steps=5), Slide(8.0, steps=80, speed=20.0, hold="force")
+    body = pad(viscosity=1e-3)
+    result = log.simulate(scene(body, cliff, *motion, solver=Solver(dynamics="viscous")))
+    fallen = float(result.indentation[-1] - result.indentation[4])
+    off = float(np.abs(result.applied_force[4:] - 0.05).max())
+    return abs(fallen - 0.3) < 0.02 and off < 1e-7, f"falls {fallen:.4f} mm, load within {off:.0e} N/mm"
+
+
+@MOTION.case("full unloading", "pressed, slid and lifted: undeformed, all work went into friction", True)
+def _unloading(log: Log) -> Verdict:
+    motion = Press(indentation=1.0, steps=8), Slide(2.0, steps=8), Press(indentation=-0.1, steps=10)
+    result = log.simulate(scene(pad(), Flat(friction=0.3), *motion))
+    left = float(np.abs(result.frames[-1].displacement - [2.0, 0.1]).max())
+    work = float(result.external_work[-1] / result.friction_dissipation[-1]) - 1.0
+    good = left < 1e-9 and result.stored_energy[-1] < 1e-12 and abs(work) < 0.05
+    return good, f"{left:.0e} mm and {result.stored_energy[-1]:.0e} N left, work {work:+.1%} of friction's"
+
+
+# -- steps ten times too large
+
+
+def _at_once(log: Log, ridges: bool, mu: float, depth: float) -> Verdict:
+    """To `depth` and 8 mm far, in steps ten times as large as usual; full slip forgets the path."""
+    ends = []
+    for press, slide in ((10, 40), (1, 4)):
+        motion = Press(indentation=depth, steps=press), Slide(8.0, steps=slide)
+        ends.append(log.simulate(scene(pad(ridges), Flat(friction=mu), *motion)))
+    off = abs(float(ends[1].tangential_force[-1] / ends[0].tangential_force[-1]) - 1.0)
+    full = abs(_ratio(ends[1], -1) - mu)
+    return off < 1e-6 and full < 1e-6, f"F_t within {off:.0e} of the same in small steps"
+
+
+for _ridges, _mu, _depth in ((False, 0.5, 1.5), (True, 0.5, 1.5), (False, 1.0, 0.5)):
+    STEPS.case(
+        f"press and slide mu {_mu:g}{' ridged' if _ridges else ''}",
+        "the end of the path in small steps, cut where needed",
+    )(partial(_at_once, ridges=_ridges, mu=_mu, depth=_depth))
+
+
+@STEPS.case("3 mm in one step", "the force of thirty steps (no friction)")
+def _deep_at_once(log: Log) -> Verdict:
+    forces = [
+        float(
+            log.simulate(scene(pad(), Flat(friction=0.0), Press(indentation=3.0, steps=n))).normal_force[-1]
+        )
+        for n in (1, 30)
+    ]
+    off = abs(forces[0] / forces[1] - 1.0)
+    return off < 1e-7, f"F_n within {off:.0e}"
+
+
+@STEPS.case("0.3 N/mm in one step", "the indentation of thirty steps (no friction)")
+def _load_at_once(log: Log) -> Verdict:
+    ends = [
+        float(log.simulate(scene(pad(), Flat(friction=0.0), Press(force=0.3, steps=n))).indentation[-1])
+        for n in (1, 30)
+    ]
+    off = abs(ends[0] / ends[1] - 1.0)
+    return off < 1e-7, f"indentation within {off:.0e}"
+
+
+@STEPS.case("touch from 1 mm above in one step", "the force of a press in ten steps (no friction)", True)
+def _touch_at_once(log: Log) -> Verdict:
+    body = finger(block(8, 3, sag=0.4))
+    forces = []
+    for motion in ([Hover(1.0), Press(indentation=0.5, steps=1)], [Press(indentation=0.5, steps=10)]):
+        forces.append(float(log.simulate(scene(body, Flat(friction=0.0), *motion)).normal_force[-1]))
+    off = abs(forces[0] / forces[1] - 1.0)
+    return off < 1e-7, f"F_n within {off:.0e}"
+
+
+@STEPS.case(
+    "texture ten times too fast", "viscous, 0.2 mm a step over equation (25): passes, cut where needed"
+)
+def _coarse_texture(log: Log) -> Verdict:
+    return _slides_over(log, _textured(Sinusoid(friction=0.1), False, "viscous", 4.0, 20), 0.1)

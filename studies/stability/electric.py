@@ -1,0 +1,320 @@
+"""Cases of the attraction: pull-in and hysteresis, thin insulators, voltages that jump."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.errors import InputError
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.reference import PullIn, pull_in_kaczmarek, pull_in_strong_troxel
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene
+from evfem.scene.terms import Boundary, form
+from evfem.simulation.result import Result
+from evfem.tissue.laws import NeoHookean
+
+from ..common import LAWS
+from .case import Group, Log, Verdict
+from .scenes import SKIN, block, finger, pad, scene
+
+PULL_IN = Group("pull-in")
+THIN = Group("thin insulators")
+VOLTAGE = Group("voltage")
+GROUPS = (PULL_IN, THIN, VOLTAGE)
+
+
+# -- a finger that hovers
+
+
+def _hysteresis(log: Log, law: str, top: float) -> Verdict:
+    up, down = VoltageRamp(top, steps=10), VoltageRamp(0.0, steps=10)
+    result = log.simulate(scene(pad(), Display(), Hover(0.05), up, down, law=LAWS[law]))
+    touching = result.contact_width > 0.0
+    if touching[0] or not touching[10] or touching[-1]:
+        return False, "open, closed and open again at 0 V, full voltage and 0 V: not so"
+    snap_in = float(result.voltage[1:11][touching[1:11]].min())
+    let_go = float(result.voltage[11:][~touching[11:]].max())
+    left = float(np.abs(result.frames[-1].displacement - [0.0, 0.05]).max())
+    good = 0.0 < let_go < snap_in and left < 1e-9
+    return good, f"snaps in by {snap_in:g} V, lets go by {let_go:g} V; {left:.0e} mm left at the end"
+
+
+for _law, _top in (("strong_troxel", 3000.0), ("kaczmarek", 5000.0)):
+    PULL_IN.case(
+        f"hover {_law}", f"up to {_top:g} V and back: lets go below where it snaps in, undeformed at the end"
+    )(partial(_hysteresis, law=_law, top=_top))
+
+
+# -- a plate: a soft layer between rollers, whose travel is far below its thickness
+
+
+@form
+def rollers(u: Any, v: Any, w: Any) -> Any:
+    """Sides that cannot move sideways: a spring of 1e4 MPa/mm."""
+    return 1e4 * u[0] * v[0]
+
+
+#: wider than about three thicknesses, a nearly incompressible layer would wrinkle below the plate's pull-in
+#: (10.1103/PhysRevLett.86.119)
+GAP, WIDTH, E, NU = 0.005, 0.5, 0.05, 0.45
+THIN_LAYER = Layer(thickness=0.01, eps_r=3.35)
+SKIN_AND_INSULATOR = Layers.of(Layer(0.38, 1650.0), THIN_LAYER)
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A block of `thickness` (mm) that hovers GAP over a display, under a law."""
+
+    law: Any
+    thickness: float
+    solver: str = "monolithic"
+
+    def scene(self, *motion: VoltageRamp, law: Any = None) -> Scene:
+        """Hover, then ramps of the voltage."""
+        mesh = block(4, 4, width=WIDTH, height=self.thickness)
+        sides = np.flatnonzero(np.abs(mesh.points[:, 0]) > 0.499 * WIDTH)
+        mesh = replace(mesh, node_sets={**mesh.node_sets, "sides": sides})
+        body = MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=NU)}, SKIN)
+        whole = scene(
+            body, Display(THIN_LAYER), Hover(GAP), *motion, law=law or self.law, coupling=self.solver
+        )
+        return whole.with_term(rollers, on=Boundary("sides"))
+
+    @property
+    def exact(self) -> PullIn:
+        """Pull-in of the rigid plate on a spring of the layer's constrained modulus."""
+        modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))
+        formula = pull_in_strong_troxel if isinstance(self.law, StrongTroxel) else pull_in_kaczmarek
+        return formula(modulus / self.thickness, GAP, 1.0, SKIN_AND_INSULATOR)  # N/mm on 1 mm2
+
+    @property
+    def finite_strain_voltage(self) -> float:
+        """Pull-in (V) under Strong-Troxel's law of a neo-Hookean layer in uniaxial strain."""
+        from scipy.optimize import minimize_scalar
+
+        mu, lmbda = E / (2.0 * (1.0 + NU)), E * NU / ((1.0 + NU) * (1.0 - 2.0 * NU))
+        a = GAP + SKIN_AND_INSULATOR.reduced
+
+        def minus_voltage(x: float) -> float:
+            stretch = 1.0 + x / self.thickness
+            stress = mu * (stretch - 1.0 / stretch) + lmbda * np.log(stretch) / stretch
+            return -float(np.sqrt(2.0 * stress / eps_0)) * (a - x)
+
+        found = minimize_scalar(minus_voltage, bounds=(0.2 * a, 0.5 * a), method="bounded")
+        return -float(found.fun)
+
+
+def _snap(result: Result) -> tuple[float, float]:
+    """The last open and the first closed voltage of a ramp."""
+    first = int(np.argmax(result.contact_width > 0.0))
+    return float(result.voltage[first - 1]), float(result.voltage[first])
+
+
+def _plate(log: Log, law: str) -> Verdict:
+    """Ramps around the formula: the bracket must hold it, the deviation fall with travel over thickness."""
+    deviations = []
+    for thickness, reach, steps in ((1.0, 0.02, 40), (10.0, 0.002, 40)):
+        plate = Plate(LAWS[law], thickness)
+        exact = plate.exact.voltage
+        ramps = VoltageRamp((1.0 - reach) * exact, 10), VoltageRamp((1.0 + reach) * exact, steps)
+        result = log.simulate(plate.scene(*ramps))
+        if not (result.contact_width > 0.0).any():
+            return False, f"open at {1.0 + reach:g} times the formula's {exact:.2f} V ({thickness:g} mm)"
+        low, high = _snap(result)
+        deviations.append(0.5 * (low + high) / exact - 1.0)
+    good = abs(deviations[0]) < 0.01 and abs(deviations[1]) < 0.2 * abs(deviations[0]) + 1e-4
+    said = f"{deviations[0]:+.3%} off the plate formula at 1 mm of thickness, {deviations[1]:+.4%} at 10 mm"
+    return good, said
+
+
+for _law in LAWS:
+    PULL_IN.case(
+        f"plate {_law}", "pull-in voltage of the plate formula within 1 %, nearer the thicker the layer"
+    )(partial(_plate, law=_law))
+
+
+class FixedCharge:
+    """Strong-Troxel's law with the charge per area given instead of the voltage.
+
+    "voltage" is what this charge makes of the layers and the first gap; it then changes with the gap. Where
+    the gap is uniform, so is the charge of an electrode: the plate is charge-controlled.
+    """
+
+    def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+        """sigma^2 / (2 eps_0), whatever the gap."""
+        charge = eps_0 * voltage / (GAP + layers.reduced)
+        return 0.5 * charge**2 / eps_0 + 0.0 * gap
+
+    def traction_derivative(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+        """Zero."""
+        return 0.0 * gap * voltage
+
+
+@PULL_IN.case(
+    "unstable branch", "a given charge per area: voltage rises to the formula's and falls again", quick=True
+)
+def _charge(log: Log) -> Verdict:
+    plate = Plate(StrongTroxel(), 10.0)
+    exact, a = plate.exact, GAP + SKIN_AND_INSULATOR.reduced
+    # travel x under the charge of U0 = U a / (a - x); the last one is at 95 % of the gap
+    x = 0.95 * GAP
+    k = 8.0 * a**3 / (27.0 * exact.voltage**2)  # eps_0 / (stiffness per area) from the formula
+    top = float(np.sqrt(2.0 * x / k)) * a
+    result = log.simulate(plate.scene(VoltageRamp(top, steps=60), law=FixedCharge()))
+    gap = result.min_gap
+    voltage = result.voltage * (a - GAP + gap) / a
+    peak = int(np.argmax(voltage))
+    off = float(voltage[peak]) / exact.voltage - 1.0
+    travel = (GAP - float(gap[peak])) / a
+    falls = bool((np.diff(voltage[peak:]) < 0.0).all()) and peak < len(voltage) - 5
+    good = abs(off) < 2e-3 and falls and abs(travel - 1 / 3) < 0.02
+    fall = voltage[-1] / voltage[peak]
+    return good, f"peak {off:+.3%} off the formula at travel {travel:.3f} (g0 + s), then down to {fall:.2f}"
+
+
+@PULL_IN.case(
+    "staggered stalls",
+    "0.003 % below pull-in monolithic finds the state, staggered says that it does not settle",
+)
+def _staggered(log: Log) -> Verdict:
+    plate = Plate(StrongTroxel(), 10.0)
+    ramp = VoltageRamp((1.0 - 3e-5) * plate.finite_strain_voltage, steps=5)
+    together = log.simulate(plate.scene(ramp))
+    if together.contact_width.any():
+        return False, "closed below its pull-in"
+    travel = (GAP - float(together.min_gap[-1])) / plate.exact.travel
+    message = str(log.stop(Plate(StrongTroxel(), 10.0, "staggered").scene(ramp)))
+    return (
+        "does not settle" in message,
+        f"monolithic: {travel:.1%} of the pull-in travel; staggered: {message}",
+    )
+
+
+# -- thin insulators
+
+
+def _thin(log: Log, law: str, thickness: float) -> Verdict:
+    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width. Under
+    Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
+    """
+    display = Display(Layer(thickness, 3.35), friction=0.3)
+    motion = Press(force=0.05, steps=5), Slide(3.0, steps=15)
+    result = log.simulate(scene(pad(), display, *motion, law=LAWS[law], voltage=140.0))
+    skin = Layer(0.38, 1650.0)
+    closed = LAWS[law].traction(0.0, 140.0, Layers.of(skin, Layer(thickness, 3.35)))
+    least = float(closed) * float(result.real_contact_width[4])
+    share = float(result.electrostatic_force[4]) / least
+    ratio = float(result.tangential_force[-1] / result.normal_force[-1])
+    in_cone = 0.0 < ratio < 0.3 if law == "strong_troxel" else abs(ratio - 0.3) < 1e-6
+    good = share > 1.0 - 1e-9 and in_cone
+    said = f"F_e {result.electrostatic_force[4]:.4g} N/mm = {share:.3f} p(0) w, p(0) = {1e3 * closed:.3g} kPa"
+    return good, f"{said}; F_t/F_n = {ratio:.7f} after 3 mm"
+
+
+_ENDS = {"strong_troxel": "sticks, F_t < 0.3 F_n", "kaczmarek": "slides in full, F_t = 0.3 F_n"}
+for _law in LAWS:
+    for _thickness in (1e-3, 2e-4, 5e-5):
+        THIN.case(
+            f"{1e6 * _thickness:g} nm {_law}",
+            f"140 V: touching skin carries p(0), the pad {_ENDS[_law]}",
+            quick=_thickness == 1e-3 and _law == "kaczmarek",
+        )(partial(_thin, law=_law, thickness=_thickness))
+
+
+@THIN.case("bare electrode", "no insulator: the skin's own layer still limits the force")
+def _bare(log: Log) -> Verdict:
+    return _thin(log, "kaczmarek", 0.0)
+
+
+@THIN.case(
+    "conductive contact", "zero solid thickness refused with a sentence, by scene and by law", quick=True
+)
+def _conductive(log: Log) -> Verdict:
+    first = log.refusal(lambda: Electrical(stratum_corneum_thickness=0.0))
+    nothing = Layers.of(Layer(0.0, 1.0), Layer(0.0, 3.35))
+    both = [log.refusal(partial(law.traction, 0.0, 100.0, nothing)) for law in LAWS.values()]
+    good = "thickness" in first and all("without any insulation" in said for said in both)
+    return good, f"{first}; {both[0]}"
+
+
+# -- voltages that jump
+
+
+@VOLTAGE.case("square wave", "0 and 1000 V in turn: every plateau pulls alike, F_t = 0.3 F_n in every step")
+def _square(log: Log) -> Verdict:
+    edges = np.arange(2.0, 6.0, 0.5)
+    position = np.concatenate([[0.0], np.repeat(edges, 2), [8.0]])
+    level = np.concatenate([[0.0, 0.0], np.repeat(np.arange(1, len(edges) + 1) % 2, 2)])[: len(position)]
+    voltage = VoltageProfile(position, 1000.0 * level)
+    motion = Press(force=0.05, steps=5), Slide(6.0, steps=60, hold="force")
+    result = log.simulate(scene(pad(), Display(), *motion, law=Kaczmarek(), voltage=voltage))
+    later = result.position > 3.0
+    ratio = result.tangential_force[later] / result.normal_force[later]
+    on = result.voltage[later] > 999.0
+    pull = result.electrostatic_force[later][on]
+    spread = float(np.ptp(pull) / pull.mean())
+    off = float(np.abs(ratio - 0.3).max())
+    good = off < 1e-6 and spread < 0.02 and 5 < on.sum() < len(on) - 5
+    return good, f"F_t/F_n within {off:.0e} of 0.3, pull of all plateaus within {spread:.2%}"
+
+
+@VOLTAGE.case("3000 V in one step", "the state that a ramp of 20 steps reaches", quick=True)
+def _at_once(log: Log) -> Verdict:
+    ends = []
+    for steps in (1, 20):
+        motion = Press(force=0.05, steps=5), VoltageRamp(3000.0, steps=steps, hold="force")
+        ends.append(log.simulate(scene(pad(), Display(friction=0.0), *motion, law=Kaczmarek())))
+    error = max(
+        abs(float(getattr(ends[0], name)[-1] / getattr(ends[1], name)[-1]) - 1.0)
+        for name in ("electrostatic_force", "normal_force", "indentation")
+    )
+    return error < 1e-6, f"forces and indentation within {error:.0e}"
+
+
+@VOLTAGE.case("3000 V from the first step", "Strong-Troxel on ridges: forces balance, F_t at most 0.3 F_n")
+def _full(log: Log) -> Verdict:
+    motion = Press(indentation=0.5, steps=3), Slide(1.0, steps=2)
+    result = log.simulate(scene(pad(ridges=True), Display(), *motion, law=StrongTroxel(), voltage=3000.0))
+    ratio = float(result.tangential_force[-1] / result.normal_force[-1])
+    good = 0.0 < ratio <= 0.3 * (1.0 + 1e-9) and log.force_error < 1e-7
+    return good, f"F_t/F_n = {ratio:.4f} after 1 mm, F_e = {result.electrostatic_force[-1]:.3f} N/mm"
+
+
+@VOLTAGE.case("attraction alone holds", "no load on the bone: contact carries the attraction")
+def _alone(log: Log) -> Verdict:
+    worst = 0.0
+    for body in (finger(block(8, 3, sag=0.4)), pad()):
+        result = log.simulate(
+            scene(body, Display(), Press(force=0.0, steps=2), law=Kaczmarek(), voltage=1000.0)
+        )
+        worst = max(worst, abs(float(result.normal_force[-1] / result.electrostatic_force[-1]) - 1.0))
+        if result.indentation[-1] <= 0.0:
+            return False, "not pulled in"
+    return worst < 1e-6, f"F_n = F_e within {worst:.0e}"
+
+
+@VOLTAGE.case(
+    "a law that blows up", "a law that returns infinity is refused or stopped with a sentence", quick=True
+)
+def _infinite(log: Log) -> Verdict:
+    class Broken:
+        """Infinite where it touches."""
+
+        def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+            return voltage**2 * np.where(np.real(gap) > 0.0, 1e-12, np.inf) + 0.0 * gap
+
+    asked = scene(
+        finger(block(8, 3, sag=0.4)), Display(), Press(indentation=0.2, steps=2), law=Broken(), voltage=100.0
+    )
+    try:
+        message = str(log.stop(asked))
+    except InputError as error:
+        log.refused, message = True, str(error)
+    return "finite" in message, message

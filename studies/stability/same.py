@@ -1,0 +1,188 @@
+"""The same answer: twice, in a mirror, in other units, with other numbers of nodes, and in other steps."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.mesh.mesh import Mesh
+from evfem.scene.motion import Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.result import COLUMNS, Result
+from evfem.tissue.laws import NeoHookean
+
+from .case import Group, Log, Verdict
+from .scenes import block, finger, mirrored, pad, renumbered, scaled, scene, shaken
+
+SAME = Group("same answer")
+GROUPS = (SAME,)
+
+#: columns that change sign in a mirror
+ODD = ("position", "tangential_force", "applied_tangential_force", "electrostatic_force_x")
+FORCES = ("normal_force", "applied_force", "electrostatic_force", "tangential_force")
+CHARGED: dict[str, Any] = {"law": Kaczmarek(), "voltage": 1000.0}
+
+
+def _apart(one: Result, other: Result, names: Any, factor: float = 1.0) -> float:
+    """Largest difference of columns over the largest value; `other` is multiplied by `factor`."""
+    worst = 0.0
+    for name in names:
+        a, b = getattr(one, name), factor * getattr(other, name)
+        scale = max(np.abs(one.normal_force).max(), 1e-12) if name in FORCES else max(np.abs(a).max(), 1e-12)
+        worst = max(worst, float(np.abs(a - b).max() / scale))
+    return worst
+
+
+def _twice(log: Log, asked: Scene) -> Verdict:
+    first, second = log.simulate(asked), log.simulate(asked)
+    columns = [name for name in COLUMNS if name not in ("seconds", "motion")]
+    same = all(np.array_equal(getattr(first, name), getattr(second, name)) for name in columns)
+    for a, b in zip(first.frames, second.frames, strict=True):
+        same &= np.array_equal(a.displacement, b.displacement)
+    return same, f"all columns and displacements are {'equal' if same else 'not equal'} bit for bit"
+
+
+_PRESS_AND_SLIDE = Press(indentation=0.5, steps=4), Slide(2.0, steps=10)
+for _name, _scene in {
+    "friction and voltage": scene(pad(True), Display(friction=0.5), *_PRESS_AND_SLIDE, **CHARGED),
+    "viscous texture": scene(
+        pad(viscosity=1e-3),
+        Sinusoid(friction=0.1),
+        Press(indentation=0.3, steps=3),
+        Slide(1.0, steps=25, speed=20.0),
+        solver=Solver(dynamics="viscous"),
+    ),
+}.items():
+    SAME.case(f"twice {_name}", "bit for bit the same", _name == "friction and voltage")(
+        partial(_twice, asked=_scene)
+    )
+
+
+def _mirror(log: Log, left: Scene, right: Scene) -> Verdict:
+    one, other = log.simulate(left), log.simulate(right)
+    even = ("normal_force", "applied_force", "electrostatic_force", "stored_energy", "external_work")
+    worst = max(_apart(one, other, even), _apart(one, other, ODD, -1.0))
+    return worst < 1e-7, f"forces, works and energies within {worst:.0e}"
+
+
+def _both_ways(
+    surfaces: list[Any], bodies: list[Any], press: Press, slide: Slide, **options: Any
+) -> list[Scene]:
+    far = {name: getattr(slide, name) for name in ("steps", "speed", "hold")}
+    motions = (Slide(slide.distance, **far), Slide(-slide.distance, **far))
+    return [
+        scene(body, surface, press, motion, **options)
+        for body, surface, motion in zip(bodies, surfaces, motions, strict=True)
+    ]
+
+
+def _waves(mu: float) -> list[Sinusoid]:
+    """A wave and its mirror image: a sin(kx + p) and a sin(-kx + p)."""
+    return [Sinusoid(terms=[[0.02, s * 6.0, 0.4], [0.01, s * 9.0, 1.0]], friction=mu) for s in (1.0, -1.0)]
+
+
+_LOPSIDED = shaken(block(16, 6, sag=0.4), 0.4)
+for _name, (_one, _other) in {
+    "ridged finger on a display": _both_ways(
+        [Display(friction=0.5)] * 2,
+        [pad(True)] * 2,
+        Press(indentation=0.5, steps=4),
+        Slide(3.0, steps=15),
+        **CHARGED,
+    ),
+    "lopsided mesh": _both_ways(
+        [Display(friction=0.5)] * 2,
+        [finger(_LOPSIDED), finger(mirrored(_LOPSIDED))],
+        Press(force=0.02, steps=4),
+        Slide(2.0, steps=10, hold="force"),
+        **CHARGED,
+    ),
+    "viscous on a wave": _both_ways(
+        _waves(0.2),
+        [pad(viscosity=1e-3)] * 2,
+        Press(indentation=0.3, steps=4),
+        Slide(1.0, steps=40, speed=20.0),
+        solver=Solver(dynamics="viscous"),
+    ),
+}.items():
+    SAME.case(f"mirror {_name}", "mirrored histories to 1e-7", _name == "lopsided mesh")(
+        partial(_mirror, left=_one, right=_other)
+    )
+
+
+# -- other units: lengths, stresses and voltages multiplied together
+
+
+def _body(mesh: Mesh, length: float, stress: float) -> MeshedFinger:
+    skin = Electrical(stratum_corneum_thickness=0.38 * length, stratum_corneum_eps_r=1650.0)
+    return MeshedFinger(scaled(mesh, length), {"tissue": NeoHookean(E=0.1 * stress, nu=0.4)}, skin)
+
+
+def _units(log: Log, length: float, stress: float) -> Verdict:
+    """Forces go with length times stress, energies with length^2 stress, voltages with its root."""
+    mesh, ends = block(12, 6, sag=0.4), []
+    for a, b in ((1.0, 1.0), (length, stress)):
+        display = Display(Layer(0.09 * a, 3.35), friction=0.5)
+        voltage = 1000.0 * a * float(np.sqrt(b))
+        motion = Press(force=0.02 * a * b, steps=4), VoltageRamp(voltage, 3, hold="force"), Slide(2.0 * a, 10)
+        ends.append(log.simulate(scene(_body(mesh, a, b), display, *motion, law=Kaczmarek())))
+    worst = max(
+        _apart(ends[0], ends[1], FORCES, 1.0 / (length * stress)),
+        _apart(ends[0], ends[1], ("stored_energy", "external_work"), 1.0 / (length**2 * stress)),
+        _apart(ends[0], ends[1], ("indentation", "contact_width"), 1.0 / length),
+    )
+    return worst < 1e-7, f"forces, widths and energies within {worst:.0e}"
+
+
+for _length, _stress in ((10.0, 1.0), (0.3, 1.0), (1.0, 1e3), (1.0, 1e-3), (20.0, 100.0)):
+    SAME.case(
+        f"units lengths x {_length:g} stresses x {_stress:g}", "the scaled history to 1e-7", _length == 10.0
+    )(partial(_units, length=_length, stress=_stress))
+
+
+def _numbers(log: Log, mesh: Mesh) -> Verdict:
+    display = Display(friction=0.5)
+    one, other = (
+        log.simulate(scene(finger(m), display, Press(force=0.02, steps=4), Slide(2.0, steps=10), **CHARGED))
+        for m in (mesh, renumbered(mesh))
+    )
+    worst = _apart(one, other, (*FORCES, "indentation", "stored_energy", "external_work", "contact_width"))
+    return worst < 1e-7, f"forces, widths and energies within {worst:.0e}"
+
+
+SAME.case("other numbers of nodes and cells", "the same history to 1e-7", True)(
+    partial(_numbers, mesh=_LOPSIDED)
+)
+
+
+def _split(log: Log, options: dict[str, Any], tolerance: float) -> Verdict:
+    """Without friction the end does not know in how many steps it was reached."""
+    ends = []
+    for steps in (2, 5, 20):
+        motion = Press(indentation=1.0, steps=steps), Slide(2.0, steps=steps)
+        surface = Display(friction=0.0)
+        ends.append(log.simulate(scene(pad(), surface, *motion, **options)).rows[-1])
+    names = ("normal_force", "applied_force", "stored_energy", "contact_width")
+    worst = max(abs(end[name] / ends[0][name] - 1.0) for end in ends[1:] for name in names)
+    return worst < tolerance, f"forces, width and energy within {worst:.0e} in 2, 5 and 20 steps"
+
+
+for _name, _options in {"": {}, " with voltage": CHARGED}.items():
+    SAME.case(f"split steps{_name}", "no friction: the end in 2, 5 and 20 steps the same to 1e-7")(
+        partial(_split, options=_options, tolerance=1e-7)
+    )
+
+
+@SAME.case("split rest under friction", "a step cut into ten without moving changes nothing")
+def _rest(log: Log) -> Verdict:
+    ends = []
+    for steps in (1, 10):
+        motion = Press(indentation=0.3, steps=4), Slide(0.5, steps=5), Press(indentation=0.3, steps=steps)
+        ends.append(log.simulate(scene(pad(), Flat(friction=0.5), *motion)).tangential_force[-1])
+    off = abs(float(ends[1] / ends[0]) - 1.0)
+    return off < 1e-7, f"F_t within {off:.0e}"

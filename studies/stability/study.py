@@ -1,0 +1,127 @@
+"""Hard cases: does it converge to the right physics, or say why not, and what does it cost?
+
+Every case states its expected physics and is judged by a number; one that does not converge is listed with
+its message. Outcomes: passed; refused or stopped with a sentence, where that is right; wrong; not converged;
+error. Beside json, csv and picture the table is written as stability.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from evfem.common.storage import write_text
+
+from ..common import Series, Study, make_folder
+from ..parallel import side_by_side
+from . import contact, electric, lost, same, tissue
+from .case import PASSED, Case, Found, judge
+from .figure import draw
+
+GROUPS = tuple(group for module in (tissue, electric, contact, same, lost) for group in module.GROUPS)
+CASES: Mapping[str, Case] = {case.key: case for group in GROUPS for case in group.cases}
+HEAD = (
+    "group",
+    "case",
+    "outcome",
+    "steps",
+    "parts",
+    "cuts",
+    "iterations",
+    "CPU s",
+    "force",
+    "energy",
+    "found",
+)
+ASSUMPTIONS = {
+    "outcomes": "passed; refused, stopped: with a sentence, as expected; wrong; not converged; error",
+    "steps": "requested steps; parts: as many as were accepted; cuts: attempts that failed and were halved",
+    "force": "largest sum of all forces in any step over the largest force; left out with inertia",
+    "energy": "energy at the end that no column has, over the largest; trapezoidal works, second order in "
+    "the step; what a snap sets free is lost, not balanced",
+    "cpu_s": "process time, without imports and compilation; two processes at a time",
+    "meshes": "coarse ones; the physics judged here does not need finer ones",
+}
+MEASURED = ("steps", "substeps", "cuts", "iterations", "cpu_s", "force_error", "energy_error")
+
+
+def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+    """Judge all cases, or the quick ones, in two processes; numbers, table and figure."""
+    chosen = [key for key, case in CASES.items() if case.quick or not quick]
+    found = side_by_side(judge_by_key, chosen, 1 if quick else 2)
+    said = {one.key: {"expected": one.expected, "outcome": one.outcome, "found": one.said} for one in found}
+    lines = table(found)
+    study = Study(
+        "stability",
+        numbers(found),
+        {},
+        ASSUMPTIONS | {"cases": said, "groups": by_group(found), "table": lines},
+        series(found),
+        lambda: draw(found),
+    )
+    result = study.finish(out, quick)
+    if out is not None:
+        write_text(make_folder(out) / "stability.md", page(found))
+    return result
+
+
+def judge_by_key(key: str) -> Found:
+    """Judge the case of that name; for other processes."""
+    return judge(CASES[key])
+
+
+def numbers(found: list[Found]) -> dict[str, float]:
+    """Costs and balances of every case, counts of every group and of all."""
+    result: dict[str, float] = {}
+    for one in found:
+        result[f"{one.key}.good"] = float(one.good)
+        result |= {f"{one.key}.{name}": float(getattr(one, name)) for name in MEASURED}
+    for name, (good, all_of_it) in by_group(found).items():
+        key = f"groups.{name}".replace(" ", "_")
+        result |= {f"{key}.good": float(good), f"{key}.cases": float(all_of_it)}
+    result["good"], result["cases"] = float(sum(one.good for one in found)), float(len(found))
+    result["cpu_s"] = sum(one.cpu_s for one in found)
+    return result
+
+
+def by_group(found: list[Found]) -> dict[str, tuple[int, int]]:
+    """Group -> cases with the expected outcome, and all of them."""
+    names = list(dict.fromkeys(one.group for one in found))
+    return {
+        name: (
+            sum(one.good for one in found if one.group == name),
+            sum(one.group == name for one in found),
+        )
+        for name in names
+    }
+
+
+def series(found: list[Found]) -> list[Series]:
+    """What the bars of the figure show, by case."""
+    names = [one.key.replace(",", "") for one in found]
+    units = {"cpu_s": "s", "cuts": "1", "iterations": "1", "steps": "1"}
+    return [Series(name, names, [float(getattr(one, name)) for one in found], units[name]) for name in units]
+
+
+def table(found: list[Found]) -> list[str]:
+    """The cases as lines of a Markdown table."""
+    lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
+    for one in found:
+        cells = [one.group, one.name, one.outcome if one.good else f"**{one.outcome}**"]
+        cells += [str(n) for n in (one.steps, one.substeps, one.cuts, one.iterations)]
+        cells += [f"{one.cpu_s:.1f}", f"{one.force_error:.0e}", f"{one.energy_error:.0e}"]
+        lines.append(f"| {' | '.join([*cells, one.said.replace('|', '/')])} |")
+    return lines
+
+
+def page(found: list[Found]) -> str:
+    """Counts by group, the table, and the expectation of every case that failed."""
+    lines = ["# Stability", "", "| group | as expected | cases |", "|---|---|---|"]
+    lines += [f"| {name} | {good} | {n} |" for name, (good, n) in by_group(found).items()]
+    lines += ["", *table(found), ""]
+    bad = [one for one in found if one.outcome not in PASSED]
+    lines += [
+        f"- {one.group}, {one.name}: expected: {one.expected}; {one.outcome}: {one.said}" for one in bad
+    ]
+    return "\n".join(lines) + "\n"

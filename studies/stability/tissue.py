@@ -1,0 +1,214 @@
+"""Cases of the tissue: incompressible and unequal layers, and meshes of the user's own, good and bad."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from evfem.contact.surfaces import Flat, Profile, Sinusoid
+from evfem.finger.fingerpad import FingerPad
+from evfem.mesh.file import read
+from evfem.mesh.quality import check
+from evfem.scene.motion import Press, Slide
+from evfem.scene.plan import plan
+from evfem.scene.scene import Solver
+from evfem.simulation.run import simulate
+
+from .case import Group, Log, Verdict
+from .scenes import (
+    benchmark,
+    block,
+    finger,
+    grid,
+    joined,
+    layered,
+    pad,
+    scene,
+    shaken,
+)
+
+INCOMPRESSIBLE = Group("incompressible")
+CONTRAST = Group("contrast")
+MESHES = Group("meshes")
+GROUPS = (INCOMPRESSIBLE, CONTRAST, MESHES)
+
+#: nu of the tissue -> F_n (N/mm) at 1 mm: this package's Q2-P1 on the next finer mesh (3025 nodes), pinned
+FINER = {0.49: 0.269697, 0.499: 0.306696, 0.4999: 0.311283, 0.49999: 0.311753}
+#: element -> deviation that its theory allows at nu = 0.49 ... 0.49999; None: it must lock
+ALLOWED = {"q1": None, "q1_fbar": 0.01, "q2": 0.10, "q2p1": 0.01, "p2": 0.10}
+GENTLY = {"q2", "p2"}
+
+
+def _incompressible(log: Log, element: str, nu: float) -> Verdict:
+    body = benchmark(tissue=(0.05, nu))
+    if element == "p2":
+        triangles = read(Path(_meshes()) / "benchmark-L0-triangles.msh")
+        body = layered(triangles, tissue=(0.05, nu), skin=(1.0, 0.30))
+    flat, press = Flat(friction=0.0, y=-6.395), Press(indentation=1.0, steps=4)
+    result = log.simulate(scene(body, flat, press, solver=Solver(element=element)))
+    error = float(result.normal_force[-1]) / FINER[nu] - 1.0
+    allowed = ALLOWED[element]
+    if allowed is None:
+        locks = error > 0.03
+        return locks, f"{'locks' if locks else 'does not lock'}: F_n {error:+.1%}"
+    return abs(error) < allowed, f"F_n {error:+.2%} of Q2-P1 on a finer mesh, allowed {allowed:.0%}"
+
+
+def _meshes() -> str:
+    from evfem import meshes
+
+    return str(Path(str(meshes.__file__)).parent)
+
+
+for _element, _allowed in ALLOWED.items():
+    for _nu in FINER:
+        _physics = (
+            "full integration locks: far too stiff"
+            if _allowed is None
+            else f"F_n within {_allowed:.0%} of a finer mesh"
+            + (", stiffening mildly as nu tends to 1/2" if _element in GENTLY else "")
+        )
+        INCOMPRESSIBLE.case(f"{_element} nu {_nu}", _physics, quick=_nu == 0.49)(
+            partial(_incompressible, element=_element, nu=_nu)
+        )
+
+
+@CONTRAST.case("nail 17 MPa on 0.034 MPa", "a nail 1000 times stiffer still changes F_n by less than 1 %")
+def _nail(log: Log) -> Verdict:
+    from evfem.tissue.laws import NeoHookean
+
+    motion = Press(indentation=1.0, steps=4), Slide(1.0, steps=5)
+    forces = []
+    for E in (17.0, 17_000.0):
+        body = pad(ridges=True, materials={"nail": NeoHookean(E=E, nu=0.3)})
+        forces.append(float(log.simulate(scene(body, Flat(friction=0.3), *motion)).normal_force[-1]))
+    change = forces[1] / forces[0] - 1.0
+    return abs(change) < 0.01, f"F_n changes by {change:.2%} from 17 MPa to 17 GPa"
+
+
+@CONTRAST.case("dry stratum corneum 100 MPa", "a dry skin carries more at the same indentation, also in slip")
+def _dry(log: Log) -> Verdict:
+    from evfem.tissue.laws import NeoHookean
+
+    forces = []
+    for E in (1.0, 100.0):
+        body = pad(ridges=True, materials={"stratum_corneum": NeoHookean(E=E, nu=0.3)})
+        motion = Press(indentation=1.0, steps=4), Slide(4.0, steps=16)
+        result = log.simulate(scene(body, Flat(friction=0.5), *motion))
+        ratio = float(result.tangential_force[-1] / result.normal_force[-1])
+        if abs(ratio - 0.5) > 1e-6:
+            return False, f"F_t/F_n = {ratio:.6f} at {E:g} MPa"
+        forces.append(float(result.normal_force[3]))
+    return forces[1] > 1.2 * forces[0], f"F_n {forces[0]:.4f} N/mm at 1 MPa, {forces[1]:.4f} at 100 MPa"
+
+
+def _series(log: Log, contrast: float) -> Verdict:
+    """Two layers with nu = 0 under a plate are one-dimensional: P = mu (F - 1/F) in both."""
+    from scipy.optimize import brentq
+
+    mesh = block(6, 8, width=4.0, height=4.0)
+    region = (mesh.points[mesh.cells, 1].mean(axis=1) > 2.0).astype(int)
+    two = replace(mesh, region=region, region_names={"soft": 0, "stiff": 1})
+    body = layered(two, soft=(0.034, 0.0), stiff=(0.034 * contrast, 0.0))
+    press = Press(indentation=0.8, steps=3)
+    result = log.simulate(scene(body, Flat(friction=0.0), press))
+
+    def stress(stretch: float, E: float) -> float:
+        return 0.5 * E * (1.0 / stretch - stretch)
+
+    def excess(soft: float) -> float:
+        return stress(soft, 0.034) - stress(1.6 - soft, 0.034 * contrast)
+
+    exact = 4.0 * stress(float(brentq(excess, 0.6, 0.999, xtol=1e-15)), 0.034)
+    error = float(result.normal_force[-1]) / exact - 1.0
+    return abs(error) < 1e-6, f"F_n is {error:+.1e} off the closed form {exact:.6f} N/mm"
+
+
+for _contrast in (500.0, 3000.0, 1e6):
+    CONTRAST.case(
+        f"two layers 1 to {_contrast:g}", "closed form of two springs in series (nu = 0)", quick=True
+    )(partial(_series, contrast=_contrast))
+
+
+# -- meshes of the user's own
+
+
+def _against_regular(log: Log, mesh: object, allowed: float) -> Verdict:
+    motion = Press(indentation=0.4, steps=3), Slide(1.5, steps=6)
+    forces = []
+    for source in (block(16, 8, sag=0.4), mesh):
+        result = log.simulate(scene(finger(source), Flat(friction=0.3), *motion))  # type: ignore[arg-type]
+        forces.append((float(result.normal_force[-1]), float(result.tangential_force[-1])))
+    error = max(abs(a / b - 1.0) for a, b in zip(*forces, strict=True))
+    return error < allowed, f"forces within {error:.2%} of a regular mesh, allowed {allowed:.0%}"
+
+
+@MESHES.case("inner nodes moved by 40 %", "forces within 1 % of the regular mesh", quick=True)
+def _distorted(log: Log) -> Verdict:
+    return _against_regular(log, shaken(block(16, 8, sag=0.4), 0.4), 0.01)
+
+
+@MESHES.case("graded 1 to 1000", "cells from 0.001 to 0.7 mm, forces within 2 % of the regular mesh")
+def _graded(log: Log) -> Verdict:
+    half, up = (np.concatenate([[0.0], np.geomspace(5e-4, 1.0, n)]) for n in (18, 12))
+    x, t = np.meshgrid(2.0 * np.concatenate([-half[:0:-1], half]), up)
+    low = 0.4 * (0.5 * x) ** 2
+    return _against_regular(log, grid(x, low + t * (2.0 - low)), 0.02)
+
+
+@MESHES.case("needles 1 to 200", "cells 200 times as wide as high at the pad, forces within 3 %")
+def _needles(log: Log) -> Verdict:
+    y = np.concatenate([[0.0], np.linspace(0.001, 0.004, 4) / 2.0, np.linspace(0.1, 1.0, 8)])
+    x, t = np.meshgrid(np.linspace(-2.0, 2.0, 21), y)
+    low = 0.4 * (0.5 * x) ** 2
+    return _against_regular(log, grid(x, low + t * (2.0 - low)), 0.03)
+
+
+@MESHES.case("sliver ridges", "the steepest walls that are allowed: F_t = 0.3 F_n in full slip")
+def _slivers(log: Log) -> Verdict:
+    # a crest of 15 % of the pitch carries the load
+    body = FingerPad(resolution="coarse", ridge_height=0.2, ridge_exponent=5.5)
+    motion = Press(indentation=0.5, steps=4), Slide(2.0, steps=10)
+    result = log.simulate(scene(body, Flat(friction=0.3), *motion))
+    ratio = float(result.tangential_force[-1] / result.normal_force[-1])
+    least = float(result.frames[-1].J.min())
+    return abs(ratio - 0.3) < 1e-6 and least > 0.0, f"F_t/F_n = {ratio:.7f}, smallest cell J {least:.2f}"
+
+
+@MESHES.case("separate parts", "refused with a sentence", quick=True)
+def _parts(log: Log) -> Verdict:
+    said = log.refusal(lambda: check(joined(block(), block(), np.array([10.0, 0.0]))))
+    return "2 separate parts" in said, said
+
+
+@MESHES.case("double nodes", "refused with a sentence", quick=True)
+def _double(log: Log) -> Verdict:
+    said = log.refusal(lambda: check(joined(block(), block(), np.array([4.0, 0.0]))))
+    return "nodes in the same place" in said, said
+
+
+def _sharper(surface: object) -> Verdict:
+    """A warning of Python's or a sentence of the plan that compares the profile with the nodes."""
+    asked = scene(finger(block(8, 3)), surface, Press(indentation=0.02, steps=1))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        said = str(plan(asked))
+        simulate(asked)
+    texts = [str(one.message) for one in caught] + said.splitlines()
+    found = [text for text in texts if "node" in text and "spacing" in text]
+    return bool(found), found[0] if found else "neither the plan nor a warning says so"
+
+
+@MESHES.case("profile sharper than the nodes", "a warning: nodes 0.5 mm apart miss grooves of 0.1 mm")
+def _unresolved(_: Log) -> Verdict:
+    x = np.arange(-5.0, 5.001, 0.05)
+    return _sharper(Profile(x, np.where(np.round(x / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0))
+
+
+@MESHES.case("wave shorter than the nodes", "a warning: nodes 0.5 mm apart miss waves of 0.2 mm")
+def _short_wave(_: Log) -> Verdict:
+    return _sharper(Sinusoid(terms=[[0.005, 2.0 * np.pi / 0.2, 0.0]], friction=0.0))
