@@ -194,7 +194,7 @@ def test_the_bibliography_has_exactly_the_dois_that_are_used():
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in {".py", ".md", ".csv"} and path != bibliography:
                 used |= dois(path)
-    assert len(used) > 15
+    assert len(used) > 10
     assert dois(bibliography) == used
 
 
