@@ -13,7 +13,7 @@ element    theta at a quadrature point                           locking at nu -
 =========  ====================================================  =============================
 q1 q2 p2   ln J of that point                                    yes (q1), mild (q2, p2)
 q1_fbar    ln J at the centroid, which is F-bar with             no
-           Fbar = (J0/J)^(1/2) F (10.1016/0045-7825(95)01001-9)
+           Fbar = (J0/J)^(1/2) F (10.1016/0020-7683(95)00259-6)
 q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
 =========  ====================================================  =============================
 

@@ -1,4 +1,5 @@
-"""The documentation: its examples run and print what stands below them, its links lead somewhere, it builds.
+"""The documentation: its examples run and print what stands below them, its links lead somewhere, the names
+that it uses exist, what it lists is complete, it builds.
 
 A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block after one is
 what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem` lines in `sh` blocks
@@ -11,18 +12,27 @@ import re
 import shlex
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+import evfem
 from evfem import cli
 from evfem.scene import file as scenefile
+from evfem.simulation.result import COLUMNS
 from evfem.sweeps import file as sweepfile
 
-DOCS = Path(__file__).parents[2] / "docs"
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
 PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
+#: everything that is read beside the code
+TEXTS = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "meshes/README.md", *(f"docs/{p}" for p in PAGES)]
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+#: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`
+NAME = re.compile(r"`((?:ev|evfem)(?:\.\w+)+)")
+DOI = re.compile(r"\b10\.\d{4,}/(?:[\w.-]|\(\w+\)|/)*\w")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
@@ -72,15 +82,149 @@ def anchors(page):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES)
-def test_links_lead_somewhere(page):
-    text = re.sub(r"```.*?^```", "", (DOCS / page).read_text(encoding="utf-8"), flags=re.M | re.S)
-    for link in LINK.findall(text):
+def prose(text):
+    """A page without its fenced blocks."""
+    return re.sub(r"^```.*?^```$", "", text, flags=re.M | re.S)
+
+
+def read(name):
+    return (ROOT / name).read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_links_lead_somewhere(name):
+    for link in LINK.findall(prose(read(name))):
         if not link.startswith("https://"):
-            name, _, anchor = link.partition("#")
-            target = (DOCS / page).parent / name if name else DOCS / page
+            path, _, anchor = link.partition("#")
+            target = (ROOT / name).parent / path if path else ROOT / name
             assert target.exists(), link
             assert not anchor or anchor in anchors(target), link
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_lines_fit_a_screen(name):
+    widest = 88 if name == "README.md" else 99
+    assert [line for line in read(name).splitlines() if len(line) > widest] == []
+
+
+def resolved(dotted):
+    """What a dotted name means: a module, or something in it; a dataclass's field counts."""
+    parts = dotted.split(".")
+    for end in range(len(parts), 0, -1):
+        try:
+            found = import_module(".".join(parts[:end]))
+        except ModuleNotFoundError:
+            continue
+        break
+    for part in parts[end:]:
+        if part in getattr(found, "__dataclass_fields__", ()):
+            return found.__dataclass_fields__[part]
+        found = getattr(found, part)
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in TEXTS if name != "CHANGELOG.md"])
+def test_names_in_sentences_exist(name):
+    for found in set(NAME.findall(prose(read(name)))):
+        assert resolved(re.sub(r"^ev\b", "evfem", found)) is not None, found
+
+
+def test_the_resolver_refuses_what_is_not_there():
+    assert resolved("evfem.contact.pad.Pad.nodes").name == "nodes"
+    assert resolved("evfem.Scene") is evfem.Scene
+    for wrong in ("evfem.contact.pat", "evfem.contact.pad.Pad.knots"):
+        with pytest.raises(AttributeError):
+            resolved(wrong)
+
+
+def rows(text):
+    """Cells of the rows of all tables, without heads and rules."""
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    rules = [i for i, line in enumerate(lines) if set(line) <= set("|- ")]
+    heads = {i - 1 for i in rules} | set(rules)
+    for i, line in enumerate(lines):
+        if i not in heads:
+            yield [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def sections(text):
+    """Heading and text of every section of the second and third level."""
+    parts = re.split(r"^##+ (.+)$", text, flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def test_the_notation_names_what_is_in_the_code():
+    checked = 0
+    for heading, text in sections(read("docs/notation.md")).items():
+        module = re.search(r"`(evfem\.[\w.]+)`", heading)
+        for cells in rows(text) if module else ():
+            for name in re.findall(r"`([A-Za-z_][\w.]*)", cells[1]):
+                if not cells[1].startswith("argument"):
+                    full = name if name.startswith("evfem.") else f"{module[1]}.{name}"
+                    assert resolved(full) is not None
+                    checked += 1
+    assert checked > 30
+    columns = rows(sections(read("docs/notation.md"))["Columns of the history"])
+    assert tuple(name for cells in columns for name in re.findall(r"`(\w+)`", cells[0])) == COLUMNS
+
+
+def test_every_file_of_the_package_is_on_the_page_about_its_inside():
+    """Each room's table has all of its modules, and each public module is where the page says."""
+    page = sections(read("docs/inside.md"))
+    package = Path(evfem.__file__).parent
+    rooms = [path.parent.name for path in package.glob("*/__init__.py") if path.parent.name != "data"]
+    for room in [*rooms, "outside the rooms"]:
+        folder = package if room == "outside the rooms" else package / room
+        inside = folder.glob("*.py") if folder == package else folder.rglob("*.py")
+        files = {".".join(p.relative_to(folder).with_suffix("").parts) for p in inside}
+        listed = [name for cells in rows(page[room]) for name in re.findall(r"`([\w.]+)`", cells[0])]
+        assert sorted(listed) == sorted(name for name in files if not name.endswith("__init__")), room
+    assert sorted(cells[0].strip("`") for cells in rows(page["Rooms"])) == sorted(rooms)
+    public = {cells[0].strip("`"): cells[1].strip("`") for cells in rows(page["Public names"])}
+    assert {name: resolved(re.sub("^ev", "evfem", name)).__name__ for name in public} == public
+
+
+def dois(path):
+    return set(DOI.findall(path.read_text(encoding="utf-8").replace("%28", "(").replace("%29", ")")))
+
+
+def test_the_bibliography_has_exactly_the_dois_that_are_used():
+    bibliography, used = DOCS / "bibliography.md", set()
+    for folder in ("evfem", "studies", "tests", "docs"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix in {".py", ".md", ".csv"} and path != bibliography:
+                used |= dois(path)
+    assert len(used) > 10
+    assert dois(bibliography) == used
+
+
+def test_the_page_on_the_command_line_has_all_commands_and_options():
+    commands = next(a for a in cli.parser()._actions if isinstance(a.choices, dict)).choices
+    options = {
+        (name, o.option_strings[-1])
+        for name, c in commands.items()
+        for o in c._actions[1:]
+        if o.option_strings
+    }
+    told, command = set(), ""
+    for cells in rows(sections(read("docs/commandline.md"))["Commands"]):
+        command = cells[0].strip("`") or command
+        if len(cells) == 3:
+            told.add((command, cells[1].strip("`").split()[0]))
+        else:
+            assert command.split()[1] in commands
+    assert told == options
+
+
+def test_tests_that_the_page_on_verification_names_are_there():
+    names = set(re.findall(r"`(test_\w+)`", read("docs/verification.md")))
+    assert names
+    assert names <= {path.stem for path in (ROOT / "tests").rglob("test_*.py")}
+
+
+def test_the_version_is_the_same_wherever_it_is_said():
+    assert f"\nversion: {evfem.__version__}\n" in read("CITATION.cff")
+    assert f"\n## {evfem.__version__}" in read("CHANGELOG.md")
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if page != "index.md"])

@@ -1,6 +1,13 @@
-"""The ten lines of the README on a coarse mesh, with a law and a weak form of the user's own."""
+"""The example of the README, run as it stands there but on a coarse mesh; with a law and a weak form of the
+user's own.
+"""
 
+import contextlib
+import io
+import os
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import meshio
 import numpy as np
@@ -9,8 +16,10 @@ import pytest
 import evfem as ev
 from evfem import export, plotting
 from evfem.scene.file import loads
+from evfem.scene.scene import default_scene
 from evfem.simulation.result import load
 
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
 DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
 MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6))
@@ -28,17 +37,64 @@ def nail_bed(u, v, w):
     return 2.0e-2 * ev.dot(u, v)
 
 
+def block(kind):
+    """The README's only block of that kind."""
+    (text,) = re.findall(rf"^```{kind}\n(.*?)^```$", README, re.M | re.S)
+    return text
+
+
+@pytest.fixture(scope="module")
+def example(tmp_path_factory):
+    """The README's Python, its simulation on a coarse mesh and with few steps: its names, what it prints, its
+    folder, and a series that was written while it ran.
+    """
+    folder, printed, simulate = tmp_path_factory.mktemp("readme"), io.StringIO(), ev.simulate
+    series = export.ParaViewSeries(folder / "live.pvd")
+    names, here = {}, Path.cwd()
+
+    def coarse(scene, progress):
+        short = replace(scene, finger=FINGER, motion=MOTION, name="slide")
+        return simulate(short, progress=progress, observers=[series])
+
+    with pytest.MonkeyPatch.context() as patch, contextlib.redirect_stdout(printed):
+        patch.setattr(ev, "simulate", coarse)
+        os.chdir(folder)
+        try:
+            exec(compile(block("python"), "README.md", "exec"), names)
+        finally:
+            os.chdir(here)
+    return names, printed.getvalue(), folder, series.path
+
+
 @pytest.fixture(scope="module")
 def scene():
     return ev.Scene(FINGER, DISPLAY, law=ev.Kaczmarek(), voltage=1000.0, motion=MOTION, name="slide")
 
 
 @pytest.fixture(scope="module")
-def result(scene, tmp_path_factory):
+def result(example):
     """The result, with a series that was written while it ran."""
-    series = export.ParaViewSeries(tmp_path_factory.mktemp("series") / "live.pvd")
-    result = ev.simulate(scene, observers=[series])
-    return result, series.path
+    names, _, _, live = example
+    return names["result"], live
+
+
+def test_the_readmes_two_scenes_and_the_built_in_one_are_the_same(example):
+    names, printed, _, _ = example
+    assert names["scene"].digest() == loads(block("toml")).digest() == default_scene().digest()
+    assert str(ev.plan(names["scene"])) in printed
+
+
+def test_the_readmes_example_leaves_the_files_that_it_names(example):
+    _, _, folder, _ = example
+    named = set(re.findall(r'"(\w+\.\w+)"', block("python")))
+    assert named == {"slide.pvd", "forces.png", "slide.npz"}
+    assert named <= {path.name for path in folder.iterdir()}
+
+
+def test_the_readmes_two_commands_stand():
+    assert re.search(
+        r'^```sh\npip install \. && evfem run\npip install "\.\[test\]" && pytest\n```$', README, re.M
+    )
 
 
 def test_the_forces_are_those_of_a_press_and_full_slip(result):

@@ -299,7 +299,7 @@ def _dof_names(basis):
 def test_fbar_is_de_souza_netos():
     """int (J/J0)^(1/2) P(Fbar) : grad v with Fbar = (J0/J)^(1/2) F in the plane, from P alone.
 
-    Pull-back of int sigma(Fbar) : grad_x v dv (10.1016/0045-7825(95)01001-9). Equal to the potential form for
+    Pull-back of int sigma(Fbar) : grad_x v dv (10.1016/0020-7683(95)00259-6). Equal to the potential form for
     the neo-Hookean law because the cofactor of a bilinear cell integrates to its value at the centroid.
     """
     space = rectangle("q1_fbar", (3, 3), jitter=0.25)
