@@ -35,6 +35,8 @@ from evfem.mixing import Mixing
 from evfem.state import KILOVOLT, SMALLEST_FORCE, Balance, Limits, State, StepFailed, Target
 
 SMALLEST_J = 0.05
+#: a bone that moved less than this share of its next way has not moved along it
+ROUNDING = 1e-9
 #: so many iterations in a row that cannot hold the attraction show that nodes are being lost to it
 LOST = 3
 #: under a prescribed force the bone moves at most this share of the body's height in one iteration
@@ -198,7 +200,8 @@ class Equilibrium:
         bone = self.body.space.mesh.node_sets["bone"][0]
         last, way = state.trend[bone], target.bone - state.bone
         axis = 0 if target.force is not None else int(np.argmax(np.abs(way)))
-        if way[axis] * last[axis] <= 0.0:
+        # where the way turns off, the last step's part along it is rounding of either sign
+        if way[axis] * last[axis] <= ROUNDING * way[axis] ** 2:
             return state
         share = min(float(way[axis] / last[axis]), self.strategy.reach)
         u = state.u + share * state.trend
