@@ -170,6 +170,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             signal.signal(number, signal.default_int_handler)
         with warnings.catch_warnings():
             warnings.simplefilter("always", UserWarning)
+            # what one package tells another's developers is not for who runs a command
+            warnings.simplefilter("ignore", DeprecationWarning)
             warnings.showwarning = _warn
             with notices.shown():
                 return _status(given)

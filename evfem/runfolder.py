@@ -154,11 +154,13 @@ def _present(path: Path) -> list[str]:
 
 
 def _picture(result: Result, path: Path) -> None:
+    from matplotlib.figure import Figure
+
     from evfem.plotting import forces
 
     with replacing(path) as temporary:
-        figure = forces(result).get_figure(root=True)
-        assert figure is not None
+        figure = forces(result).figure
+        assert isinstance(figure, Figure)
         figure.savefig(temporary, format="png", dpi=150)
 
 

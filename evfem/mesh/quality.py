@@ -142,8 +142,10 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
                 "neighbouring cells with different mid-nodes on their common edge", "one mid-node per edge"
             )
     ones = np.ones(of_cell.size, dtype=np.int8)
-    cell = np.repeat(np.arange(len(of_cell)), mesh.corners)
-    table = coo_array((ones, (cell, of_cell.ravel())), shape=(len(of_cell), len(edges))).tocsr()
+    # the graph routines of older SciPy know no other integers
+    cell = np.repeat(np.arange(len(of_cell), dtype=np.int32), mesh.corners)
+    edge = of_cell.ravel().astype(np.int32)
+    table = coo_array((ones, (cell, edge)), shape=(len(of_cell), len(edges))).tocsr()
     parts, _ = connected_components(table @ table.T, directed=False)
     if parts > 1:
         refuse(f"{parts} separate parts", "one body, its cells joined by common edges")

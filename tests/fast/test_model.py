@@ -94,17 +94,20 @@ def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained)
     nodes = model.pad.nodes
     attraction = replace(model.attraction, pad=alone_pad(model))
     solver = fast_solver(model, pad, attraction)
+    # the run it remembers is another one: BLAS threads round otherwise, and both stop at the solver's
+    # tolerance; equilibria that are not remembered are a tenth of the largest force away, steady sliding less
+    same = 100.0 * run.scene.solver.tolerance
     found = 0
     for old, new in pairwise(states[6:]):
         force = model.equilibrium.contact_forces(new) + new.attraction
-        if np.abs(pad.force - force).max(axis=(1, 2)).min() > 0.0:
+        if np.abs(pad.force - force).max(axis=(1, 2)).min() > same * np.abs(force).max():
             continue
         small = replace(old, u=old.u[nodes])
         got = solver.step(small, Target.held(new.bone, new.voltage))
         assert np.abs(got.reaction - new.reaction).max() < 3e-5 * np.abs(new.reaction).max()
         assert np.abs(got.contact_force - new.contact_force).max() < 1e-3 * new.contact_force.max()
         found += 1
-    assert found >= 2
+    assert found >= pad.slide.size - 1  # the first one ends the press
 
 
 def test_a_step_is_tried_as_hard_as_the_strategy_says(trained):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from evfem.errors import InputError
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, TABLE_2, FingerPad, MeshedFinger
@@ -77,7 +78,7 @@ def test_area_of_the_nail_is_that_between_ellipse_and_offset():
     curvature = A * B / speed**3
     d = pad.nail_thickness
     # offset strip: d times length minus d^2/2 times the turning angle
-    exact = np.trapezoid(d * speed - 0.5 * d * d * curvature * speed, theta)
+    exact = trapezoid(d * speed - 0.5 * d * d * curvature * speed, theta)
     assert region_area(pad.mesh(2), "nail") == pytest.approx(exact, rel=1e-6)
 
 

@@ -115,6 +115,19 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     assert rest[1] < 0.1 * rest[0]
 
 
+@pytest.mark.parametrize("rounding", [-1e-20, 0.0, 1e-20])
+def test_a_step_that_turns_off_begins_where_the_last_one_ended_whatever_the_rounding(rounding):
+    model, state = pressed(Flat(friction=0.3))
+    last = state.last_increment.copy()
+    last[model.mesh.node_sets["bone"], 0] = rounding
+    seen = []
+    for trial in (last, 0.0 * last):
+        model.equilibrium.body.forget()
+        model.equilibrium.step(replace(state, last_increment=trial), Target.held(model.bone(0.05, 0.2), 0.0))
+        seen.append(model.equilibrium.record.residuals[1])
+    assert seen[0] == pytest.approx(seen[1], rel=1e-6)
+
+
 def test_a_failed_step_returns_nothing_and_leaves_its_start_alone():
     model, state = pressed(Flat())
     kept = {

@@ -200,9 +200,8 @@ def twin_energy(space, u):
         planes = []
         for X, Y, w, value in zip(*x, dx, theta, strict=True):
             A, root = np.column_stack([np.ones_like(X), X, Y]), np.sqrt(w)
-            fit = np.linalg.lstsq(
-                A * root[:, None], np.column_stack([value.real, value.imag]) * root[:, None]
-            )[0]
+            parts = np.column_stack([value.real, value.imag])
+            fit = np.linalg.lstsq(A * root[:, None], parts * root[:, None], rcond=None)[0]
             planes.append(A @ (fit @ [1.0, 1j]))
         theta = np.array(planes)
     psi = 0.5 * MU * (np.sum(F * F, axis=(0, 1)) - 2.0 - 2.0 * theta) + 0.5 * LMBDA * theta**2
