@@ -46,6 +46,8 @@ STABLE                  fraction of the critical negative stiffness that is used
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
 ROUNDING                violations below this fraction of the largest force are rounding
 UNHELD                  pivots of the bone below this fraction belong to a body that nothing holds
+TURNED                  a bone that moved less than this fraction of its next way has not moved   turns
+                        along it
 HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
                         mm: far above rounding, far below any mesh
 CHANGES                 so many changes of side in one step show that neither side is             jumps
@@ -84,6 +86,7 @@ STABLE = 0.9
 LOST = 3
 ROUNDING = 1e-12
 UNHELD = 1e-10
+TURNED = 1e-9
 HAIR = 1e-9
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3

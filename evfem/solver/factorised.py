@@ -33,6 +33,7 @@ from evfem.common.constants import (
     SHORTEST_FRACTION,
     SMALLEST_FORCE,
     SMALLEST_J,
+    TURNED,
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
@@ -105,7 +106,8 @@ class FactorisedBody:
         node = self.body.space.mesh.node_sets["bone"][0]
         last, way = state.last_increment[node], target.bone(state.bone) - state.bone
         axis = int(np.argmax(np.abs(way)))
-        if way[axis] * last[axis] <= 0.0:
+        # where the bone turns off, its last increment along the new way is rounding of either sign
+        if way[axis] * last[axis] <= TURNED * way[axis] ** 2:
             return state
         fraction = min(float(way[axis] / last[axis]), self.limits.strategy.reach)
         u = state.u + fraction * state.last_increment
