@@ -21,7 +21,7 @@ from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
 from evfem.solver.factorised import FactorisedBody
-from evfem.solver.interface import Interface
+from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.state import Limits
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
@@ -75,8 +75,9 @@ def make_model(scene: Scene) -> Model:
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
     limits = Limits(solver.tolerance, solver.strategy, solver.threads)
-    interface = Interface(pad, mesh.points, surface, solver.tolerance)
-    if solver.contact == "penalty":
+    kind = PenaltyInterface if solver.contact == "penalty" else Interface
+    interface = kind(pad, mesh.points, surface, solver.tolerance)
+    if isinstance(interface, PenaltyInterface):
         normal = float(solver.penalty_normal or 0.0)
         interface.penalties = (normal, solver.penalty_tangential or normal)
     equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))

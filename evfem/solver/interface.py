@@ -78,7 +78,6 @@ class Interface:
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
         self.points = points[pad.nodes]
-        self.penalties: tuple[float, float] | None = None
         self.pins = Pins(surface.friction_jumps, pad.nodes.size)
         ends = self.points[pad.edges[:, :2]]
         self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
@@ -111,10 +110,10 @@ class Interface:
         """
         position = self.positions(state.u)[c]
         surface = surface_state(self.surface, position)
-        compliance = self._compliance(old)[c]
+        compliance = self.compliance(old)[c]
         origin = self._origin(old)[c]
         slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
-        friction = self._friction(np.where(self.pins.held[c], origin, position[:, 0]))
+        friction = self.friction(np.where(self.pins.held[c], origin, position[:, 0]))
         return Candidates(
             surface=surface,
             slip=slip,
@@ -131,16 +130,12 @@ class Interface:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
-    def _compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm; 0 where contact is
-        exact.
-        """
-        if self.penalties is None:
-            return np.zeros_like(old.contact_force)
-        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), SHORTEST_LENGTH * self.length)
-        return 1.0 / np.outer(length, self.penalties)
+    def compliance(self, old: State) -> Floats:
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm: 0, contact is exact."""
+        return np.zeros_like(old.contact_force)
 
-    def _friction(self, x: Floats) -> Floats:
+    def friction(self, x: Floats) -> Floats:
+        """Friction coefficient at the positions x (mm)."""
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
     def shallowest_penetration(self, state: State) -> float | None:
@@ -160,10 +155,10 @@ class Interface:
             return False
         normal, shear = state.contact_force[active].T
         slip = (surface.stretch * (position[:, 0] - self._origin(old)))[active]
-        compliance = self._compliance(old)[active]
+        compliance = self.compliance(old)[active]
         slip = slip + compliance[:, 1] * (shear - old.contact_force[active, 1])
         x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
-        limit = self._friction(x) * normal
+        limit = self.friction(x) * normal
         status = state.status[active]
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
@@ -175,3 +170,16 @@ class Interface:
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())
+
+
+class PenaltyInterface(Interface):
+    """An interface that yields: 1 / (penalty x tributary length) of compliance per node; `penalties` in N/mm3
+    along normal and tangent.
+    """
+
+    penalties: tuple[float, float] = (np.inf, np.inf)
+
+    def compliance(self, old: State) -> Floats:
+        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
+        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), SHORTEST_LENGTH * self.length)
+        return 1.0 / np.outer(length, self.penalties)
