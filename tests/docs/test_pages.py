@@ -103,6 +103,12 @@ def test_links_lead_somewhere(name):
             assert not anchor or anchor in anchors(target), link
 
 
+@pytest.mark.parametrize("name", [name for name in TEXTS if name != "CHANGELOG.md"])
+def test_files_in_sentences_exist(name):
+    paths = re.findall(r"`((?:evfem|studies|tests|docs|meshes)/[\w./-]*)`", prose(read(name)))
+    assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
 @pytest.mark.parametrize("name", [name for name in TEXTS if name not in UNFILLED])
 def test_lines_fit_a_screen(name):
     widest = 88 if name == "README.md" else 99
