@@ -27,7 +27,14 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
 #: everything that is read beside the code
-TEXTS = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "meshes/README.md", *(f"docs/{p}" for p in PAGES)]
+TEXTS = [
+    "README.md",
+    "CHANGELOG.md",
+    "CONTRIBUTING.md",
+    "meshes/README.md",
+    "studies/notebooks/README.md",
+    *(f"docs/{p}" for p in PAGES),
+]
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 #: pages that are still to be filled to the width of the others
