@@ -45,7 +45,7 @@ STABLE                  fraction of the critical negative stiffness that is used
                         attraction weakens with the gap faster than the tissue stiffens
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
 ROUNDING                violations below this fraction of the largest force are rounding
-UNHELD                  pivots of the bone below this fraction belong to a body that nothing holds
+UNHELD                  pivots of the bone below this fraction belong to a body without a hold
 TURNED                  a bone that moved less than this fraction of its next way has not moved   turns
                         along it
 HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps

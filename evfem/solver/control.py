@@ -10,7 +10,7 @@ control             known                        unknown                       e
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
 `GivenVoltage`      voltage                                                    none
-`FollowFriction`    voltage at one of its bounds squared voltage between them  F_x = force
+`FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
 Attraction is proportional to the squared voltage, so that this unknown enters linearly. A control of one's

@@ -19,7 +19,7 @@ from evfem.scene.file import loads
 from evfem.scene.scene import default_scene
 from evfem.simulation.result import load
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
 DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
 MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6))

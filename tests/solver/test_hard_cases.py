@@ -49,7 +49,8 @@ def test_a_thin_insulator_by_strong_troxels_law():
 
 def test_penalised_friction_obeys_the_return_map():
     """The penalty variant is a compliance of the interface; pointwise it is the return map of Coulomb's law
-    with an elastic stick (Wriggers, Computational Contact Mechanics, 2nd ed., 2006).
+    with an elastic stick (Wriggers, Computational Contact Mechanics, 2nd ed., 2006,
+    doi:10.1007/978-3-540-32609-0).
     """
     solver = Solver(contact="penalty", penalty_normal=50.0, penalty_tangential=20.0)
     motion = [Press(indentation=0.3, steps=1), Slide(0.05, steps=2)]
