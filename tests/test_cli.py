@@ -37,7 +37,7 @@ RESULTS = ["checkpoint.npz", "fields.pvd", "forces.png", "history.csv", "summary
 def command(*arguments):
     """The command in this environment, with the package the tests use, in a clean locale."""
     path = os.pathsep.join(p for p in sys.path if p)
-    environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1"}
+    environment = os.environ | {"PYTHONPATH": path}
     return [sys.executable, "-m", "evfem.cli", *map(str, arguments)], environment
 
 
