@@ -101,3 +101,7 @@ def _draw_surfaces(figure: Figure, eps_sc: Any, eps_i: Any, force: dict[str, Any
     ax.view_init(elev=18, azim=-50)
     ax.set_box_aspect(None, zoom=0.9)
     ax.set_title("[a]   $F_e$ (N)", loc="left", fontsize="medium", y=0.95)
+    # older matplotlib lays three-dimensional axes out by where the last drawing put their ticks
+    figure.set_layout_engine("none")
+    figure.draw_without_rendering()
+    figure.set_layout_engine("constrained")

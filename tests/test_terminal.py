@@ -53,7 +53,7 @@ def terminal(folder, *words, columns=80, code="from evfem.cli import main; impor
     ours, theirs = pty.openpty()
     ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
     path = os.pathsep.join(p for p in sys.path if p)
-    environment = os.environ | {"PYTHONPATH": path, "OMP_NUM_THREADS": "1", "NO_COLOR": "1", "TERM": "xterm"}
+    environment = os.environ | {"PYTHONPATH": path, "NO_COLOR": "1", "TERM": "xterm"}
     environment.pop("COLUMNS", None)
     arguments = [sys.executable, "-c", code, *map(str, words)]
     with Popen(arguments, cwd=folder, env=environment, stdin=theirs, stdout=theirs, stderr=theirs) as process:
