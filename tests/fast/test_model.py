@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tools.builders import balance, block, finger
+from tools.builders import balance, finger
+from tools.meshes import block
 
 import evfem as ev
 from evfem.common.constants import PAD_TOLERANCE
