@@ -12,7 +12,8 @@ import meshio
 import numpy as np
 import pytest
 from tools.commands import called, process_of, run_process
-from tools.fakes import SQUARE_SCENE, square_mesh
+from tools.fakes import SQUARE_SCENE
+from tools.meshes import square_mesh
 
 import evfem
 from evfem import cli

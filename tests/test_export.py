@@ -6,7 +6,8 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from tools.fakes import KINDS, fake_frame, fake_result, fake_row, square_mesh
+from tools.fakes import fake_frame, fake_result, fake_row
+from tools.meshes import KINDS, square_mesh
 
 from evfem.errors import InputError, StorageError
 from evfem.export import ParaViewSeries, instants, paraview

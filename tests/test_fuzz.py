@@ -12,7 +12,8 @@ import pytest
 from evfem.studies.stability import fuzzing
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from tools.fakes import fake_result, square_mesh
+from tools.fakes import fake_result
+from tools.meshes import square_mesh
 
 from evfem.common import tables
 from evfem.contact.surfaces import Flat, Profile, Sinusoid

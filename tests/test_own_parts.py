@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
-from tools.builders import INSULATOR, SKIN, block
+from tools.builders import INSULATOR, SKIN
+from tools.meshes import block
 
 import evfem as ev
 from evfem.contact.own import completed

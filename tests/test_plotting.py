@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection, PolyCollection
-from tools.fakes import KINDS, fake_result, square_mesh
+from tools.fakes import fake_result
+from tools.meshes import KINDS, square_mesh
 
 from evfem.errors import InputError
 from evfem.plotting import FIELDS, contact_pressure, deformed, forces, regions

@@ -4,7 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from tools.fakes import fake_frame, fake_row, square_mesh
+from tools.fakes import fake_frame, fake_row
+from tools.meshes import square_mesh
 
 from evfem import export
 from evfem.errors import InputError, StorageError

@@ -13,7 +13,8 @@ from importlib.util import find_spec
 from subprocess import Popen
 
 import pytest
-from tools.fakes import SQUARE_SCENE, square_mesh
+from tools.fakes import SQUARE_SCENE
+from tools.meshes import square_mesh
 
 import evfem as ev
 from evfem import cli

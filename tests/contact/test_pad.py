@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tools.builders import block
+from tools.meshes import block
 
 from evfem.contact.pad import Pad, make_pad, surface_state
 from evfem.contact.surfaces import Flat, Sinusoid

@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from tools.builders import balance, block, finger
+from tools.builders import balance, finger, layered_finger
+from tools.meshes import block, half_finger
 
 import evfem as ev
 from evfem.common.constants import PAD_TOLERANCE
@@ -32,6 +33,7 @@ from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, StepFailed
 
 INSULATOR = ev.Layer(thickness=0.09, eps_r=3.35)
+HALF_FINGER = layered_finger(half_finger(80, 5, 1, free_ends=True))
 PRESS = ev.Press(force=0.05, steps=5)
 PRESS_AND_SLIDE = (PRESS, ev.Slide(1.5, steps=15))
 
@@ -41,10 +43,9 @@ def display(friction):
 
 
 def pad_scene(friction=0.5, voltage=1000.0, motion=PRESS_AND_SLIDE, **more):
-    smooth = ev.FingerPad(resolution="coarse", ridges=False)
     law = ev.Kaczmarek()
     output = ev.Output(every=1000)
-    return ev.Scene(smooth, display(friction), law=law, voltage=voltage, motion=motion, output=output, **more)
+    return ev.Scene(HALF_FINGER, display(friction), law=law, voltage=voltage, motion=motion, output=output, **more)
 
 
 @pytest.fixture(scope="module")
@@ -194,7 +195,7 @@ def test_other_voltages_and_frictions_are_right(trained, friction, voltage, hold
     names = ["normal_force", "tangential_force", "friction_dissipation"]
     for name in names + ["electrostatic_force"] * (voltage > 0.0):
         # work of friction: a step that begins to slip all at once counts
-        assert off(fast, full, name) < (1e-2 if name == "friction_dissipation" else 1e-3)
+        assert off(fast, full, name) < (1.5e-2 if name == "friction_dissipation" else 1e-3)
     assert np.abs(fast.normal_force - full.normal_force)[:5].max() < 1e-3 * full.normal_force.max()
     assert balance(fast).max() < 1e-5
     assert (fast.substeps == 1).all()

@@ -3,13 +3,13 @@
 import meshio
 import numpy as np
 import pytest
-from evfem.studies.benchmark import benchmark_mesh
 from tools.mesh_parts import REGIONS, of_kind, raw
+from tools.meshes import half_finger
 
 from evfem.errors import InputError, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.mesh import file as meshfile
-from evfem.mesh.mesh import Mesh
+from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import scaled_jacobian
 from evfem.tissue.laws import NeoHookean
 
@@ -53,7 +53,7 @@ def test_finger_pad_survives_a_file_with_a_region_and_a_boundary_called_nail(end
 
 def test_vtu_is_in_the_encoding_of_the_contract(tmp_path):
     path = tmp_path / "mesh.vtu"
-    meshfile.write(benchmark_mesh(0), path)
+    meshfile.write(half_finger(), path)
     file = meshio.read(path)
     assert file.points.shape == (793, 3)
     assert file.cell_data["region"][0].dtype.kind == "i"
@@ -64,7 +64,7 @@ def test_vtu_is_in_the_encoding_of_the_contract(tmp_path):
 
 def test_msh_has_named_physical_groups_of_lines_and_surfaces(tmp_path):
     path = tmp_path / "mesh.msh"
-    meshfile.write(benchmark_mesh(0), path)
+    meshfile.write(half_finger(), path)
     text = path.read_text()
     assert text.startswith("$MeshFormat\n2.2 0 8\n")
     assert [
@@ -89,14 +89,15 @@ def test_foreign_gmsh_file_with_numbers_that_repeat_per_dimension(tmp_path):
 
 
 def test_version_four_gmsh_file_is_read(tmp_path):
-    mesh = benchmark_mesh(0)
+    mesh = half_finger()
     meshfile.write(mesh, tmp_path / "two.msh")
     file = meshio.read(tmp_path / "two.msh")
     names = {(1, 3): "pad", (1, 4): "bone", (2, 1): "tissue", (2, 2): "skin"}
     path = tmp_path / "four.msh"
     path.write_text(version_four(file, names))
     read = meshfile.read(path)
-    np.testing.assert_array_equal(read.cells[np.argsort(read.region, kind="stable")], mesh.cells)
+    by_region = (one.cells[np.argsort(one.region, kind="stable")] for one in (read, mesh))
+    np.testing.assert_array_equal(*by_region)
     np.testing.assert_array_equal(read.node_sets["pad"], mesh.node_sets["pad"])
     np.testing.assert_array_equal(read.node_sets["bone"], mesh.node_sets["bone"])
 
@@ -186,7 +187,7 @@ def test_unreadable_file_gets_a_sentence_and_a_clean_terminal(name, content, tmp
 def test_truncated_files_get_a_sentence(tmp_path, capfd):
     for ending in ("vtu", "msh"):
         path = tmp_path / f"mesh.{ending}"
-        meshfile.write(benchmark_mesh(0), path)
+        meshfile.write(half_finger(), path)
         whole = path.read_bytes()
         for share in (0.1, 0.5, 0.9):
             path.write_bytes(whole[: int(share * len(whole))])
@@ -204,7 +205,7 @@ def test_missing_file_and_folder(tmp_path):
 
 def test_cells_outside_every_physical_group_are_refused(tmp_path):
     path = tmp_path / "mesh.msh"
-    meshfile.write(benchmark_mesh(0), path)
+    meshfile.write(half_finger(), path)
     path.write_text(
         path.read_text().replace('2 2 "skin"\n', "").replace("$PhysicalNames\n4", "$PhysicalNames\n3")
     )
@@ -215,7 +216,7 @@ def test_cells_outside_every_physical_group_are_refused(tmp_path):
 @pytest.mark.parametrize("name", ["mesh.stl", "mesh.vtk", "mesh.obj", "mesh", "mesh.VTX"])
 def test_format_without_names_is_refused_and_nothing_written(name, tmp_path):
     with pytest.raises(InputError, match="cannot carry the names"):
-        meshfile.write(benchmark_mesh(0), tmp_path / name)
+        meshfile.write(half_finger(), tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -229,15 +230,15 @@ def test_failed_write_leaves_the_old_file_alone(tmp_path, monkeypatch):
 
     monkeypatch.setitem(meshfile.WRITERS, ".vtu", full)
     with pytest.raises(StorageError, match="No space left"):
-        meshfile.write(benchmark_mesh(0), path)
+        meshfile.write(half_finger(), path)
     assert path.read_bytes() == b"old"
     assert [file.name for file in tmp_path.iterdir()] == ["mesh.vtu"]
     with pytest.raises(StorageError):
-        meshfile.write(benchmark_mesh(0), tmp_path / "no folder" / "mesh.vtu")
+        meshfile.write(half_finger(), tmp_path / "no folder" / "mesh.vtu")
 
 
 def test_msh_cannot_carry_a_lonely_node(tmp_path):
-    mesh = benchmark_mesh(0)
+    mesh = half_finger()
     sets = {**mesh.node_sets, "mark": np.array([400])}
     with pytest.raises(InputError, match="node 400"):
         meshfile.write(
@@ -248,5 +249,5 @@ def test_msh_cannot_carry_a_lonely_node(tmp_path):
 def test_meshed_finger_reads_a_file(tmp_path):
     laws = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.3)}
     finger = MeshedFinger(stored(tmp_path), laws, regions=REGIONS)
-    same(finger.mesh(1), benchmark_mesh(0))
-    same(finger.mesh(2), benchmark_mesh(0, 2))
+    same(finger.mesh(1), half_finger())
+    same(finger.mesh(2), raised(half_finger()))

@@ -3,7 +3,7 @@
 import meshio
 import numpy as np
 import pytest
-from tools.fakes import square_mesh
+from tools.meshes import square_mesh
 
 from evfem.errors import InputError
 from evfem.mesh.file import read, write

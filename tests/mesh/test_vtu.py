@@ -8,7 +8,7 @@ import meshio
 import numpy as np
 import pytest
 from meshio.vtu import write
-from tools.fakes import KINDS, square_mesh
+from tools.meshes import KINDS, square_mesh
 
 from evfem.mesh import file as meshfile
 from evfem.mesh import vtu as vturead

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tools.fakes import square_mesh
+from tools.meshes import square_mesh
 
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel

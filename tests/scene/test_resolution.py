@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from tools.builders import block, finger
+from tools.builders import finger
+from tools.meshes import block
 
 from evfem.cli import main
 from evfem.contact.surfaces import Flat, Profile, Sinusoid

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import scipy.sparse as sparse
+from tools.builders import pad_state
 from tools.grids import assembled, quarter_ring, rectangle
-from tools.physics_meshes import block, both_sides, graded, pad_state, parabola
+from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
 from evfem.reference import (
@@ -33,7 +34,7 @@ def test_hertz_line_contact(law):
     """
     E, nu, radius = 0.91, 0.3, 1e3
     x = both_sides(graded(1.125, 1 / 40, 60.0, 1.5))
-    mesh = block(x, graded(0.1, 1 / 40, 60.0, 1.5), pad=1.125, lower=parabola(radius))
+    mesh = contact_block(x, graded(0.1, 1 / 40, 60.0, 1.5), pad=1.125, lower=parabola(radius))
     largest = HertzLine.from_half_width(1.0, radius, plane_modulus(E, nu))
     motion = (ev.Press(indentation=1e-5, steps=1), ev.Press(force=largest.load, steps=2))
     result = press(mesh, law(E, nu), ev.Flat(friction=0.0), *motion)
@@ -59,7 +60,9 @@ def test_bonded_layer_under_a_cylinder():
     E, nu, radius, k = 0.91, 0.3, 1e4, 0.01
     layer = BondedLayer(half_width=1.0, thickness=1.0, radius=radius, E=E, nu=nu)
     cylinder = ev.Sinusoid(friction=0.0, terms=[[1.0 / (radius * k**2), k, np.pi / 2]])
-    mesh = block(both_sides(graded(1.25, 1 / 32, 7.0, 1.3)), np.linspace(0.0, 1.0, 13) ** 1.3, pad=1.25)
+    mesh = contact_block(
+        both_sides(graded(1.25, 1 / 32, 7.0, 1.3)), np.linspace(0.0, 1.0, 13) ** 1.3, pad=1.25
+    )
     motion = ev.Press(indentation=layer.indentation, steps=1)
     result = press(mesh, ev.LinearElastic(E, nu), cylinder, motion)
     assert result.normal_force[-1] * radius / plane_modulus(E, nu) == pytest.approx(1.221797, rel=1e-3)
@@ -76,7 +79,7 @@ def test_cattaneo_mindlin_stick_zone():
     half_width, radius, mu, nu = 0.1, 20.0, 0.3, 0.499
     x = both_sides(graded(1.125 * half_width, half_width / 32, 40.0, 1.5))
     y = graded(0.1 * half_width, half_width / 32, 40.0, 1.5)
-    mesh = block(x, y, pad=1.125 * half_width, lower=parabola(radius, flat=3.0))
+    mesh = contact_block(x, y, pad=1.125 * half_width, lower=parabola(radius, flat=3.0))
     hertz = HertzLine.from_half_width(half_width, radius, modulus=1.0)
     slide = ev.Slide(distance=1.05 * half_width**2 / radius, steps=3, hold="force")
     law = ev.NeoHookean(E=1.0 - nu**2, nu=nu)  # E* = 1
@@ -101,7 +104,7 @@ def test_cattaneo_mindlin_stick_zone():
 def test_point_sliding_on_a_profile(direction):
     """A wedge touches a sinusoid with its tip only: F_t/F_n = (mu + y')/(1 - mu y')."""
     mu = 0.4
-    wedge = block(
+    wedge = contact_block(
         np.linspace(-1.0, 1.0, 9), np.linspace(0.0, 1.0, 5), pad=1.0, lower=lambda x: 0.4 * np.abs(x)
     )
     wave = ev.Sinusoid(friction=mu, terms=[[0.05, 3.0, 0.5]])
@@ -179,7 +182,7 @@ def test_a_users_stress_law_is_the_built_in_law_in_the_same_contact():
             mu, lmbda = 0.4, 0.6
             return mu * F + (lmbda * np.log(ev.det(F)) - mu) * ev.transpose(ev.inv(F))
 
-    mesh = block(np.linspace(-2.0, 2.0, 9), np.linspace(0.0, 2.0, 5), pad=2.0, lower=parabola(6.0))
+    mesh = contact_block(np.linspace(-2.0, 2.0, 9), np.linspace(0.0, 2.0, 5), pad=2.0, lower=parabola(6.0))
     motion = (ev.Press(indentation=0.4, steps=2), ev.Slide(distance=0.2, steps=2))
     built_in = ev.NeoHookean(E=0.4 * (3 * 0.6 + 2 * 0.4) / (0.6 + 0.4), nu=0.6 / (2 * (0.6 + 0.4)))
     mine, theirs = (

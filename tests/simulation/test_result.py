@@ -7,7 +7,8 @@ import zipfile
 
 import numpy as np
 import pytest
-from tools.fakes import KINDS, fake_result, fake_row
+from tools.fakes import fake_result, fake_row
+from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
 from evfem.simulation.result import COLUMNS, Checkpoint, Result, csv_header, csv_line, load, versions

@@ -4,7 +4,8 @@ from functools import cache
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_scene, block, finger
+from tools.builders import INSULATOR, balance, benchmark_scene, finger
+from tools.meshes import block
 
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_finger, benchmark_scene, block, finger
+from tools.builders import INSULATOR, balance, benchmark_finger, benchmark_scene, finger
+from tools.meshes import block
 
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers

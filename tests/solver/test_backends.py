@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tools.builders import block, finger
+from tools.builders import finger
+from tools.meshes import block
 
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek

@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_finger, block, finger
+from tools.builders import INSULATOR, balance, benchmark_finger, finger
+from tools.meshes import block
 
 from evfem.contact import condensed
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import block, finger
+from tools.builders import finger
+from tools.meshes import block
 
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.contact.surfaces import Flat, Sinusoid

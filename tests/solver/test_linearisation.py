@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, block, finger
+from tools.builders import INSULATOR, finger
+from tools.meshes import block
 
 from evfem.contact.signorini import OPEN, STICK
 from evfem.contact.surfaces import Display, Sinusoid

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from tools.builders import block, finger
+from tools.builders import finger
+from tools.meshes import block
 
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError

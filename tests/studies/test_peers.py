@@ -60,7 +60,9 @@ def test_quick_comparison_without_peers(monkeypatch, tmp_path, capsys):
     assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.peers
 def test_quick_comparison_with_what_is_installed(tmp_path):
+    assert PRESENT, "there is nothing to compare with; FElupe at least: pip install evfem[peers]"
     result = studies.run("peers", quick=True, out=tmp_path)
     found, said = result["numbers"], result["assumptions"]
     assert said["missing"] == [name for name in numbers.PEERS if name not in PRESENT]
@@ -80,17 +82,22 @@ def test_quick_comparison_with_what_is_installed(tmp_path):
     assert found.get("A.L0.apart_percent.q2", 0.0) < 1e-5
 
 
+@pytest.mark.peers
 @pytest.mark.parametrize("scene", ["B", "C"])
 def test_friction_and_attraction_are_the_same_problem_for_all(scene, tmp_path):
     # several codes, one problem: a stiff penalty (as above), an elastic slip of 2e-5 mm in the first 0.1 mm
     own = problem.quantities(scene, hosts.run_once("evfem", "q1", scene, 0)["history"])
-    for name in numbers.PEERS:
+    assert PRESENT
+    for name in PRESENT:
         peer = hosts.run_once(name, "q1", scene, 0, tmp_path)
-        if name not in PRESENT:
-            assert f"{name} is not installed" in peer["failed"]
-            continue
         assert problem.quantities(scene, peer["history"]) == pytest.approx(own, rel=5e-4)
         assert peer["iterations"] <= 5 * len(problem.path(scene))  # C with a wrong sign in its tangent: 81
+
+
+@pytest.mark.parametrize("name", numbers.PEERS)
+def test_a_package_that_is_not_there_is_named(name, monkeypatch, tmp_path):
+    monkeypatch.setattr(hosts, "host", lambda name: None)
+    assert f"{name} is not installed" in hosts.run_once(name, "q1", "A", 0, tmp_path)["failed"]
 
 
 def imports(path):

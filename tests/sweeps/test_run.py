@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 import pytest
-from tools.builders import block
+from tools.meshes import block
 from tools.workers import work_or_die
 
 import evfem as ev

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tools.laws import EnergyOnly, StressOnly
 
 from evfem.errors import InputError
 from evfem.tensor import complex_step, ddot, det, inv, mul, trace, transpose
@@ -19,21 +20,13 @@ LOG_LAWS = BUILT_IN[:3]
 names = {"ids": lambda law: type(law).__name__}
 
 
-class EnergyOnly:
-    """A user's law: the neo-Hookean energy again, nothing else."""
+ENERGY, STRESS = EnergyOnly(1.3, 2.1), StressOnly(1.3, 2.1)
+
+
+class ViscousEnergy(EnergyOnly):
+    """The energy, and a relaxation time."""
 
     viscosity = 0.25
-
-    def psi(self, F):
-        lnJ = np.log(det(F))
-        return 0.5 * 1.3 * (ddot(F, F) - 3.0 - 2.0 * lnJ) + 0.5 * 2.1 * lnJ**2
-
-
-class StressOnly:
-    """A user's law: the stress of the same energy, nothing else."""
-
-    def P(self, F):
-        return 1.3 * F + (2.1 * np.log(det(F)) - 1.3) * transpose(inv(F))
 
 
 class BarredNeoHookean:
@@ -113,7 +106,7 @@ def test_split_form_is_the_full_form_where_theta_is_the_volume_change(law, shape
     np.testing.assert_allclose(law.split_sigma_zz(F, theta), P[2, 2] / J, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("law", [*BUILT_IN, split(EnergyOnly()), split(StressOnly())], **names)
+@pytest.mark.parametrize("law", [*BUILT_IN, split(ENERGY), split(STRESS)], **names)
 def test_split_derivatives_against_central_differences(law):
     F, theta = split_states()
     S, q = law.split_stress(F, theta)
@@ -223,7 +216,7 @@ def test_ogden_stress_by_hand_at_two_equal_stretches():
     np.testing.assert_allclose(S, 0.7 * a**-2 * a**2 * np.eye(2), rtol=1e-14)
 
 
-@pytest.mark.parametrize("user", [EnergyOnly(), StressOnly()], **names)
+@pytest.mark.parametrize("user", [ENERGY, STRESS], **names)
 def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
     built_in = NeoHookean(
         E=1.3 * (3 * 2.1 + 2 * 1.3) / (2.1 + 1.3), nu=2.1 / (2 * (2.1 + 1.3))
@@ -242,7 +235,7 @@ def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
     assert law.shear_modulus == pytest.approx(1.3, rel=1e-10)
 
 
-@pytest.mark.parametrize(("user", "digits"), [(StressOnly(), 1e-12), (EnergyOnly(), 1e-9)])
+@pytest.mark.parametrize(("user", "digits"), [(STRESS, 1e-12), (ENERGY, 1e-9)])
 def test_wrapped_users_law_has_the_split_derivatives_written_by_hand(user, digits):
     F, theta = split_states()
     hand, law = BarredNeoHookean(), split(user)
@@ -265,8 +258,8 @@ def test_energy_of_a_stress_only_law_survives_large_turns():
     s, c = np.sin(2.6), np.cos(2.6)
     F = np.array([[c, -s], [s, c]]) @ np.array([[1.5, 0.2], [0.0, 0.8]])
     theta = np.log(det(F))
-    energy = split(StressOnly()).split_energy(F, theta)
-    assert energy == pytest.approx(EnergyOnly().psi(embed(F)), rel=1e-10)
+    energy = split(STRESS).split_energy(F, theta)
+    assert energy == pytest.approx(ENERGY.psi(embed(F)), rel=1e-10)
 
 
 def test_energy_of_a_stress_only_law_that_is_not_objective():
@@ -281,7 +274,7 @@ def test_energy_of_a_stress_only_law_that_is_not_objective():
 
 
 def test_wrapper_keeps_the_laws_own_rates_and_is_not_applied_twice():
-    law = split(EnergyOnly())
+    law = split(ViscousEnergy(1.3, 2.1))
     assert isinstance(law, UserLaw)
     assert law.viscosity == 0.25
     assert law.density == 1e-9

@@ -1,24 +1,40 @@
-"""Small bodies and scenes that several tests share."""
+"""Small bodies and scenes that several tests share, and what their results say."""
 
 import numpy as np
-from evfem.studies.benchmark import benchmark_mesh
-from evfem.studies.stability.scenes import INSULATOR, SKIN, block, finger
 
 from evfem.contact.surfaces import Display
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.finger.fingerpad import MeshedFinger
+from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.tissue.laws import NeoHookean
+from tools.meshes import half_finger
 
-__all__ = ["INSULATOR", "SKIN", "balance", "benchmark_finger", "benchmark_scene", "block", "finger"]
-
+SKIN = Electrical(stratum_corneum_thickness=0.38, stratum_corneum_eps_r=1650.0)
+INSULATOR = Layer(thickness=0.09, eps_r=3.35)
 BENCHMARK_LAWS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
+#: level of the benchmark -> cells around, across the tissue, across the skin
+LEVELS = {0: (60, 10, 2), 1: (120, 20, 4), 2: (336, 56, 12)}
+
+
+def finger(mesh, E=0.1, nu=0.4, viscosity=0.0):
+    """A body of one neo-Hookean material."""
+    return MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=nu)}, SKIN, viscosity)
+
+
+def layered_finger(mesh):
+    """A body of tissue and skin with the benchmark's laws."""
+    return MeshedFinger(mesh, BENCHMARK_LAWS, SKIN)
+
+
+def coarse_pad():
+    """Table 2's finger without ridges on its coarsest mesh."""
+    return FingerPad(ridges=False, resolution="coarse")
 
 
 def benchmark_finger(level=0):
     """The finger of the press-and-slide benchmark."""
-    return MeshedFinger(benchmark_mesh(level), BENCHMARK_LAWS, SKIN)
+    return layered_finger(half_finger(*LEVELS[level]))
 
 
 def benchmark_scene(kind, level, element=None, steps=15):
@@ -38,3 +54,20 @@ def balance(result):
     y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
     forces = np.array([x, y])
     return np.abs(forces.sum(axis=1) / np.maximum(np.abs(forces).max(axis=(0, 1)), 1e-6)).T
+
+
+def pad_state(result, k=-1):
+    """Of frame k along the pad: x relative to the bone, current tributary lengths, fields by name.
+
+    The nodes of a quadratic edge carry 1/6, 4/6, 1/6 of its length.
+    """
+    frame, pad = result.frames[k], result.mesh.node_sets["pad"]
+    pad = pad[np.argsort(result.mesh.points[pad, 0])]
+    x = result.mesh.points[pad, 0] + frame.displacement[pad, 0] - frame.position
+    length = np.zeros(len(pad))
+    edge = x[2::2] - x[:-2:2]
+    length[1::2] += edge * 4.0 / 6.0
+    length[:-2:2] += edge / 6.0
+    length[2::2] += edge / 6.0
+    names = ("contact_pressure", "shear_traction", "contact_status", "gap")
+    return x, length, {name: getattr(frame, name)[pad] for name in names}

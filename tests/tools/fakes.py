@@ -1,12 +1,11 @@
-"""A square of four cells that is pressed and slid: its mesh, a scene file, and a small made-up result."""
+"""A square of four cells that is pressed and slid: a scene file, and a small made-up result."""
 
 import numpy as np
 
-from evfem.mesh.mesh import Mesh
 from evfem.simulation.result import COLUMNS, Frame, Result
+from tools.meshes import square_mesh
 
-KINDS = ("quad", "quad9", "triangle", "triangle6")
-#: a scene file but for its motion, beside `square_mesh` in square.vtu
+#: a scene file but for its motion, beside `meshes.square_mesh` in square.vtu
 SQUARE_SCENE = """
 version = 1
 [finger]
@@ -23,38 +22,6 @@ nu = 0.3
 kind = "flat"
 friction = 0.2
 """
-
-
-def square_mesh(kind="quad"):
-    """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side `bone`."""
-    n = 5 if kind in ("quad9", "triangle6") else 3
-    x, y = np.meshgrid(np.linspace(-1, 1, n), np.linspace(0, 2, n))
-    number = np.arange(n * n).reshape(n, n)
-    step = 2 if n == 5 else 1
-    cells, region = [], []
-    for j in range(0, n - 1, step):
-        for i in range(0, n - 1, step):
-            block = number[j : j + step + 1, i : i + step + 1]
-            new = _cells(block, kind)
-            cells += new
-            region += [int(j > 0)] * len(new)
-    sets = {"pad": number[0], "bone": number[-1]}
-    points = np.column_stack([x.ravel(), y.ravel()])
-    names = {"soft": 0, "hard": 1}
-    return Mesh(
-        points, np.array(cells), kind, np.array(region), names, {k: v.copy() for k, v in sets.items()}
-    )
-
-
-def _cells(b, kind):
-    if kind == "quad":
-        return [[b[0, 0], b[0, 1], b[1, 1], b[1, 0]]]
-    if kind == "triangle":
-        return [[b[0, 0], b[0, 1], b[1, 1]], [b[0, 0], b[1, 1], b[1, 0]]]
-    if kind == "quad9":
-        return [[b[0, 0], b[0, 2], b[2, 2], b[2, 0], b[0, 1], b[1, 2], b[2, 1], b[1, 0], b[1, 1]]]
-    lower = [b[0, 0], b[0, 2], b[2, 2], b[0, 1], b[1, 2], b[1, 1]]
-    return [lower, [b[0, 0], b[2, 2], b[2, 0], b[1, 1], b[2, 1], b[1, 0]]]
 
 
 def fake_row(step):

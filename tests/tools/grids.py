@@ -9,6 +9,7 @@ from skfem.io.meshio import from_meshio
 
 from evfem.mesh.mesh import Mesh, raised
 from evfem.tissue.space import ELEMENTS, make_space
+from tools.meshes import between
 
 #: element -> cells before they are raised to the element's order
 CELLS = {"q1": "quad", "q1_fbar": "quad", "q2": "quad", "q2p1": "quad", "p2": "triangle"}
@@ -23,13 +24,10 @@ def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=
     `upper`, the rest is `lower`. Node sets: left, right, bottom, top and outline.
     """
     nx, ny = divisions
-    x, y = np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1))
-    points = np.column_stack([x.ravel(), y.ravel()])
-    number = np.arange(points.shape[0]).reshape(ny + 1, nx + 1)
-    quads = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], -1).reshape(-1, 4)
-    cells = quads if CELLS[element] == "quad" else _halves(quads, nx)
-    sets = {"bottom": number[0], "top": number[-1], "left": number[:, 0], "right": number[:, -1]}
-    sets["outline"] = np.unique(np.concatenate(list(sets.values())))
+    base = between(*np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1)))
+    points, sets = base.points, base.node_sets
+    cells = base.cells if CELLS[element] == "quad" else _halves(base.cells, nx)
+    sets = sets | {"outline": np.unique(np.concatenate(list(sets.values())))}
     inner = np.setdiff1d(np.arange(len(points)), sets["outline"])
     shift = np.random.default_rng(5).uniform(-jitter, jitter, (len(inner), 2))
     points[inner] += shift * [size[0] / nx, size[1] / ny]
