@@ -57,7 +57,9 @@ def _vector(state: State) -> Floats:
 
 
 def _state(state: State, vector: Floats) -> State:
-    u, force, bone, squared = np.split(vector, np.cumsum([state.u.size, state.contact_force.size, 2]))
+    u, force, bone, squared = np.split(
+        vector, np.cumsum([state.u.size, state.contact_force.size, state.bone.size])
+    )
     return replace(
         state,
         u=u.reshape(state.u.shape),

@@ -85,7 +85,7 @@ class StepSolver(Protocol):
     record: Record
 
     def rest(self, bone: Floats, voltage: float) -> State:
-        """The undeformed body, translated by `bone` (2,)."""
+        """The undeformed body, translated by `bone` (dim,)."""
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2)."""
@@ -115,9 +115,9 @@ class Statics:
         self.interface, self.attraction, self._size = interface, attraction, size
 
     def rest(self, bone: Floats, voltage: float) -> State:
-        """The undeformed body, translated by `bone` (2,)."""
-        nodes = self.interface.pad.nodes.size
-        zero, still = np.zeros((nodes, 2)), np.zeros((self._size, 2))
+        """The undeformed body, translated by `bone` (dim,)."""
+        nodes, dim = self.interface.pad.nodes.size, len(bone)
+        zero, still = np.zeros((nodes, dim)), np.zeros((self._size, dim))
         state = State(
             u=still + bone,
             contact_force=zero,
@@ -125,7 +125,7 @@ class Statics:
             bone=np.array(bone, dtype=float),
             voltage=voltage,
             attraction=zero,
-            reaction=np.zeros(2),
+            reaction=np.zeros(dim),
             velocity=still,
             last_increment=still,
         )

@@ -66,25 +66,25 @@ class Body:
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics
         self.terms = tuple(terms) if dynamics is None else (*terms, dynamics)
-        bone = space.mesh.node_sets["bone"]
+        bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
         free = np.setdiff1d(np.arange(space.size), bone)
-        self.size = 2 * free.size + 2
-        self.unknowns: Ints = np.empty((space.size, 2), dtype=np.int64)
-        self.unknowns[free] = np.arange(2 * free.size).reshape(-1, 2)
-        self.unknowns[bone] = [self.size - 2, self.size - 1]
-        self.bone: Ints = np.array([self.size - 2, self.size - 1])
+        self.size = dim * free.size + dim
+        self.bone: Ints = np.arange(dim * free.size, self.size)
+        self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)
+        self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
+        self.unknowns[bone] = self.bone
         self.pattern = Pattern(self.unknowns[space.nodes].reshape(len(space.nodes), -1), self.size)
 
     def reduce(self, nodal: Floats) -> Floats:
-        """Nodal forces (N, 2) to reduced forces (n,): sums over the bone."""
+        """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
         return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
 
     def expand(self, reduced: Floats) -> Floats:
-        """Reduced displacements (n,) to nodal ones (N, 2)."""
+        """Reduced displacements (n,) to nodal ones (N, dim)."""
         return reduced[self.unknowns]
 
     def forces(self, u: Floats) -> Floats:
-        """Internal nodal forces (N, 2)."""
+        """Internal nodal forces (N, dim)."""
         # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
         total = self.tissue.forces(u - u[self.space.mesh.node_sets["bone"][0]])
         for term in self.terms:
@@ -101,7 +101,7 @@ class Body:
         return self.pattern.upper(cells)
 
     def velocity(self, u: Floats) -> Floats:
-        """Nodal velocities (N, 2) at the end of a step that ends at u."""
+        """Nodal velocities (N, dim) at the end of a step that ends at u."""
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
 
     def energy(self, u: Floats) -> float:
