@@ -20,6 +20,8 @@ from evfem import cli
 from evfem.mesh import file as meshfile
 from evfem.simulation.result import COLUMNS
 
+pytestmark = pytest.mark.solver
+
 SCENE = f"""{SQUARE_SCENE}
 [output]
 every = 2

@@ -19,6 +19,8 @@ from evfem.scene.file import load
 from evfem.simulation.result import COLUMNS, Saved, csv_header
 from evfem.simulation.run import simulate
 
+pytestmark = pytest.mark.solver
+
 
 def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}

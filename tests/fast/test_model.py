@@ -44,8 +44,10 @@ def display(friction):
 
 def pad_scene(friction=0.5, voltage=1000.0, motion=PRESS_AND_SLIDE, **more):
     law = ev.Kaczmarek()
-    parts = {"law": law, "voltage": voltage, "motion": motion, "output": ev.Output(every=1000)}
-    return ev.Scene(HALF_FINGER, display(friction), **parts, **more)
+    output = ev.Output(every=1000)
+    return ev.Scene(
+        HALF_FINGER, display(friction), law=law, voltage=voltage, motion=motion, output=output, **more
+    )
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,8 @@ import pytest
 
 from evfem import data
 
+pytestmark = pytest.mark.solver
+
 NOTEBOOKS = Path(__file__).parents[2] / "studies" / "notebooks"
 NAMES = ("compare_participants", "design_a_voltage_signal", "explore_a_scene")
 

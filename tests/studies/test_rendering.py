@@ -13,6 +13,8 @@ import pytest
 from evfem.errors import InputError, NotConverged
 from evfem.simulation.rendering import ApparentFriction
 
+pytestmark = pytest.mark.solver
+
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 names = ("fig12", "fig13", "rendered", "parallel")
 fig12, fig13, rendered, parallel = (importlib.import_module(f"{studies.__name__}.{name}") for name in names)
