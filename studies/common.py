@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evfem import data
+from evfem.common.arrays import Floats
 from evfem.common.storage import disk, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
@@ -21,8 +21,6 @@ from evfem.simulation.result import origin
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 LAWS: dict[str, StrongTroxel | Kaczmarek] = {"strong_troxel": StrongTroxel(), "kaczmarek": Kaczmarek()}
 LABELS = {"strong_troxel": "Strong-Troxel", "kaczmarek": "Kaczmarek"}

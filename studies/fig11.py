@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 
 from evfem import data
+from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, PowerFit, fit_power
 
 from . import fig11_panels
-from .common import LAWS, Floats, Series, Study, table2_layers
+from .common import LAWS, Series, Study, table2_layers
 from .fig11_panels import PAPER_FIT
 from .pressing import Case, Pad, Pressed, phases, run_all
 

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .common import COLOURS, Floats, new_figure, panel_letter
+from evfem.common.arrays import Floats
+
+from .common import COLOURS, new_figure, panel_letter
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

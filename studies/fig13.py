@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
@@ -24,7 +25,7 @@ from evfem.simulation.model import placed
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.simulation.result import Frame, Result
 
-from .common import COLOURS, Floats, Series, Study, make_folder, new_figure
+from .common import COLOURS, Series, Study, make_folder, new_figure
 from .rendered import (
     ASSUMPTIONS,
     QUICK_TEXTURE,

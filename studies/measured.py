@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.electrostatics.forces import EllipsoidalPad, pad_force
 
-from .common import CASES, LAWS, Floats, participants, table2_layers
+from .common import CASES, LAWS, participants, table2_layers
 
 INCLINATION = np.radians(30.0)  # of the finger against the plate, section 2.2
 

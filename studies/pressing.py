@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from evfem import data
+from evfem.common.arrays import Floats
 from evfem.contact.edge import contact_spans, outline_nodes
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Layer, Layers
@@ -22,7 +23,7 @@ from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import simulate
 from evfem.tissue.laws import NeoHookean
 
-from .common import LAWS, Floats
+from .common import LAWS
 from .parallel import side_by_side
 
 #: which length of the outline stands for A_j: its projection now, its arc now, its arc before deformation

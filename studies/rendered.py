@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
@@ -28,8 +29,6 @@ from evfem.simulation.rendering import (
     voltage_for,
 )
 from evfem.tissue.laws import NeoHookean
-
-from .common import Floats
 
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0

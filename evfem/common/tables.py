@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from evfem.common.arrays import Floats
 from evfem.errors import InputError
 
-Floats = NDArray[np.float64]
 #: most rows of a csv file
 MOST_ROWS = 1_000_000
 

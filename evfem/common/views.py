@@ -61,22 +61,19 @@ def table(title: str, rows: Sequence[tuple[str, str]], below: str = "") -> str:
 
 
 def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
-    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG."""
-    finite = [v for _, values in lines.values() for v in values if math.isfinite(v)]
-    low, high = min([0.0, *finite]), max([0.0, *finite])
-    scale = (HEIGHT - 4) / (high - low) if high > low else 0.0
-    drawn = [
-        f'<polyline fill="none" stroke="{html.escape(colour)}" stroke-width="1.5" points="{points}">'
-        f"<title>{html.escape(name)}</title></polyline>"
-        for name, (colour, values) in lines.items()
-        if (points := _points(values, high, scale))
-    ]
-    return f'<svg width="{WIDTH}" height="{HEIGHT}" role="img">{"".join(drawn)}</svg>'
+    """Curves over their number, {name: (colour, values)}, on one scale with zero in it, as a small SVG.
 
-
-def _points(values: Sequence[float], high: float, scale: float) -> str:
-    """At most about one point for each pixel."""
-    step = max(len(values) // WIDTH, 1)
-    picked = [(i, values[i]) for i in range(0, len(values), step) if math.isfinite(values[i])]
-    wide = (WIDTH - 4) / max(len(values) - 1, 1)
-    return " ".join(f"{2 + i * wide:.1f},{2 + (high - v) * scale:.1f}" for i, v in picked)
+    Coordinates are number and value; the view box scales them. About one point for each pixel is drawn.
+    """
+    finite = [0.0, *(v for _, values in lines.values() for v in values if math.isfinite(v))]
+    longest = max(len(values) for _, values in lines.values())
+    step, height = max(longest // WIDTH, 1), max(finite) - min(finite) or 1.0
+    drawn = ""
+    for name, (colour, values) in lines.items():
+        picked = ((i, values[i]) for i in range(0, len(values), step) if math.isfinite(values[i]))
+        points = " ".join(f"{i},{-value:.6g}" for i, value in picked)
+        style = f'stroke="{colour}" stroke-width="1.5" vector-effect="non-scaling-stroke"'
+        title = f"<title>{html.escape(name)}</title>"
+        drawn += f'<polyline fill="none" {style} points="{points}">{title}</polyline>'
+    box = f'viewBox="0 {-max(finite):.6g} {longest - 1} {height:.6g}" preserveAspectRatio="none"'
+    return f'<svg width="{WIDTH}" height="{HEIGHT}" overflow="visible" {box} role="img">{drawn}</svg>'

@@ -10,14 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
 from evfem.electrostatics.laws import Layers
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw
 
-Floats = npt.NDArray[np.float64]
 POSITIVE_FORCE = "a normal force above zero"
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.tables import Floats
+from evfem.common.arrays import Floats
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import count, real, set_frozen
 from evfem.common.storage import replacing, write_text
-from evfem.common.tables import MOST_ROWS, Floats
+from evfem.common.tables import MOST_ROWS
 from evfem.electrostatics import hjif
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
 from evfem.errors import InputError, readable

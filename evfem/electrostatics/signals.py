@@ -110,7 +110,7 @@ class VoltageProfile:
 
 @dataclass(frozen=True)
 class FollowForce:
-    """A voltage that is not given but found: whatever makes the friction force on the bone follow a wish.
+    """A voltage that is not given but found: whatever makes the friction force on the bone follow a target.
 
     `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between its rows;
     during slides the effective voltage stays between 0 and `largest_voltage` (V), elsewhere it stays as it
@@ -177,7 +177,7 @@ class Amplifier:
         """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s).
 
         Both are exact: rows are added where the profile crosses the limit, and where the amplifier, which
-        moves towards the wish as fast as it can, catches up with it. Raises InputError for a slew without
+        moves towards the target as fast as it can, catches up with it. Raises InputError for a slew without
         a speed.
         """
         cut = self._clipped(profile)
@@ -209,8 +209,8 @@ def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
     now = float(profile.voltage[0])
     rows = [(float(profile.position[0]), now)]
     for i in np.flatnonzero(np.diff(profile.position) > 0):
-        (x, end), (wish, last) = profile.position[i : i + 2], profile.voltage[i : i + 2]
-        slope, lag = (last - wish) / (end - x), now - wish
+        (x, end), (target, last) = profile.position[i : i + 2], profile.voltage[i : i + 2]
+        slope, lag = (last - target) / (end - x), now - target
         side = np.sign(lag)
         closing = steepest + side * slope
         if lag != 0.0 and abs(lag) >= closing * (end - x):  # never catches up on this piece
@@ -218,7 +218,7 @@ def _no_steeper(profile: VoltageProfile, steepest: float) -> VoltageProfile:
         else:
             if lag != 0.0:
                 x += abs(lag) / closing
-                now = wish + abs(lag) / closing * slope
+                now = target + abs(lag) / closing * slope
                 rows.append((x, now))
             now = last if abs(slope) <= steepest else now + np.sign(slope) * steepest * (end - x)
         rows.append((end, now))

@@ -20,6 +20,7 @@ import numpy as np
 
 import evfem
 from evfem.common.arrays import Floats, Ints
+from evfem.common.checks import plain
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.common.tables import csv_text
@@ -123,7 +124,7 @@ class Result:
     @property
     def rows(self) -> list[dict[str, Any]]:
         """The history as one dictionary per step, plain Python numbers."""
-        columns = [_plain(getattr(self, name)) for name in COLUMNS]
+        columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
         return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def summary(self) -> dict[str, Any]:
@@ -255,10 +256,6 @@ def _json(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _plain(column: Any) -> list[Any]:
-    return column.tolist() if isinstance(column, np.ndarray) else list(column)
-
-
 @cache
 def versions() -> dict[str, str]:
     """Versions of evfem, Python and the packages that compute, as far as they are installed."""
@@ -319,8 +316,8 @@ class Checkpoint:
         """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
-        plain = [{name: _python(value) for name, value in row.items()} for row in rows]
-        header["rows"] = np.array(json.dumps(plain))
+        plain_rows = [{name: plain(value) for name, value in row.items()} for row in rows]
+        header["rows"] = np.array(json.dumps(plain_rows))
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
 
     def read(self, scene_digest: str) -> Saved:
@@ -359,10 +356,6 @@ def _check_rows(rows: Any) -> None:
             raise ValueError(f"row {step}")
         if not all(math.isfinite(row[name]) for name in RESUMED):
             raise ValueError(f"row {step}")
-
-
-def _python(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value
 
 
 def _mesh_arrays(mesh: Mesh) -> dict[str, np.ndarray]:

@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 from statistics import NormalDist
 
 import numpy as np
-from numpy.typing import NDArray
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import choice, count, real, set_frozen
 from evfem.errors import InputError
 
-Floats = NDArray[np.float64]
 METHODS = ("latin_hypercube", "random")
 MOST_SAMPLES = 100_000
 

@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.mesh.mesh import Mesh
 from evfem.tissue.laws import NeoHookean
 
 from ..benchmark import benchmark_mesh
-from ..common import Floats
 
 SCENES = ("A", "B", "C")
 MATERIALS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}

@@ -141,7 +141,6 @@ class Group:
 
 #: outcomes that count as passed, and the others
 PASSED = ("passed", "refused", "stopped")
-FAILED = ("wrong", "not converged", "error")
 
 
 @dataclass(frozen=True)

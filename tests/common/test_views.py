@@ -87,11 +87,10 @@ def test_a_result_shows_how_far_it_came_and_its_end():
     assert caption == "Result of 'fake': 4 of 4 steps, 2 with fields, 9 nodes"
     assert found["tangential force"] == "2 N/mm"
     points = [[float(v) for v in pair.split(",")] for pair in curves[1].get("points").split()]
-    # tangential forces 11/7 ... 14/7 N/mm on a scale of 44 pixels from 0 to the largest, 14/7
-    assert [y for _, y in points] == pytest.approx(
-        [2 + 44 * (14 - n) / 14 for n in (11, 12, 13, 14)], abs=0.06
-    )
-    assert [x for x, _ in points] == pytest.approx([2.0, 80.7, 159.3, 238.0], abs=0.06)
+    # tangential forces 11/7 ... 14/7 N/mm, y downwards; the box reaches from 0 to the largest, 14/7
+    assert points == [[i, pytest.approx(-n / 7, rel=1e-5)] for i, n in enumerate((11, 12, 13, 14))]
+    box = ElementTree.fromstring(result._repr_html_()).find(".//svg").get("viewBox")
+    assert [float(v) for v in box.split()] == pytest.approx([0.0, -2.0, 3.0, 2.0])
 
 
 def test_results_without_or_with_odd_steps():
