@@ -168,8 +168,8 @@ def difference(function: Callable[..., Array], x: Array, step: float, rank: int 
     def column(index: tuple[int, ...]) -> Array:
         shift = np.zeros(np.shape(x))
         shift[index] = step
-        changes = (c * (function(x + n * shift) - function(x - n * shift)) for n, c in DIFFERENCE)
-        return sum(changes) / step
+        changes = [c * (function(x + n * shift) - function(x - n * shift)) for n, c in DIFFERENCE]
+        return np.sum(changes, axis=0) / step
 
     return _columns(column, x, rank)
 

@@ -98,7 +98,7 @@ class Points:
     normal: Floats | None = None
 
     def rows(self, parts: Parts) -> Floats:
-        """(C, Q, r, n): displacements of one component to its parts r."""
+        """(C, Q, m, n): displacements of one component to its parts."""
         wanted = [self.value[:, :, None]] if parts.value else []
         wanted += [np.swapaxes(self.gradient, 2, 3)] if parts.grad else []
         empty = np.zeros((*self.weight.shape, 0, self.nodes.shape[1]))
@@ -129,12 +129,12 @@ def _flat_rows(gradient: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Parts `x` (K, C, Q) of the displacement, and where theta is among them grad u (dim, dim, C, S) at its
-    samples.
+    """Parts `x` (K, C, Q) of the displacement, and grad u `sampled` (dim, dim, C, S) where ln J is; no
+    samples where theta is not among the parts.
     """
 
     x: Floats
-    sampled: Floats | None
+    sampled: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,13 @@ class Integral:
 
     @cached_property
     def _rows(self) -> Floats:
+        """(C, Q, m, n): displacements of one component to its parts."""
         return self.points.rows(self.parts)
+
+    @property
+    def _volume(self) -> VolumeMeasure:
+        assert self.points.volume is not None, "no volume measure on facets"
+        return self.points.volume
 
     def state(self, u: Floats) -> State:
         """What the form sees of the displacements u (N, dim)."""
@@ -165,8 +171,8 @@ class Integral:
         x = np.empty((parts.size, C, Q))
         x[: m * parts.dim] = values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
         if not parts.theta:
-            return State(x, None)
-        volume = self.points.volume
+            return State(x, np.empty((parts.dim, parts.dim, C, 0)))
+        volume = self._volume
         if parts.grad and volume.gradient is self.points.gradient:
             sampled = parts.field(x).grad
         else:
@@ -208,7 +214,7 @@ class Integral:
         flux = s[: m * self.parts.dim].reshape(m, -1, C, Q).transpose(2, 3, 0, 1)
         fe = np.swapaxes(self._rows.reshape(C, Q * m, n), 1, 2) @ flux.reshape(C, Q * m, -1)
         if self.parts.theta:
-            volume = self.points.volume
+            volume = self._volume
             pull = volume.at_samples(s[-1]) * transpose(volume.slope(state.sampled))
             pull = pull.transpose(2, 3, 0, 1).reshape(C, -1, self.parts.dim)
             fe += np.swapaxes(volume.to_gradient, 1, 2) @ pull
@@ -221,7 +227,7 @@ class Integral:
         D = self.derivatives(state.x) * self.points.weight
         K = self._gradient_products(D[: m * dim, : m * dim])
         if self.parts.theta:
-            volume = self.points.volume
+            volume = self._volume
             push = volume.push(state.sampled)
             K += self._theta_products(D, volume.rows(push)).reshape(K.shape)
             if not volume.small_strain:

@@ -70,17 +70,19 @@ def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
     random = np.random.default_rng(1).uniform(-SIZE, SIZE, (2, all_parts.size, *x.shape[1:]))
     used: set[str] = set()
-    watched = []
-    for stacked in random:
-        field = all_parts.field(stacked)
-        watched.append(_Watched(field, field.grad, None if boundary else field.theta))
-        watched[-1].used = used
-    form(*watched, w)
+    u, v = (_watched(all_parts.field(stacked), boundary, used) for stacked in random)
+    form(u, v, w)
     parts = Parts(len(x), value=True, grad="grad" in used, theta="theta" in used)
     state = random[0, : parts.size]
     D = complex_step(lambda x: fluxes(form, parts, x, w), state, rank=1)
     skew = np.abs(D - np.swapaxes(D, 0, 1)).max()
     return Trial(parts, bool(skew <= 1e-12 * np.abs(D).max()))
+
+
+def _watched(field: Field, boundary: bool, used: set[str]) -> _Watched:
+    copy = _Watched(field, field.grad, None if boundary else field.theta)
+    copy.used = used
+    return copy
 
 
 def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
