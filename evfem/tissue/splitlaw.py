@@ -130,8 +130,11 @@ class FormLaw:
 
     @cached_property
     def shear_modulus(self) -> float:
-        """Initial shear modulus in MPa: dS12/dF12 at rest."""
-        A, _, _ = self.split_tangent(identity(2, 2), np.zeros((1, 1)))
+        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
+        A, *others = self.split_tangent(identity(2, 2), np.zeros((1, 1)))
+        if not all(np.isfinite(part).all() for part in (A, *others)):
+            allowed = "as a material a form of grad(u), u.theta, grad(v) and v.theta that is finite at rest"
+            raise InputError("material", self.form.name, allowed)
         return float(np.mean(A[0, 1, 0, 1]))
 
     def split_energy(self, F: Array, theta: Array) -> Array:

@@ -121,14 +121,17 @@ def named_edges(mesh: Mesh, name: str) -> Ints:
     return edges
 
 
-def facet_points(space: Space, name: str) -> Points:
-    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets."""
+def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | None = None) -> Points:
+    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets; `quadrature`
+    gives places (1, Q) in [0, 1] along an edge with their weights (Q,) instead of the element's own.
+    """
     import skfem
 
     kind, intorder, _ = ELEMENTS[space.element]
     grid = scikit_mesh(space.mesh)
     facets = _facets(space, grid, name)
-    basis = skfem.FacetBasis(grid, shape_functions(kind), facets=facets, intorder=intorder)
+    shape = shape_functions(kind)
+    basis = skfem.FacetBasis(grid, shape, facets=facets, intorder=intorder, quadrature=quadrature)
     return Points(
         basis.tind,
         space.nodes[basis.tind],
