@@ -131,8 +131,9 @@ class FormLaw:
     @cached_property
     def shear_modulus(self) -> float:
         """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
-        A, *others = self.split_tangent(identity(2, 2), np.zeros((1, 1)))
-        if not all(np.isfinite(part).all() for part in (A, *others)):
+        rest = identity(2, 2), np.zeros((1, 1))
+        A, c, k = self.split_tangent(*rest)
+        if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
             allowed = "as a material a form of grad(u), u.theta, grad(v) and v.theta that is finite at rest"
             raise InputError("material", self.form.name, allowed)
         return float(np.mean(A[0, 1, 0, 1]))
