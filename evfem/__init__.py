@@ -27,7 +27,7 @@ _NAMES = {
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp"),
     "scene.plan": ("plan",),
     "scene.scene": ("Output", "Scene", "Solver", "default_scene"),
-    "scene.terms": ("Boundary", "Region", "form", "grad"),
+    "scene.terms": ("Boundary", "Region"),
     "simulation.result": ("Checkpoint", "Frame", "Result"),
     "simulation.run": ("simulate",),
     "solver.strategy": ("Strategy",),
@@ -35,6 +35,7 @@ _NAMES = {
     "sweeps.run": ("SweepResult", "sweep"),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
+    "tissue.forms": ("form", "grad"),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
 }
 #: public modules -> where they are

@@ -47,8 +47,6 @@ from evfem.scene.scene import Solver as Solver
 from evfem.scene.scene import default_scene as default_scene
 from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
-from evfem.scene.terms import form as form
-from evfem.scene.terms import grad as grad
 from evfem.simulation import rendering as rendering
 from evfem.simulation import result as result
 from evfem.simulation.result import Checkpoint as Checkpoint
@@ -71,6 +69,8 @@ from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
 from evfem.tissue import laws as _laws
+from evfem.tissue.forms import form as form
+from evfem.tissue.forms import grad as grad
 from evfem.tissue.laws import LinearElastic as LinearElastic
 from evfem.tissue.laws import NeoHookean as NeoHookean
 from evfem.tissue.laws import Ogden as Ogden

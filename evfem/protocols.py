@@ -8,7 +8,7 @@ derivatives (`evfem.tensor.complex_step`), another one differences.
 part                   goes to                                   needs
 =====================  ========================================  =======================================
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
-material               ``FingerPad(materials={region: ...})``    `StressLaw` or `EnergyLaw`
+material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
 weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
 observer               ``simulate(observers=[...])``             any of `Starting`, `Stepping`, `Finishing`
@@ -53,16 +53,17 @@ class EnergyLaw(Protocol):
         """Energy per reference volume (...) in MPa at the deformation gradient F (3, 3, ...)."""
 
 
-Material = StressLaw | EnergyLaw
-
-
 class WeakForm(Protocol):
     """What `evfem.form` marks as a weak form: a function, or any object that can be called like one."""
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
         """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
-        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary.
+        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary. Over a
+        region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
         """
+
+
+Material = StressLaw | EnergyLaw | WeakForm
 
 
 @runtime_checkable

@@ -17,6 +17,8 @@ Array = NDArray[Any]
 
 #: Size of the imaginary perturbation; its square vanishes beside one, so no digit is lost.
 STEP = 1e-30
+#: Central difference of sixth order: f' = sum of c (f(x + n h) - f(x - n h)) / h.
+DIFFERENCE = ((1, 3.0 / 4.0), (2, -3.0 / 20.0), (3, 1.0 / 60.0))
 
 
 def det(A: Array) -> Array:
@@ -146,12 +148,53 @@ def complex_step(function: Callable[..., Array], x: Array, *others: Any, rank: i
     >>> complex_step(det, np.array([[2.0, 1.0], [0.0, 3.0]]), rank=2).tolist()
     [[3.0, 0.0], [-1.0, 2.0]]
     """
-    stepped = np.array(x, dtype=complex)
-    columns = []
-    for index in np.ndindex(stepped.shape[:rank]):
+
+    def column(index: tuple[int, ...]) -> Array:
+        stepped = np.array(x, dtype=complex)
         stepped[index] += 1j * STEP
-        columns.append(np.imag(function(stepped, *others)) / STEP)
-        stepped[index] = x[index]
-    axes = columns[0].ndim - (stepped.ndim - rank)
+        return np.imag(function(stepped, *others)) / STEP
+
+    return _columns(column, x, rank)
+
+
+def difference(function: Callable[..., Array], x: Array, step: float, rank: int = 0) -> Array:
+    """The derivative as in `complex_step`, by central differences of sixth order: for functions that are not
+    analytic in code, or take complex steps themselves. Errors are of the order step^6 and rounding / step.
+
+    >>> abs(float(difference(np.sin, np.array(0.0), 4e-3)) - 1.0) < 1e-14
+    True
+    """
+
+    def column(index: tuple[int, ...]) -> Array:
+        shift = np.zeros(np.shape(x))
+        shift[index] = step
+        changes = [c * (function(x + n * shift) - function(x - n * shift)) for n, c in DIFFERENCE]
+        return np.sum(changes, axis=0) / step
+
+    return _columns(column, x, rank)
+
+
+def derivative(function: Callable[[Array], Any], x: Array, step: float) -> Array:
+    """Derivative at real x (...) of a user's function that works point by point: by a complex step, or by
+    differences over `step` where the function drops the imaginary part or refuses it.
+
+    >>> float(derivative(np.sin, np.array(0.0), 1e-4))
+    1.0
+    >>> abs(float(derivative(lambda x: np.abs(x) ** 3, np.array(1.0), 1e-4)) - 3.0) < 1e-11
+    True
+    """
+    x = np.real(x)
+    try:
+        stepped = np.asarray(function(x + 1j * STEP))
+    except TypeError:  # numpy functions of real numbers alone
+        return difference(function, x, step)
+    return stepped.imag / STEP if np.iscomplexobj(stepped) else difference(function, x, step)
+
+
+def _columns(column: Callable[[tuple[int, ...]], Array], x: Array, rank: int) -> Array:
+    """Derivatives by each tensor component of x, their axes between those of the value and the trailing."""
+    shape, trailing = np.shape(x)[:rank], np.ndim(x) - rank
+    columns = [column(index) for index in np.ndindex(shape)]
+    axes = columns[0].ndim - trailing
     derivative = np.stack(columns, axis=axes)
-    return derivative.reshape(columns[0].shape[:axes] + stepped.shape[:rank] + columns[0].shape[axes:])
+    return derivative.reshape(columns[0].shape[:axes] + shape + columns[0].shape[axes:])

@@ -24,8 +24,8 @@ ROOMS = {
     "mesh": ({"numpy", "scipy", "meshio"}, "mesh quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem", "numba"},
-        "moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous space weakform forms "
-        "dynamics body",
+        "fields forms moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous space "
+        "assembly weakform userforms dynamics body",
     ),
     "finger": ({"numpy"}, "outline lattice section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),

@@ -1,6 +1,9 @@
 r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
 
-Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j.
+The attraction is a boundary traction that depends on the current gap, the weak form `attraction` below. What
+runs is its nodal rule: each pad node j carries the pressure p(g_j) of its current gap on its current
+projected length A_j. On linear edges that is the form with its quadrature points at the nodes; on quadratic
+edges the rule shares out the chord's projection instead of the curve's.
 
 Trial states that penetrate count as touching, g = 0.
 
@@ -23,9 +26,21 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats
 from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.laws import traction_derivative
+from evfem.tensor import mul, positive_part
+from evfem.tissue.forms import deformation_gradient, form
 
 #: gaps up to this (mm) count as closed
 TOUCHING = 1e-9
+
+
+@form
+def attraction(u: Any, v: Any, w: Any) -> Any:
+    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap below X + u."""
+    T = np.stack([-w.n[1], w.n[0]])
+    width = positive_part(mul(deformation_gradient(u), T)[0])
+    x, y = w.x[0] + u[0], w.x[1] + u[1]
+    gap = positive_part(y - w.surface.y - w.surface.height(x))
+    return w.law.traction(gap, w.voltage, w.layers) * width * v[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,10 +12,9 @@ from evfem.common.checks import set_frozen
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.protocols import CompleteSurface, Surface
-from evfem.tensor import STEP, Array
+from evfem.tensor import Array, derivative, difference
 
-#: central difference of fourth order: f' = sum of c (f(x + n h) - f(x - n h)) / h, and its step in mm
-DIFFERENCE = ((1, 2.0 / 3.0), (2, -1.0 / 12.0))
+#: step of differences in mm
 LENGTH = 1e-4
 
 
@@ -79,12 +77,12 @@ class OwnSurface:
     def slope(self, x: Array) -> Array:
         """The user's own slope, or the derivative of the height."""
         own = getattr(self.own, "slope", None)
-        return np.asarray(own(x)) if own is not None else _derivative(self.own.height, x)
+        return np.asarray(own(x)) if own is not None else derivative(self.own.height, x, LENGTH)
 
     def curvature(self, x: Array) -> Array:
         """The user's own curvature, or the derivative of the slope (1/mm)."""
         own = getattr(self.own, "curvature", None)
-        return np.asarray(own(x)) if own is not None else _derivative(self.slope, x)
+        return np.asarray(own(x)) if own is not None else derivative(self.slope, x, LENGTH)
 
     def friction_coefficient(self, x: Array) -> Array:
         """The user's own coefficient, or that of the number or table."""
@@ -94,25 +92,10 @@ class OwnSurface:
     def friction_slope(self, x: Array) -> Array:
         """Derivative of the friction coefficient (1/mm)."""
         own = getattr(self.own, "friction_coefficient", None)
-        return _difference(own, x) if own is not None else self.plain.friction_slope(x)
+        return difference(own, np.real(x), LENGTH) if own is not None else self.plain.friction_slope(x)
 
     def shifted(self, y: float) -> OwnSurface:
         """The same surface with its height shifted by `y` (mm)."""
         moved = copy(self)
         set_frozen(moved, y=y)
         return moved
-
-
-def _derivative(function: Callable[[Array], Any], x: Array) -> Array:
-    """Derivative at real x: by a complex step, or by differences of a function that drops it."""
-    try:
-        stepped = np.asarray(function(np.asarray(x) + 1j * STEP))
-    except TypeError:  # numpy functions of real numbers alone
-        return _difference(function, x)
-    return stepped.imag / STEP if np.iscomplexobj(stepped) else _difference(function, x)
-
-
-def _difference(function: Callable[[Array], Any], x: Array) -> Array:
-    x = np.real(x)
-    ahead = [c * (function(x + n * LENGTH) - function(x - n * LENGTH)) for n, c in DIFFERENCE]
-    return np.asarray(sum(ahead)) / LENGTH

@@ -27,7 +27,10 @@ from scipy.constants import epsilon_0 as eps_0
 from evfem.common.checks import Values, at_least, plain
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw
-from evfem.tensor import STEP
+from evfem.tensor import derivative
+
+#: step of differences of a law by its gap (mm)
+GAP_STEP = 1e-5
 
 __all__ = ["Kaczmarek", "Layer", "Layers", "StrongTroxel", "eps_0", "traction_derivative"]
 
@@ -182,17 +185,9 @@ class Kaczmarek:
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
     """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on `traction`.
 
-    A law that drops the imaginary part (it takes absolute values, say) is differenced with a step of
-    1e-6 mm instead.
+    A law that drops the imaginary part (it takes absolute values, say) is differenced over `GAP_STEP`.
     """
     own = getattr(law, "traction_derivative", None)
     if own is not None:
         return own(gap, voltage, layers)
-    stepped = law.traction(np.asarray(gap) + 1j * STEP, voltage, layers)
-    if np.iscomplexobj(stepped):
-        return plain(np.asarray(stepped).imag / STEP)
-    step = 1e-6
-    change = law.traction(np.asarray(gap) + step, voltage, layers) - law.traction(
-        np.asarray(gap) - step, voltage, layers
-    )
-    return plain(np.asarray(change / (2.0 * step)))
+    return plain(derivative(lambda g: law.traction(g, voltage, layers), np.asarray(gap), GAP_STEP))

@@ -18,7 +18,10 @@ from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Hover, VoltageRamp
 from evfem.scene.resolution import unresolved
 from evfem.scene.scene import Scene
+from evfem.scene.terms import Boundary
+from evfem.tissue.forms import Form
 from evfem.tissue.laws import split
+from evfem.tissue.userforms import Trial, tried
 
 #: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
 RIGID_BELOW = 1e-4
@@ -115,7 +118,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         _friction(scene),
         _electricity(scene),
         _time(scene),
-        _forms(scene),
+        _forms(scene, mesh),
     )
     return Plan(
         name=scene.name,
@@ -132,8 +135,9 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
 
 
 def _tissue(scene: Scene, mesh: Mesh) -> Term:
-    laws = ", ".join(sorted({type(law).__name__ for law in scene.finger.materials.values()}))
-    moduli = [split(law).shear_modulus for law in scene.finger.materials.values()]
+    materials = scene.finger.materials
+    laws = ", ".join(sorted({_law_name(law, name, mesh) for name, law in materials.items()}))
+    moduli = [split(law).shear_modulus for law in materials.values()]
     # a modulus in kPa or Pa is seen here
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli), max(moduli)))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
@@ -225,9 +229,24 @@ def _time(scene: Scene) -> Term:
     )
 
 
-def _forms(scene: Scene) -> Term:
-    names = ", ".join(f"{term.form.name} on {term.on.name}" for term in scene.forms)
-    return Term("user forms", bool(scene.forms), names or "none")
+def _forms(scene: Scene, mesh: Mesh) -> Term:
+    laws = scene.finger.materials
+    names = []
+    for form, on in ((term.form, term.on) for term in scene.forms):
+        trial = tried(mesh, form, on.name, isinstance(on, Boundary), laws.get(on.name))
+        names.append(f"{form.name} on {on.name}{_caveat(trial)}")
+    return Term("user forms", bool(names), ", ".join(names) or "none")
+
+
+def _caveat(trial: Trial) -> str:
+    """What to expect of a form whose tangent is not symmetric."""
+    return "" if trial.has_potential else " (no potential: only the symmetric part of its tangent is used)"
+
+
+def _law_name(law: Any, region: str, mesh: Mesh) -> str:
+    if isinstance(law, Form):
+        return f"{law.name}{_caveat(tried(mesh, law, region, boundary=False))}"
+    return type(law).__name__
 
 
 def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:

@@ -19,8 +19,9 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.protocols import CompleteSurface, ForceLaw, Surface
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
-from evfem.scene.terms import Boundary, Form, Region, Term
+from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
+from evfem.tissue.forms import Form
 
 ELEMENTS = ("q1", "q1_fbar", "q2", "q2p1", "p2")
 DYNAMICS = ("quasistatic", "viscous", "inertial")

@@ -19,14 +19,15 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
+from evfem.scene.terms import Boundary
 from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.state import Limits
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
-from evfem.tissue.forms import make_term
 from evfem.tissue.space import make_space
+from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import check_laws
 
 
@@ -65,11 +66,11 @@ def make_model(scene: Scene) -> Model:
     pad = make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
+    solver, laws = scene.solver, scene.finger.materials
     terms = [
-        make_term(space, term.form, term.on.name, boundary=type(term.on).__name__ == "Boundary")
+        make_term(space, term.form, term.on.name, isinstance(term.on, Boundary), laws.get(term.on.name))
         for term in scene.forms
     ]
-    solver, laws = scene.solver, scene.finger.materials
     dynamics = None
     if needed.has("time"):
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")

@@ -8,20 +8,27 @@ step,
           f = M\,(v - v_0)/\Delta t, \quad v = (u - u_0)/\Delta t .
 
 Only the shear modulus enters the viscosity, so nothing locks. The step dissipates :math:`\int S_v : (E -
-E_0)`. A step that takes no time has neither term.
+E_0)`. A step that takes no time has neither term. The forms are `kelvin_voigt` and `mass` of
+`evfem.tissue.forms`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.tensor import ddot
+from evfem.tissue.assembly import Integral, points_of
+from evfem.tissue.fields import Parts
+from evfem.tissue.forms import deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.laws import split
-from evfem.tissue.space import ELEMENTS, Space, scatter, scikit_mesh, shape_functions
-from evfem.tissue.weakform import compiled_kernels, gradient_rows
+from evfem.tissue.space import Space
+from evfem.tissue.weakform import compiled_kernels
 
 
 class Dynamics:
@@ -39,14 +46,26 @@ class Dynamics:
         self._inertia = None if self.mass is None else assembled(space, self.mass)
         self.kernels = compiled_kernels("viscous") if viscosity is not None else None
         self.step: float = 0.0
-        self._u0 = self._v0 = np.zeros((space.size, 2))
-        self._strain0: Floats = np.zeros((*space.weight.shape, 2, 2))
+        self._u0 = self._v0 = np.zeros((space.size, space.dim))
+        self._strain0: Any = None
 
     def begin(self, u: Floats, velocity: Floats, step: float) -> None:
         """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N, 2)."""
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = self._strain(u)
+            if self.kernels is None:
+                self._damping.w.step, self._damping.w.strain0 = step, self._strain0
+
+    @cached_property
+    def _damping(self) -> Integral:
+        """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each step."""
+        assert self.viscosity is not None
+        cells = np.flatnonzero(self.viscosity)
+        w = SimpleNamespace(eta=self.viscosity[cells, None], step=self.step, strain0=self._strain0)
+        return Integral(
+            kelvin_voigt, points_of(self.space, cells), Parts(self.space.dim, grad=True), w, at_once=True
+        )
 
     @property
     def beginning(self) -> tuple[Floats, float]:
@@ -61,13 +80,7 @@ class Dynamics:
         if self.viscosity is not None and self.kernels is not None:
             total += self.kernels.forces(u, *self._blocks())
         elif self.viscosity is not None:
-            F = self._gradient(u)
-            P = F @ self._stress(F) * self.space.weight[..., None, None]
-            total += scatter(
-                self.space.nodes,
-                np.einsum("eqij,eqnj->eni", P, self.space.gradient, optimize=True),
-                self.space.size,
-            )
+            total += self._damping.forces(u)
         if self._inertia is not None:
             total += self._inertia @ ((u - self._u0) / self.step**2 - self._v0 / self.step)
         return total
@@ -76,25 +89,13 @@ class Dynamics:
         """Add the terms' tangents to the cell matrices (E, 2 n, 2 n)."""
         if self.step == 0.0:
             return
-        E, Q, n, _ = self.space.gradient.shape
         if self.viscosity is not None and self.kernels is not None:
             self.kernels.add_tangent(u, *self._blocks(), cells)
         elif self.viscosity is not None:
-            F = self._gradient(u)
-            S, rate = self._stress(F), (self.viscosity / self.step)[:, None, None, None, None, None]
-            unit = np.eye(2)
-            D = np.einsum("ik,eqjl->eqijkl", unit, S)
-            D += rate * (
-                np.einsum("eqil,eqkj->eqijkl", F, F)
-                + np.einsum("eqim,eqkm,jl->eqijkl", F, F, unit, optimize=True)
-            )
-            D *= self.space.weight[..., None, None, None, None]
-            rows = gradient_rows(self.space.gradient)
-            flat = rows.reshape(E, Q * 4, 2 * n)
-            cells += np.swapaxes(flat, 1, 2) @ (D.reshape(E, Q, 4, 4) @ rows).reshape(E, Q * 4, 2 * n)
+            self._damping.add_tangent(u, cells)
         if self.mass is not None:
-            cells[:, 0::2, 0::2] += self.mass / self.step**2
-            cells[:, 1::2, 1::2] += self.mass / self.step**2
+            for i in range(self.space.dim):
+                cells[:, i :: self.space.dim, i :: self.space.dim] += self.mass / self.step**2
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, 2) in mm/s at the end of the step; zero when no time passes."""
@@ -109,8 +110,9 @@ class Dynamics:
             rate, cells, _ = self._blocks()
             squares = np.einsum("bqjl,bqjl,j->bql", change, change, np.array([1.0, 1.0, 2.0]))
             return float(np.einsum("bl,bql,bql->", 2.0 * rate, squares, cells.weight))
-        squares = np.einsum("eqij,eqij->eq", change, change)
-        return float(np.einsum("e,eq,eq->", 2.0 * self.viscosity / self.step, squares, self.space.weight))
+        damping = self._damping
+        power = 2.0 * damping.w.eta / self.step * ddot(change, change)[0]
+        return float(np.sum(power * damping.points.weight))
 
     def kinetic_energy(self, velocity: Floats) -> float:
         """Kinetic energy of nodal velocities (N, 2), N mm per mm of depth."""
@@ -118,18 +120,13 @@ class Dynamics:
             return 0.0
         return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
 
-    def _gradient(self, u: Floats) -> Floats:
-        """F (E, Q, 2, 2)."""
-        F = np.swapaxes(u[self.space.nodes], 1, 2)[:, None] @ self.space.gradient
-        F[..., 0, 0] += 1.0
-        F[..., 1, 1] += 1.0
-        return F
-
     def _strain(self, u: Floats) -> Floats:
-        """Green strain of every point: (E, Q, 2, 2), or in blocks where the compiled loops read it."""
-        return (
-            strain(self._gradient(u)) if self.kernels is None else self.kernels.strains(u, self.space.cells)
-        )
+        """Green strain of every damped point: (dim, dim, 1, C, Q) as the form takes it, or in blocks where
+        the compiled loops read it.
+        """
+        if self.kernels is not None:
+            return self.kernels.strains(u, self.space.cells)
+        return green_strain(deformation_gradient(self._damping.field(u)))[:, :, None]
 
     def _blocks(self) -> tuple[Any, ...]:
         """What the compiled loops read: viscosity over the step (B, L), cells, strains before the step."""
@@ -137,15 +134,6 @@ class Dynamics:
 
         assert self.viscosity is not None
         return blocked(self.viscosity / self.step), self.space.cells, self._strain0
-
-    def _stress(self, F: Floats) -> Floats:
-        assert self.viscosity is not None
-        return 2.0 * (self.viscosity / self.step)[:, None, None, None] * (strain(F) - self._strain0)
-
-
-def strain(F: Floats) -> Floats:
-    """Green strain (..., 2, 2) of F (..., 2, 2)."""
-    return 0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(2))
 
 
 def assembled(space: Space, matrices: Floats) -> Any:
@@ -159,13 +147,11 @@ def assembled(space: Space, matrices: Floats) -> Any:
 
 def mass_matrices(space: Space) -> Floats:
     """Consistent mass matrices per unit density (E, n, n) in mm2."""
-    import skfem
-
-    kind, intorder, _ = ELEMENTS[space.element]
-    shape = shape_functions(kind)
-    basis = skfem.Basis(scikit_mesh(space.mesh), shape, intorder=intorder)
-    N = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])
-    return np.einsum("aeq,beq,eq->eab", N, N, basis.dx, optimize=True)
+    dim = space.dim
+    cells = np.arange(len(space.nodes))
+    w = SimpleNamespace(density=1.0)
+    form = Integral(mass, points_of(space, cells), Parts(dim, value=True), w, at_once=True)
+    return np.ascontiguousarray(form.cell_tangents(np.zeros((space.size, dim)))[:, ::dim, ::dim])
 
 
 def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, inertia: bool) -> Dynamics | None:

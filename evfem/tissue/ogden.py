@@ -12,6 +12,7 @@ from evfem.common.checks import real, set_frozen
 from evfem.errors import InputError
 from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_power, transpose
 from evfem.tissue.moduli import bulk_modulus, check_rates, check_volumetric
+from evfem.tissue.splitlaw import stepped_tangent
 
 
 @dataclass(frozen=True)
@@ -107,14 +108,7 @@ class Ogden:
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """Second derivatives of W at real F and theta: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
-
-        def both(t: Array, F: Array) -> Array:
-            S, q = self.split_stress(F, t)
-            return np.concatenate([S.reshape(4, *t.shape), q[None]])
-
-        A = complex_step(lambda F: self.split_stress(F, theta)[0], F, rank=2)
-        by_theta = complex_step(both, theta, F)
-        return A, by_theta[:4].reshape(F.shape), by_theta[4]
+        return stepped_tangent(self.split_stress, F, theta)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:
         """Cauchy stress (...) out of the plane."""

@@ -1,12 +1,7 @@
-r"""Weak form of the tissue: internal forces and tangent of plane-strain hyperelasticity.
+r"""Displacement spaces: shape functions at quadrature points, and how an element measures its volume.
 
-For the energy density :math:`\psi(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law
-uses the volume change,
-
-.. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad
-          S = \partial_F\psi,\; q = \partial_\theta\psi .
-
-Laws of small strain take the trace of the strain for ln J. The elements differ only in the volume measure:
+An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak form (laws of
+small strain take the trace of the strain for ln J). The elements differ only in this measure:
 
 =========  ====================================================  =============================
 element    theta at a quadrature point                           locking at nu -> 1/2
@@ -18,9 +13,8 @@ q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
 =========  ====================================================  =============================
 
 `theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no
-unknown is added, the tangent is symmetric and the forces have a potential. With rows B = (grad u, theta) per
-quadrature point and the law's second derivatives D the tangent reads K = B^T D B + (curvature of ln J).
-Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes.
+unknown is added, the tangent is symmetric and the forces have a potential.
+Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes; dim dimensions.
 """
 
 from __future__ import annotations
@@ -47,20 +41,6 @@ ELEMENTS: Mapping[str, tuple[str, int, str]] = {
 }
 
 
-def element_for(mesh: Mesh, element: str | None) -> str:
-    """Name of the element to use on `mesh`: the given one if it fits the cells, else the recommended
-    default.
-    """
-    if element is None:
-        return "q2p1" if mesh.corners == 4 else "p2"
-    if element not in ELEMENTS or (ELEMENTS[element][0].startswith("quad") != (mesh.corners == 4)):
-        allowed = [
-            name for name, (kind, *_) in ELEMENTS.items() if kind.startswith("quad") == (mesh.corners == 4)
-        ]
-        raise InputError("solver.element", element, f"on {mesh.kind} cells: {', '.join(allowed)}")
-    return element
-
-
 def scikit_mesh(mesh: Mesh) -> Any:
     """The same mesh as a scikit-fem mesh, its nodes where ours are (curved mid-nodes included)."""
     import skfem
@@ -73,7 +53,7 @@ def scikit_mesh(mesh: Mesh) -> Any:
     if mesh.order == 1:
         return base
     quadratic = {4: skfem.MeshQuad2, 3: skfem.MeshTri2}[mesh.corners].from_mesh(base)
-    _, ours = cKDTree(straight_points(mesh)).query(quadratic.doflocs.T)
+    ours = nodes_at(straight_points(mesh), quadratic.doflocs.T)
     return type(quadratic)(np.ascontiguousarray(mesh.points[ours].T), quadratic.t)
 
 
@@ -91,19 +71,34 @@ def straight_points(mesh: Mesh) -> Floats:
     return points
 
 
+def nodes_at(points: Floats, places: Floats) -> Ints:
+    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its unknowns.
+
+    Raises `RuntimeError` where none lies within 1e-9 of the mesh's size: then the two meshes differ.
+    """
+    distance, number = cKDTree(points).query(places)
+    farthest, allowed = float(np.max(distance)), 1e-9 * float(np.ptp(points, axis=0).max())
+    if not farthest <= allowed:
+        raise RuntimeError(f"a node of scikit-fem's mesh is {farthest:g} mm away from the nearest of ours")
+    return number
+
+
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Displacement space on a mesh: nodes of every cell, gradients of the shape functions, weights and ln J
-    samples.
+    """Displacement space on a mesh: nodes of every cell, shape functions and their gradients, weights and ln
+    J samples.
 
-    `nodes` (E, n); `gradient` (E, Q, n, 2) with respect to the reference; `weight` (E, Q); `sample` (E, S, n,
-    2) gradients where ln J is sampled; `projection` (E, Q, S), or None where theta is simply ln J of the
-    quadrature point.
+    `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (E, Q, n); `gradient` (E, Q, n, dim)
+    with respect to the reference; `weight` (E, Q); `sample` (E, S, n, dim) gradients where ln J is sampled,
+    the same array as `gradient` where those are the quadrature points; `projection` (E, Q, S), or None where
+    theta is simply ln J of the quadrature point.
     """
 
     mesh: Mesh
     element: str
     nodes: Ints
+    points: Floats
+    value: Floats
     gradient: Floats
     weight: Floats
     sample: Floats
@@ -113,6 +108,11 @@ class Space:
     def size(self) -> int:
         """Number of nodes."""
         return len(self.mesh.points)
+
+    @property
+    def dim(self) -> int:
+        """Number of space dimensions."""
+        return self.mesh.points.shape[1]
 
     @cached_property
     def cells(self) -> Any:
@@ -136,24 +136,26 @@ def make_space(mesh: Mesh, element: str) -> Space:
     shape = shape_functions(kind)
     grid = scikit_mesh(mesh)
     basis = skfem.Basis(grid, shape, intorder=intorder)
-    _, node_of_dof = cKDTree(mesh.points).query(basis.doflocs.T)
-    nodes = node_of_dof[basis.element_dofs].T
-    gradient = _gradients(basis)
+    nodes = nodes_at(mesh.points, basis.doflocs.T)[basis.element_dofs].T
+    gradient = shape_gradients(basis)
     check_orientation(mesh, basis)
     projection = None
     sample = gradient
     if sampling == "centroid":
         centre = skfem.Basis(grid, shape, quadrature=(np.array([[0.5], [0.5]]), np.array([1.0])))
-        sample = _gradients(centre)
+        sample = shape_gradients(centre)
         projection = np.ones((len(nodes), gradient.shape[1], 1))
     elif sampling == "linear":
         projection = _linear_projection(np.asarray(basis.global_coordinates()), basis.dx)
+    points, weight = np.asarray(basis.global_coordinates()), np.ascontiguousarray(basis.dx)
     return Space(
         mesh,
         element,
         np.ascontiguousarray(nodes),
+        points,
+        shape_values(basis),
         gradient,
-        np.ascontiguousarray(basis.dx),
+        weight,
         sample,
         projection,
     )
@@ -167,13 +169,18 @@ def shape_functions(kind: str) -> Any:
 
 
 def scatter(nodes: Ints, fe: Floats, size: int) -> Floats:
-    """Sum of cell forces (E, n, 2) on the nodes (E, n) they belong to, (size, 2)."""
+    """Sum of cell forces (E, n, dim) on the nodes (E, n) they belong to, (size, dim)."""
     flat = nodes.ravel()
-    return np.stack([np.bincount(flat, fe[..., i].ravel(), size) for i in (0, 1)], axis=1)
+    return np.stack([np.bincount(flat, fe[..., i].ravel(), size) for i in range(fe.shape[2])], axis=1)
 
 
-def _gradients(basis: Any) -> Floats:
-    """Shape gradients of a scalar basis as (E, Q, n, 2)."""
+def shape_values(basis: Any) -> Floats:
+    """Shape functions of a scalar basis as (E, Q, n)."""
+    return np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)], axis=-1)
+
+
+def shape_gradients(basis: Any) -> Floats:
+    """Shape gradients of a scalar basis as (E, Q, n, dim)."""
     fields = [basis.basis[a][0].grad for a in range(basis.Nbfun)]
     shape = np.broadcast_shapes(*(f.shape for f in fields))
     return np.ascontiguousarray(np.stack([np.broadcast_to(f, shape) for f in fields]).transpose(2, 3, 0, 1))
@@ -193,12 +200,12 @@ def check_orientation(mesh: Mesh, basis: Any) -> None:
 
 
 def _linear_projection(x: Floats, weight: Floats) -> Floats:
-    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y}, at the
-    same points.
+    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y[, Z]}, at the
+    same points x (dim, E, Q).
     """
     centred = x - x.mean(axis=2, keepdims=True)
     centred = centred / np.abs(centred).max(axis=(0, 2), keepdims=True)
-    phi = np.stack([np.ones_like(weight), centred[0], centred[1]], axis=-1)
+    phi = np.stack([np.ones_like(weight), *centred], axis=-1)
     weighted = phi * weight[..., None]
     mass = np.swapaxes(phi, 1, 2) @ weighted
     return np.ascontiguousarray(phi @ np.linalg.solve(mass, np.swapaxes(weighted, 1, 2)))

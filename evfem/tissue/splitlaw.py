@@ -3,22 +3,41 @@
 `split(law)` returns a law that has the form already, and wraps an object that only has `P(F)` or `psi(F)` on
 F (3, 3, ...): its energy at in-plane F and theta is psi(Fbar) with Fbar = exp((theta - ln det F)/2) F in the
 plane and Fbar33 = 1, so that det Fbar = exp(theta). Derivatives come by complex step; where the second
-derivative of an energy is needed, by central differences of sixth order of the complex-step stress.
+derivative of an energy is needed, by central differences of sixth order of the complex-step stress. A weak
+form of grad u and theta can be a law too. All of it is for plane strain.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 
 from evfem.errors import InputError
-from evfem.tensor import Array, cofactor, complex_step, ddot, det, mul, symmetric_power, transpose
+from evfem.tensor import (
+    Array,
+    cofactor,
+    complex_step,
+    ddot,
+    det,
+    difference,
+    identity,
+    mul,
+    symmetric_power,
+    transpose,
+)
+from evfem.tissue.fields import Parts, fluxes
+from evfem.tissue.forms import Form
 
-#: Central difference of sixth order: f' = sum of c (f(x + n h) - f(x - n h)) / h.
-DIFFERENCE = ((1, 3.0 / 4.0), (2, -3.0 / 20.0), (3, 1.0 / 60.0))
+#: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3
+#: what a form that stands for a law may use
+PARTS = Parts(2, grad=True, theta=True)
+
+Stress = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @runtime_checkable
@@ -74,7 +93,7 @@ class UserLaw:
         Fbar = _scaled(F, theta)
         if hasattr(self.law, "psi"):
             return np.asarray(self.law.psi(embed(Fbar)))
-        return _work(self._stress, Fbar)
+        return _work(lambda F, _: (self._stress(embed(F))[:2, :2], np.zeros(())), Fbar, np.zeros(()))
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
         """S = e^a (P - (P : F) F^-T / 2) and q = e^a P : F / 2, with P at Fbar = e^a F."""
@@ -85,32 +104,86 @@ class UserLaw:
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """Second derivatives of W: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
-        x = np.concatenate([F.reshape(4, *F.shape[2:]), theta[None]])
-        rate = complex_step if hasattr(self.law, "P") else _central_difference
-        D = rate(self._stacked_stress, x, rank=1)
-        A = D[:4, :4].reshape(2, 2, 2, 2, *theta.shape)
-        return A, D[:4, 4].reshape(F.shape), D[4, 4]
-
-    def _stacked_stress(self, x: Array) -> Array:
-        """(S, q) as five components at (F, theta) as five components."""
-        S, q = self.split_stress(x[:4].reshape(2, 2, *x.shape[1:]), x[4])
-        return np.concatenate([S.reshape(4, *x.shape[1:]), q[None]])
+        if hasattr(self.law, "P"):
+            return stepped_tangent(self.split_stress, F, theta)
+        return stepped_tangent(self.split_stress, F, theta, DIFFERENCE_STEP)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:
         """Cauchy stress (...) out of the plane, P33(Fbar) / det F."""
         return self._stress(embed(_scaled(F, theta)))[2, 2] / det(F)
 
 
+class FormLaw:
+    """A weak form of grad u and theta in the split form: its fluxes are S and q.
+
+    Its energy is the work along a path from rest; what it does out of the plane is unknown, so nan. `w` is
+    the form's context; without one the place is the origin.
+    """
+
+    volume_measure: Literal["log", "trace"] = "log"
+    viscosity: float | None = None
+    density: float = 1e-9
+
+    def __init__(self, form: Form, w: Any = None) -> None:
+        self.form = form
+        self.w = w or SimpleNamespace(x=np.zeros((2, 1, 1)), n=None, law=None)
+
+    @cached_property
+    def shear_modulus(self) -> float:
+        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
+        rest = identity(2, 2), np.zeros((1, 1))
+        A, c, k = self.split_tangent(*rest)
+        if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
+            allowed = "as a material a form of grad(u), u.theta, grad(v) and v.theta that is finite at rest"
+            raise InputError("material", self.form.name, allowed)
+        return float(np.mean(A[0, 1, 0, 1]))
+
+    def split_energy(self, F: Array, theta: Array) -> Array:
+        """W(F, theta) (C, Q) at real F."""
+        return _work(self.split_stress, F, theta)
+
+    def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
+        """S (2, 2, C, Q) and q (C, Q)."""
+        s = fluxes(self.form, PARTS, PARTS.stacked(F - identity(2, F.ndim - 2), theta), self.w)
+        return transpose(s[:4].reshape(F.shape)), s[4]
+
+    def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
+        """Derivatives of S and q: A (2, 2, 2, 2, C, Q), c (2, 2, C, Q), k (C, Q)."""
+        return stepped_tangent(self.split_stress, F, theta)
+
+    def split_sigma_zz(self, F: Array, theta: Array) -> Array:
+        """nan (C, Q): a form in the plane does not say."""
+        return np.full(theta.shape, np.nan)
+
+
 def split(law: Any) -> SplitLaw:
-    """The law itself if it has the split form, else a `UserLaw` around its `P(F)` or `psi(F)`.
+    """The law itself if it has the split form, else a `FormLaw` around a form or a `UserLaw` around `P(F)` or
+    `psi(F)`.
 
     Raises `InputError` for an object that has none of them.
     """
     if isinstance(law, SplitLaw):
         return law
+    if isinstance(law, Form):
+        return cast(SplitLaw, FormLaw(law))
     if not (hasattr(law, "P") or hasattr(law, "psi")):
-        raise InputError("material", law, "a law of evfem, or an object with a method P(F) or psi(F)")
+        allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
+        raise InputError("material", law, allowed)
     return cast(SplitLaw, UserLaw(law))
+
+
+def stepped_tangent(
+    stress: Stress, F: Array, theta: Array, step: float | None = None
+) -> tuple[Array, Array, Array]:
+    """A, c, k of a law by its split stress: by complex steps, or by differences over `step`."""
+
+    def stacked(x: Array) -> Array:
+        S, q = stress(x[:4].reshape(2, 2, *x.shape[1:]), x[4])
+        return np.concatenate([S.reshape(4, *x.shape[1:]), q[None]])
+
+    x = np.concatenate([F.reshape(4, *F.shape[2:]), theta[None]])
+    D = complex_step(stacked, x, rank=1) if step is None else difference(stacked, x, step, rank=1)
+    return D[:4, :4].reshape(2, 2, *F.shape), D[:4, 4].reshape(F.shape), D[4, 4]
 
 
 def _scale(F: Array, theta: Array) -> Array:
@@ -121,11 +194,11 @@ def _scaled(F: Array, theta: Array) -> Array:
     return _scale(F, theta) * F
 
 
-def _work(stress: Any, F: Array) -> Array:
-    """Integral of P : dF from rest to in-plane F along R(t phi) (I + t (U - I)), 0 <= t <= 1."""
+def _work(stress: Stress, F: Array, theta: Array) -> Array:
+    """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)) and t theta, 0 <= t <= 1."""
     U = symmetric_power(mul(transpose(F), F), 0.5)
     phi = np.arctan2(F[1, 0] - F[0, 1], F[0, 0] + F[1, 1])
-    eye = np.eye(2).reshape((2, 2) + (1,) * phi.ndim)
+    eye = identity(2, phi.ndim)
     work = np.zeros(phi.shape)
     for node, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
         t = 0.5 * (node + 1.0)
@@ -133,16 +206,6 @@ def _work(stress: Any, F: Array) -> Array:
         R, turned = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]]) * phi
         V = eye + t * (U - eye)
         rate = mul(turned, V) + mul(R, U - eye)
-        work += 0.5 * weight * ddot(stress(embed(mul(R, V)))[:2, :2], rate)
+        S, q = stress(mul(R, V), t * theta)
+        work += 0.5 * weight * (ddot(S, rate) + q * theta)
     return work
-
-
-def _central_difference(function: Any, x: Array, rank: int = 1) -> Array:
-    """Derivative of function(x) (m, ...) by x (n, ...) as (m, n, ...), of sixth order."""
-    columns = []
-    for i in range(len(x)):
-        step = np.zeros((len(x),) + (1,) * (x.ndim - rank))
-        step[i] = DIFFERENCE_STEP
-        ahead = sum(c * (function(x + n * step) - function(x - n * step)) for n, c in DIFFERENCE)
-        columns.append(ahead / DIFFERENCE_STEP)
-    return np.stack(columns, axis=1)

@@ -1,26 +1,13 @@
-r"""Weak form of the tissue: internal forces and tangent of plane-strain hyperelasticity.
+r"""The tissue: internal forces, tangent, energy and stresses of plane-strain hyperelasticity.
 
-For the energy density :math:`\psi(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law
-uses the volume change,
+For the energy density :math:`W(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law
+uses the volume change and is the measure of the element (`evfem.tissue.space`),
 
 .. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad
-          S = \partial_F\psi,\; q = \partial_\theta\psi .
+          S = \partial_F W,\; q = \partial_\theta W .
 
-Laws of small strain take the trace of the strain for ln J. The elements differ only in the volume measure:
-
-=========  ====================================================  =============================
-element    theta at a quadrature point                           locking at nu -> 1/2
-=========  ====================================================  =============================
-q1 q2 p2   ln J of that point                                    yes (q1), mild (q2, p2)
-q1_fbar    ln J at the centroid, which is F-bar with             no
-           Fbar = (J0/J)^(1/2) F (10.1016/0020-7683(95)00259-6)
-q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
-=========  ====================================================  =============================
-
-`theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no
-unknown is added, the tangent is symmetric and the forces have a potential. With rows B = (grad u, theta) per
-quadrature point and the law's second derivatives D the tangent reads K = B^T D B + (curvature of ln J).
-Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes.
+Each region is an integral of one form: `neo_hookean` for that law, `hyperelastic` for every other, or the
+user's own. For the plane: the laws are in plane strain.
 """
 
 from __future__ import annotations
@@ -28,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from importlib import import_module
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -35,7 +23,14 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
+from evfem.tensor import det, identity
+from evfem.tissue.assembly import Integral, UserIntegral, points_of
+from evfem.tissue.fields import Field, Parts
+from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
 from evfem.tissue.space import Space, scatter
+
+#: what the tissue's forms use: F, S by the gradient, and the volume measure
+PARTS = Parts(2, grad=True, theta=True)
 
 
 class Tissue:
@@ -46,122 +41,67 @@ class Tissue:
     """
 
     def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
-        from evfem.tissue import laws as materials
+        from evfem.tissue.laws import split
 
         self.space = space
         self.groups: list[tuple[Any, Ints]] = [
-            (materials.split(law), space.mesh.cells_of(name)) for name, law in laws.items()
+            (split(law), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
-        measures = [(law.volume_measure, cells) for law, cells in self.groups]
-        self._small_strain = np.concatenate(
-            [c for m, c in measures if m == "trace"] or [np.zeros(0, np.int64)]
-        )
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
         self.kernels = compiled_kernels("elastic") if self.mu is not None else None
-        self._rows: Floats | None = None
 
-    # -- kinematics
-    # -------------------------------------------------------------------------------------------------
-
-    def kinematics(self, u: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """F (2, 2, E, Q), theta (E, Q), J at the samples (E, S) and F^-T there (E, S, 4) for u (N, 2)."""
-        space = self.space
-        ue = np.swapaxes(u[space.nodes], 1, 2)[:, None]
-        F = ue @ space.gradient
-        Fs = F if space.sample is space.gradient else ue @ space.sample
-        trace = Fs[..., 0, 0] + Fs[..., 1, 1]
-        # J - 1 keeps the digits that J loses where tissue is nearly incompressible
-        change = trace + (Fs[..., 0, 0] * Fs[..., 1, 1] - Fs[..., 0, 1] * Fs[..., 1, 0])
-        J = 1.0 + change
-        F[..., 0, 0] += 1.0
-        F[..., 1, 1] += 1.0
-        if Fs is not F:
-            Fs[..., 0, 0] += 1.0
-            Fs[..., 1, 1] += 1.0
-        with np.errstate(invalid="ignore", divide="ignore"):
-            log_J = np.log1p(change)
-            cofactor = np.stack([Fs[..., 1, 1], -Fs[..., 1, 0], -Fs[..., 0, 1], Fs[..., 0, 0]], axis=-1)
-            inverse = cofactor / J[..., None]
-        small = self._small_strain
-        log_J[small] = trace[small]
-        inverse[small] = np.array([1.0, 0.0, 0.0, 1.0])
-        theta = log_J if space.projection is None else (space.projection @ log_J[..., None])[..., 0]
-        return np.moveaxis(F, (2, 3), (0, 1)), theta, J, inverse
+    @cached_property
+    def regions(self) -> list[tuple[Any, Integral]]:
+        """Law and form of each group."""
+        return [make_region(self.space, law, cells) for law, cells in self.groups]
 
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
         if self.kernels is not None:
             return self.kernels.smallest_J(u, self.space.cells)
-        return float(self.kinematics(u)[2].min())
-
-    # -- residual, tangent, energy
-    # ----------------------------------------------------------------------------------
+        return min(integral.smallest_J(u) for _, integral in self.regions)
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
         if self.kernels is not None:
             return self.kernels.forces(u, *self._blocks)
-        F, theta, _, inverse = self.kinematics(u)
-        S, q = self._stress(F, theta)
-        space, w = self.space, self.space.weight
-        fe = np.einsum("ijeq,eqnj,eq->eni", S, space.gradient, w, optimize=True)
-        samples = self._to_samples(q * w)
-        fe += np.einsum(
-            "es,esij,esnj->eni",
-            samples,
-            inverse.reshape(*inverse.shape[:2], 2, 2),
-            space.sample,
-            optimize=True,
-        )
+        fe = np.empty((*self.space.nodes.shape, self.space.dim))
+        for _, integral in self.regions:
+            fe[integral.points.cells] = integral.cell_forces(u)
         return scatter(self.space.nodes, fe, self.space.size)
 
     def tangent(self, u: Floats) -> Floats:
         """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
         if self.kernels is not None:
             return self.kernels.tangent(u, *self._blocks, len(self.space.nodes))
-        F, theta, _, inverse = self.kinematics(u)
-        _, q = self._stress(F, theta)
-        A, c, k = self._moduli(F, theta)
-        E, Q = theta.shape
-        D = np.empty((E, Q, 5, 5))
-        D[..., :4, :4] = np.moveaxis(A.reshape(4, 4, E, Q), (2, 3), (0, 1))
-        D[..., :4, 4] = D[..., 4, :4] = np.moveaxis(c.reshape(4, E, Q), 0, -1)
-        D[..., 4, 4] = k
-        D *= self.space.weight[..., None, None]
-        B = self._gradient_rows()
-        theta_rows = self._theta_rows(inverse)
-        rows = np.concatenate([B, theta_rows[:, :, None]], axis=2)
-        flat = rows.reshape(E, Q * 5, -1)
-        K = np.swapaxes(flat, 1, 2) @ (D @ rows).reshape(E, Q * 5, -1)
-        return K + self._log_curvature(self._to_samples(q * self.space.weight), inverse)
+        E, n = self.space.nodes.shape
+        K = np.empty((E, self.space.dim * n, self.space.dim * n))
+        for _, integral in self.regions:
+            K[integral.points.cells] = integral.cell_tangents(u)
+        return K
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
         if self.kernels is not None:
             return self.kernels.energy(u, *self._blocks)
-        F, theta, _, _ = self.kinematics(u)
-        psi = np.empty_like(theta)
-        for law, cells in self.groups:
-            psi[cells] = law.split_energy(F[:, :, cells], theta[cells])
-        return float(np.sum(psi * self.space.weight))
+        total = 0.0
+        for law, integral in self.regions:
+            field = integral.field(u)
+            psi = law.split_energy(deformation_gradient(field), field.theta)
+            total += float(np.sum(psi * integral.points.weight))
+        return total
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
         """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,)."""
-        F, theta, _, _ = self.kinematics(u)
-        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
-        S, q = self._stress(F, theta)
-        sigma = np.empty((*theta.shape, 4))
-        push, volume, small = F.copy(), J.copy(), self._small_strain
-        push[:, :, small], volume[small] = np.eye(2)[:, :, None, None], 1.0
-        for i, a, b in ((0, 0, 0), (1, 1, 1), (3, 0, 1)):
-            sigma[..., i] = (S[a, 0] * push[b, 0] + S[a, 1] * push[b, 1] + q * (a == b)) / volume
-        for law, cells in self.groups:
-            sigma[cells, :, 2] = law.split_sigma_zz(F[:, :, cells], theta[cells])
-        w = self.space.weight / self.space.weight.sum(axis=1, keepdims=True)
-        return np.einsum("eqs,eq->es", sigma, w), np.einsum("eq,eq->e", J, w)
-
-    # -- pieces
-    # -------------------------------------------------------------------------------------------------------
+        sigma, J = np.empty((len(self.space.nodes), 4)), np.empty(len(self.space.nodes))
+        for law, integral in self.regions:
+            cells, weight = integral.points.cells, integral.points.weight
+            mean = weight / weight.sum(axis=1, keepdims=True)
+            field = integral.field(u)
+            stress = cauchy_stress(law, field)
+            sigma[cells] = np.einsum("sdq,dq->ds", stress, mean)
+            J[cells] = np.einsum("dq,dq->d", det(deformation_gradient(field)), mean)
+        return sigma, J
 
     @cached_property
     def _blocks(self) -> tuple[Any, ...]:
@@ -170,58 +110,45 @@ class Tissue:
 
         return blocked(self.mu), blocked(self.lmbda), self.space.cells
 
-    def _stress(self, F: Floats, theta: Floats) -> tuple[Floats, Floats]:
-        S, q = np.empty_like(F), np.empty_like(theta)
-        for law, cells in self.groups:
-            S[:, :, cells], q[cells] = law.split_stress(F[:, :, cells], theta[cells])
-        return S, q
 
-    def _moduli(self, F: Floats, theta: Floats) -> tuple[Floats, Floats, Floats]:
-        A, c, k = np.zeros((2, 2, *F.shape)), np.zeros_like(F), np.empty_like(theta)
-        for law, cells in self.groups:
-            A[..., cells, :], c[..., cells, :], k[cells] = law.split_tangent(F[:, :, cells], theta[cells])
-        return A, c, k
+def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
+    """A law, and its weak form over some cells."""
+    from evfem.tissue.laws import NeoHookean
+    from evfem.tissue.splitlaw import FormLaw
 
-    def _to_samples(self, values: Floats) -> Floats:
-        """Transpose of the projection: what acts on theta (E, Q), gathered where ln J is sampled (E, S)."""
-        if self.space.projection is None:
-            return values
-        return (values[:, None] @ self.space.projection)[:, 0]
-
-    def _gradient_rows(self) -> Floats:
-        """(E, Q, 4, 2 n): nodal displacements to the components (i, J) of grad u; constant, so built once."""
-        if self._rows is None:
-            self._rows = gradient_rows(self.space.gradient)
-        return self._rows
-
-    def _theta_rows(self, inverse: Floats) -> Floats:
-        """(E, Q, 2 n): nodal displacements to the change of theta."""
-        space = self.space
-        B = (
-            self._rows
-            if space.sample is space.gradient and self._rows is not None
-            else gradient_rows(space.sample)
-        )
-        rows = (inverse[:, :, None] @ B)[:, :, 0]
-        return rows if space.projection is None else space.projection @ rows
-
-    def _log_curvature(self, q: Floats, inverse: Floats) -> Floats:
-        """Second derivative of ln J: -F^-T grad(du)^T F^-T : grad(v), weighted with q (E, S)."""
-        space = self.space
-        q = q.copy()
-        q[self._small_strain] = 0.0
-        push = space.sample @ np.swapaxes(inverse.reshape(*inverse.shape[:2], 2, 2), -1, -2)
-        blocks = -np.einsum("es,esak,esbi->eaibk", q, push, push, optimize=True)
-        size = 2 * space.nodes.shape[1]
-        return blocks.reshape(len(space.nodes), size, size)
+    points = points_of(space, cells, small_strain=law.volume_measure == "trace")
+    if isinstance(law, FormLaw):
+        w = SimpleNamespace(x=points.x, n=None, law=None)
+        return FormLaw(law.form, w), UserIntegral(law.form, points, PARTS, w)
+    if type(law) is NeoHookean:
+        w = SimpleNamespace(law=law, mu=law.mu, lmbda=law.lmbda)
+        return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
+    w = SimpleNamespace(law=law)
+    return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
 
 
-def gradient_rows(gradient: Floats) -> Floats:
-    """(E, Q, n, 2) shape gradients to the (E, Q, 4, 2 n) matrix from nodal displacements to grad u."""
-    E, Q, n, _ = gradient.shape
-    rows = np.zeros((E, Q, 2, 2, n, 2))
-    rows[:, :, 0, :, :, 0] = rows[:, :, 1, :, :, 1] = np.swapaxes(gradient, 2, 3)
-    return rows.reshape(E, Q, 4, 2 * n)
+def law_moduli(u: Field, w: Any) -> Floats:
+    """Derivatives of the fluxes (S, q) of a law that knows them, (K, K, C, Q)."""
+    A, c, k = w.law.split_tangent(deformation_gradient(u), u.theta)
+    d, points = len(c), u.theta.shape
+    D = np.empty((d * d + 1, d * d + 1, *points))
+    # the stacked parts run through the transposed gradient
+    D[:-1, :-1].reshape(d, d, d, d, *points)[:] = A.transpose(1, 0, 3, 2, 4, 5)
+    D[:-1, -1].reshape(d, d, *points)[:] = np.swapaxes(c, 0, 1)
+    D[-1, :-1], D[-1, -1] = D[:-1, -1], k
+    return D
+
+
+def cauchy_stress(law: Any, u: Field) -> Floats:
+    """Cauchy stress (4, C, Q) as xx, yy, zz, xy."""
+    F, small = deformation_gradient(u), law.volume_measure == "trace"
+    S, q = law.split_stress(F, u.theta)
+    push, volume = (identity(2, 2), 1.0) if small else (F, det(F))
+    xx, yy, xy = (
+        (S[a, 0] * push[b, 0] + S[a, 1] * push[b, 1] + q * (a == b)) / volume
+        for a, b in ((0, 0), (1, 1), (0, 1))
+    )
+    return np.stack([xx, yy, law.split_sigma_zz(F, u.theta), xy])
 
 
 def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any]:

@@ -16,8 +16,9 @@ from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.reference import PullIn, pull_in_kaczmarek, pull_in_strong_troxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene
-from evfem.scene.terms import Boundary, form
+from evfem.scene.terms import Boundary
 from evfem.simulation.result import Result
+from evfem.tissue.forms import form
 from evfem.tissue.laws import NeoHookean
 
 from ..common import LAWS

@@ -1,12 +1,20 @@
 """Electrostatic forces on the outline: directions, derivatives, energy, and the exact hover force."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from tools.grids import assembled
 
-from evfem.contact.attraction import Attraction
-from evfem.contact.pad import Pad
+from evfem.contact.attraction import Attraction, attraction
+from evfem.contact.pad import Pad, make_pad
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.finger.fingerpad import FingerPad
+from evfem.tissue.assembly import Integral
+from evfem.tissue.fields import Parts
+from evfem.tissue.space import make_space
+from evfem.tissue.userforms import facet_points
 
 LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
 SURFACES = [Flat(y=-1.0), Sinusoid(terms=[[0.05, 4.0, 0.3]], y=-1.0)]
@@ -189,3 +197,39 @@ def test_hover_force_of_half_an_ellipse_on_sixty_edges(order, voltage, gap, exac
     attraction = Attraction(Kaczmarek(), LAYERS, pad, Flat(y=-6.395 - gap))
     force = -attraction.forces(position, voltage, everyone(attraction))[:, 1].sum()
     assert force == pytest.approx(exact, rel=5e-4)
+
+
+@pytest.mark.parametrize(("order", "total"), [(1, 1e-14), (2, 3e-3)])
+@surfaces
+def test_nodal_rule_is_the_weak_form_with_its_points_at_the_nodes(order, total, surface):
+    """Exactly, tangent too, on linear edges; on quadratic ones it projects chords (sum 1.9e-3 apart)."""
+    mesh = FingerPad(resolution="coarse").mesh(order)
+    space, pad = make_space(mesh, {1: "q1", 2: "q2p1"}[order]), make_pad(mesh)
+    surface = surface.shifted(mesh.points[:, 1].min() - 0.2)
+    x, y = mesh.points.T
+    u = 0.02 * np.column_stack([np.sin(x) * (2.0 - y), np.cos(2.0 * x)])
+    position = (mesh.points + u)[pad.nodes]
+    rule = Attraction(Kaczmarek(), LAYERS, pad, surface)
+    weights = {1: [1 / 2, 1 / 2], 2: [1 / 6, 4 / 6, 1 / 6]}[order]
+    quadrature = (np.linspace(0.0, 1.0, order + 1)[None], np.array(weights))
+    points = facet_points(space, "pad", quadrature)
+    w = SimpleNamespace(
+        x=points.x, n=points.normal, law=rule.law, layers=LAYERS, voltage=800.0, surface=surface
+    )
+    form = Integral(attraction, points, Parts(2, value=True, grad=True), w)
+    forces = rule.forces(position, 800.0, None)
+    found = -form.forces(u)[pad.nodes]
+    assert found[:, 1].sum() == pytest.approx(forces[:, 1].sum(), rel=total)
+    if order == 2:
+        assert abs(found[:, 1].sum() / forces[:, 1].sum() - 1.0) > 1e-3
+    else:
+        np.testing.assert_allclose(found, forces, atol=2e-14 * np.abs(forces).max())
+        cells = np.zeros((len(space.nodes), 8, 8))
+        form.add_tangent(u, cells)
+        unknown = (2 * pad.nodes[:, None] + [0, 1]).ravel()
+        K = -assembled(space, cells)[unknown][:, unknown]
+        np.testing.assert_allclose(
+            K.toarray(),
+            rule.stiffness(position, 800.0, None).toarray(),
+            atol=1e-12 * np.abs(K).max(),
+        )

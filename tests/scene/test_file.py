@@ -14,8 +14,9 @@ from evfem.scene import keys
 from evfem.scene.file import dump, load, loads
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
-from evfem.scene.terms import Boundary, form
+from evfem.scene.terms import Boundary
 from evfem.solver.strategy import Strategy
+from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 
 DISPLAY = """

@@ -15,7 +15,8 @@ from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
-from evfem.scene.terms import Boundary, Region, form
+from evfem.scene.terms import Boundary, Region
+from evfem.tissue.forms import form
 
 FINGER = FingerPad()
 PRESS = Press(force=0.05)

@@ -16,7 +16,7 @@ from evfem.reference import (
     sliding_force_ratio,
     tube_inner_radius,
 )
-from evfem.tissue.forms import make_term
+from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
 

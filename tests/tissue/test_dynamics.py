@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from tools.grids import assembled, fine_points, rectangle, solve
 
-from evfem.scene.terms import form
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
-from evfem.tissue.forms import make_term
+from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean
 from evfem.tissue.space import ELEMENTS
+from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
 every_element = pytest.mark.parametrize("element", list(ELEMENTS))

@@ -10,7 +10,8 @@ from tools.laws import EnergyOnly, StressOnly, neo_hookean_stress
 import evfem as ev
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.tissue.forms import make_term
+from evfem.tissue.assembly import Integral
+from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
 MU, LMBDA = 0.7, 1.9
@@ -128,13 +129,16 @@ def test_tissue_written_as_a_form_is_the_tissue(element):
 @every_kind
 @pytest.mark.parametrize(("on", "boundary"), [("upper", False), ("left", True)])
 def test_tangent_is_the_derivative_of_the_forces(element, on, boundary):
-    """Complex step against central differences for a form that is neither linear nor symmetric."""
+    """Complex step against central differences for a form that is neither linear nor symmetric; the solver's
+    matrix gets the symmetric part."""
     space = rectangle(element, (2, 2), warp=bend, split=lambda x, y: y > 0.5)
     term = make_term(space, crooked, on, boundary)
     u = wavy(space.mesh.points)
-    cells = np.zeros((len(space.nodes), *[2 * space.nodes.shape[1]] * 2))
-    term.add_tangent(u, cells)
-    K = assembled(space, cells).toarray()
+    given = np.zeros((2, len(space.nodes), *[2 * space.nodes.shape[1]] * 2))
+    term.add_tangent(u, given[0])
+    np.add.at(given[1], term.points.cells, Integral.cell_tangents(term, u))
+    symmetric, K = (assembled(space, cells).toarray() for cells in given)
+    np.testing.assert_allclose(symmetric, 0.5 * (K + K.T), atol=1e-15)
     columns = np.empty_like(K)
     for i in range(u.size):
         step = np.zeros(u.size)
@@ -225,6 +229,49 @@ def test_form_without_a_potential():
     assert abs(force) > 1e-3
     assert result.applied_tangential_force[-1] == pytest.approx(force, rel=1e-8)
     assert result.tangential_force[-1] == 0.0
+
+
+@ev.form
+def material(u, v, w):
+    """The default tissue, in the split form."""
+    F = ev.grad(u) + np.eye(2)[:, :, None, None]
+    return MU * ev.ddot(F, ev.grad(v)) + (LMBDA * u.theta - MU) * v.theta
+
+
+@pytest.mark.parametrize("element", ["q1", "q1_fbar", "q2p1"])
+def test_form_as_a_material_is_the_tissue(element):
+    """Forces, energies and stresses in the plane of a press and slide; the stress out of it is unknown."""
+    ours, theirs = (ev.simulate(block_scene(law, element, friction=0.2)) for law in (NEO_HOOKEAN, material))
+    np.testing.assert_allclose(theirs.applied_force, ours.applied_force, rtol=1e-10)
+    np.testing.assert_allclose(theirs.stored_energy, ours.stored_energy, rtol=1e-10)
+    assert theirs.newton_iterations.tolist() == ours.newton_iterations.tolist()
+    found, expected = (result.frames[-1].cauchy_stress for result in (theirs, ours))
+    np.testing.assert_allclose(found[:, [0, 1, 3]], expected[:, [0, 1, 3]], atol=1e-12)
+    assert np.isnan(found[:, 2]).all()
+
+
+def test_form_as_a_material_knows_the_place_and_nothing_but_gradients():
+    """Stiffness that grows along x carries the mean; a material cannot depend on the displacement itself."""
+
+    def graded(u, v, w):
+        return (0.5 + 0.5 * w.x[0]) * material(u, v, w)
+
+    even, uneven = (ev.simulate(block_scene(ev.form(law))) for law in (material, graded))
+    assert uneven.applied_force[-1] == pytest.approx(even.applied_force[-1], rel=0.1)
+    ratios = [result.stored_energy[-1] / result.external_work[-1] for result in (uneven, even)]
+    assert ratios[0] == pytest.approx(ratios[1], rel=1e-2)
+    with pytest.raises(InputError, match="grad"):
+        ev.simulate(block_scene(ev.form(lambda u, v, w: material(u, v, w) + u[0] * v.theta)))
+
+
+def test_plan_says_where_a_form_has_no_potential():
+    held = block_scene(material).with_term(ev.form(lambda u, v, w: 0.2 * u[1] * v[1]), on=ev.Boundary("side"))
+    assert "potential" not in str(ev.plan(held))
+    assert "material, plane strain, shear modulus 0.7 MPa" in str(ev.plan(held))
+    pushed = block_scene().with_term(ev.form(lambda u, v, w: 0.05 * u[1] * v[0]), on=ev.Region("tissue"))
+    assert "on tissue (no potential: only the symmetric" in " ".join(str(ev.plan(pushed)).split())
+    crooked_law = ev.form(lambda u, v, w: material(u, v, w) + 0.1 * ev.grad(u)[0, 1] * ev.grad(v)[1, 1])
+    assert "(no potential: " in str(ev.plan(block_scene(crooked_law)))
 
 
 def test_terms_leave_the_scene_they_are_added_to_alone():

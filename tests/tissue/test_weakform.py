@@ -14,7 +14,7 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, inv, transpose
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.space import ELEMENTS, element_for, make_space
+from evfem.tissue.space import ELEMENTS, make_space
 from evfem.tissue.splitlaw import embed
 from evfem.tissue.weakform import Tissue, check_laws
 
@@ -353,11 +353,7 @@ def test_inverted_states_are_seen(element, compiled):
 
 
 def test_wrong_elements_and_laws_are_refused():
-    quads, triangles = rectangle("q1", (1, 1)).mesh, rectangle("p2", (1, 1)).mesh
-    assert (element_for(quads, None), element_for(triangles, None)) == ("q2p1", "p2")
-    for mesh, element in ((quads, "p2"), (triangles, "q1"), (quads, "q3")):
-        with pytest.raises(InputError, match="element"):
-            element_for(mesh, element)
+    quads = rectangle("q1", (1, 1)).mesh
     with pytest.raises(InputError, match="quad9"):
         make_space(quads, "q2")
     with pytest.raises(InputError, match="no material for region lower"):

@@ -1,0 +1,285 @@
+r"""One engine for every weak form: nodal forces :math:`\sum_q w B^T s`, tangents :math:`\sum_q w B^T D B`.
+
+The fluxes s = df/d(v, grad v, theta(v)) of a form are its values at unit test functions
+(`evfem.tissue.fields`); a complex step on each part of (u, grad u, theta) gives their derivatives D. The rows
+B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not linear in the
+displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n nodes each, Q quadrature
+points, S samples of ln J, K parts, m of them per component; N nodes, E cells of the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.tensor import Array, cofactor, complex_step, det, identity, trace, transpose
+from evfem.tissue.fields import Field, Integrand, Parts, fluxes, fluxes_at_once
+from evfem.tissue.space import Space, scatter
+
+
+def volume_change(H: Array) -> Array:
+    """J - 1 = det(1 + H) - 1 of H (dim, dim, ...), with the digits that J loses where it is nearly 1."""
+    middle: Array | float = 0.0 if len(H) == 2 else trace(cofactor(H))
+    return trace(H) + (middle + det(H))
+
+
+@dataclass(frozen=True, eq=False)
+class VolumeMeasure:
+    """theta = Pi ln J of some cells: `gradient` (C, S, n, dim) of the shape functions where ln J is sampled;
+    `projection` (C, Q, S) is Pi, None where the samples are the quadrature points. A measure of
+    `small_strain` takes the trace of the strain for ln J.
+    """
+
+    gradient: Floats
+    projection: Floats | None
+    small_strain: bool
+
+    def at_points(self, H: Floats) -> Floats:
+        """theta (C, Q) from grad u (dim, dim, C, S) at the samples; nan where a cell is inverted."""
+        with np.errstate(invalid="ignore", divide="ignore"):
+            sampled = trace(H) if self.small_strain else np.log1p(volume_change(H))
+        return sampled if self.projection is None else (self.projection @ sampled[..., None])[..., 0]
+
+    def at_samples(self, values: Floats) -> Floats:
+        """Transpose of Pi: what acts on theta (C, Q), gathered where ln J is sampled (C, S)."""
+        return values if self.projection is None else (values[:, None] @ self.projection)[:, 0]
+
+    def slope(self, H: Floats) -> Floats:
+        """d ln J / dF = F^-T, or the unit matrix of a trace, (dim, dim, C, S)."""
+        unit = identity(len(H), 2)
+        if self.small_strain:
+            return np.broadcast_to(unit, H.shape)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return cofactor(unit + H) / (1.0 + volume_change(H))
+
+    @cached_property
+    def to_gradient(self) -> Floats:
+        """(C, S dim, n): displacements of one component to its gradient at the samples."""
+        return _flat_rows(self.gradient)
+
+    def push(self, H: Floats) -> Floats:
+        """d ln J by the nodal displacements, (C, S, n, dim)."""
+        return self.gradient @ np.ascontiguousarray(self.slope(H).transpose(2, 3, 1, 0))
+
+    def rows(self, push: Floats) -> Floats:
+        """d theta by the nodal displacements, (C, Q, n dim)."""
+        flat = push.reshape(*push.shape[:2], -1)
+        return flat if self.projection is None else self.projection @ flat
+
+    def curvature(self, push: Floats, q: Floats) -> Floats:
+        """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, weighted with q (C, Q), as (C, n, dim,
+        n, dim).
+        """
+        C, S, n, dim = push.shape
+        flat = push.reshape(C, S, n * dim)
+        products = np.swapaxes(flat, 1, 2) @ (-self.at_samples(q)[..., None] * flat)
+        return products.reshape(C, n, dim, n, dim).transpose(0, 1, 4, 3, 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Quadrature points of some cells or facets: `cells` (C,) they lie in, `nodes` (C, n) of those, shape
+    functions `value` (C, Q, n) with `gradient` (C, Q, n, dim), `weight` (C, Q), the place `x` (dim, C, Q);
+    in cells the measure of `volume`, on facets the outward `normal` (dim, C, Q).
+    """
+
+    cells: Ints
+    nodes: Ints
+    value: Floats
+    gradient: Floats
+    weight: Floats
+    x: Floats
+    volume: VolumeMeasure | None = None
+    normal: Floats | None = None
+
+    def rows(self, parts: Parts) -> Floats:
+        """(C, Q, m, n): displacements of one component to its parts."""
+        wanted = [self.value[:, :, None]] if parts.value else []
+        wanted += [np.swapaxes(self.gradient, 2, 3)] if parts.grad else []
+        empty = np.zeros((*self.weight.shape, 0, self.nodes.shape[1]))
+        return np.ascontiguousarray(np.concatenate([empty, *wanted], axis=2))
+
+
+def points_of(space: Space, cells: Ints, small_strain: bool = False) -> Points:
+    """The quadrature points of a space in some of its cells."""
+    gradient = space.gradient[cells]
+    sample = gradient if space.sample is space.gradient else space.sample[cells]
+    projection = None if space.projection is None else space.projection[cells]
+    return Points(
+        cells,
+        space.nodes[cells],
+        space.value[cells],
+        gradient,
+        space.weight[cells],
+        space.points[:, cells],
+        VolumeMeasure(sample, projection, small_strain),
+    )
+
+
+def _flat_rows(gradient: Floats) -> Floats:
+    """Gradients (C, Q, n, dim) as (C, Q dim, n)."""
+    C, Q, n, dim = gradient.shape
+    return np.swapaxes(gradient, 2, 3).reshape(C, Q * dim, n)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """Parts `x` (K, C, Q) of the displacement, and grad u `sampled` (dim, dim, C, S) where ln J is; no
+    samples where theta is not among the parts.
+    """
+
+    x: Floats
+    sampled: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Integral:
+    """A weak form over `points`: its nodal forces and their derivative.
+
+    `w` is the form's context. `moduli(u, w)` gives the fluxes' derivatives (K, K, C, Q) where they are known
+    in a faster way than by complex steps. A form whose arrays may have one more axis before (C, Q) can be
+    evaluated `at_once` for all test functions.
+    """
+
+    form: Integrand
+    points: Points
+    parts: Parts
+    w: Any
+    moduli: Callable[[Field, Any], Floats] | None = None
+    at_once: bool = False
+
+    @cached_property
+    def _rows(self) -> Floats:
+        """(C, Q, m, n): displacements of one component to its parts."""
+        return self.points.rows(self.parts)
+
+    @property
+    def _volume(self) -> VolumeMeasure:
+        assert self.points.volume is not None, "no volume measure on facets"
+        return self.points.volume
+
+    def state(self, u: Floats) -> State:
+        """What the form sees of the displacements u (N, dim)."""
+        ue, parts = u[self.points.nodes], self.parts
+        C, Q, m, n = self._rows.shape
+        values = (self._rows.reshape(C, Q * m, n) @ ue).reshape(C, Q, m, parts.dim)
+        x = np.empty((parts.size, C, Q))
+        x[: m * parts.dim] = values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
+        if not parts.theta:
+            return State(x, np.empty((parts.dim, parts.dim, C, 0)))
+        volume = self._volume
+        if parts.grad and volume.gradient is self.points.gradient:
+            sampled = parts.field(x).grad
+        else:
+            there = (volume.to_gradient @ ue).reshape(C, -1, parts.dim, parts.dim)
+            sampled = np.ascontiguousarray(there.transpose(3, 2, 0, 1))
+        x[-1] = volume.at_points(sampled)
+        return State(x, sampled)
+
+    def field(self, u: Floats) -> Field:
+        """The displacements u (N, dim) as the form sees them."""
+        return self.parts.field(self.state(u).x)
+
+    def smallest_J(self, u: Floats) -> float:
+        """Smallest volume ratio at the samples of theta."""
+        return 1.0 + float(volume_change(self.state(u).sampled).min())
+
+    # -- at the points
+    # ----------------------------------------------------------------------------------------------
+
+    def fluxes(self, x: Array) -> Array:
+        """s (K, C, Q) at the parts x (K, C, Q) of u."""
+        evaluate = fluxes_at_once if self.at_once else fluxes
+        return evaluate(self.form, self.parts, x, self.w)
+
+    def derivatives(self, x: Floats) -> Floats:
+        """D = ds/d(u, grad u, theta), (K, K, C, Q)."""
+        if self.moduli is not None:
+            return self.moduli(self.parts.field(x), self.w)
+        return complex_step(self.fluxes, x, rank=1)
+
+    # -- of the cells
+    # -------------------------------------------------------------------------------------------------
+
+    def cell_forces(self, u: Floats) -> Floats:
+        """Forces on the nodes of each cell, sum of w B^T s, (C, n, dim)."""
+        state = self.state(u)
+        C, Q, m, n = self._rows.shape
+        s = self.fluxes(state.x) * self.points.weight
+        flux = s[: m * self.parts.dim].reshape(m, -1, C, Q).transpose(2, 3, 0, 1)
+        fe = np.swapaxes(self._rows.reshape(C, Q * m, n), 1, 2) @ flux.reshape(C, Q * m, -1)
+        if self.parts.theta:
+            volume = self._volume
+            pull = volume.at_samples(s[-1]) * transpose(volume.slope(state.sampled))
+            pull = pull.transpose(2, 3, 0, 1).reshape(C, -1, self.parts.dim)
+            fe += np.swapaxes(volume.to_gradient, 1, 2) @ pull
+        return fe
+
+    def cell_tangents(self, u: Floats) -> Floats:
+        """Derivatives of the cells' forces, (C, n dim, n dim), unknowns ordered (node, component)."""
+        state, dim = self.state(u), self.parts.dim
+        C, _, m, n = self._rows.shape
+        D = self.derivatives(state.x) * self.points.weight
+        K = self._gradient_products(D[: m * dim, : m * dim])
+        if self.parts.theta:
+            volume = self._volume
+            push = volume.push(state.sampled)
+            K += self._theta_products(D, volume.rows(push)).reshape(K.shape)
+            if not volume.small_strain:
+                K += volume.curvature(push, self.fluxes(state.x)[-1] * self.points.weight)
+        return K.reshape(C, n * dim, n * dim)
+
+    def _gradient_products(self, D: Floats) -> Floats:
+        """B^T D B of value and gradient, D (m dim, m dim, C, Q), as (C, n, dim, n, dim)."""
+        (C, Q, m, n), dim = self._rows.shape, self.parts.dim
+        ordered = D.reshape(m, dim, m, dim, C, Q).transpose(4, 5, 0, 1, 3, 2)
+        right = ordered.reshape(C, Q, m * dim * dim, m) @ self._rows
+        left = np.swapaxes(self._rows.reshape(C, Q * m, n), 1, 2)
+        products = left @ right.reshape(C, Q * m, -1)
+        return np.ascontiguousarray(products.reshape(C, n, dim, dim, n).swapaxes(3, 4))
+
+    def _theta_products(self, D: Floats, rows: Floats) -> Floats:
+        """B^T D B of theta with itself and with value and gradient, (C, n dim, n dim)."""
+        right = D[-1, -1][..., None] * rows
+        if D[-1, :-1].any():
+            right += self._coupled(D[-1, :-1])
+        K = np.swapaxes(rows, 1, 2) @ right
+        if D[:-1, -1].any():
+            K += np.swapaxes(self._coupled(D[:-1, -1]), 1, 2) @ rows
+        return K
+
+    def _coupled(self, c: Floats) -> Floats:
+        """c (m dim, C, Q) times the rows of value and gradient, (C, Q, n dim)."""
+        (C, Q, m, n), dim = self._rows.shape, self.parts.dim
+        products = c.reshape(m, dim, C, Q).transpose(2, 3, 1, 0) @ self._rows
+        return np.swapaxes(products, 2, 3).reshape(C, Q, n * dim)
+
+    # -- of the mesh
+    # --------------------------------------------------------------------------------------------------
+
+    def forces(self, u: Floats) -> Floats:
+        """Nodal forces (N, dim)."""
+        return scatter(self.points.nodes, self.cell_forces(u), len(u))
+
+    def add_tangent(self, u: Floats, cells: Floats) -> None:
+        """Add the tangents to the cell matrices (E, n dim, n dim) of the whole mesh."""
+        if self.points.normal is None:
+            cells[self.points.cells] += self.cell_tangents(u)
+        else:  # a cell may have several facets
+            np.add.at(cells, self.points.cells, self.cell_tangents(u))
+
+
+class UserIntegral(Integral):
+    """The integral of a user's form. Its tangents are the symmetric part of the exact ones, which are
+    symmetric already if the form has a potential: the solver factorises a symmetric matrix.
+    """
+
+    def cell_tangents(self, u: Floats) -> Floats:
+        """(C, n dim, n dim), unknowns ordered (node, component)."""
+        exact = super().cell_tangents(u)
+        return 0.5 * (exact + np.swapaxes(exact, 1, 2))

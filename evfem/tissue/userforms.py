@@ -1,0 +1,152 @@
+"""A user's weak form over a named region or boundary, as a term of the internal forces.
+
+What the form uses of u and v (gradients, the volume measure) is found in a trial at random displacements, and
+so is whether it has a potential: then the derivative of its fluxes is symmetric. The derivative is exact, by
+complex step, but the solver's matrix is symmetric: of a form without potential it gets the symmetric part,
+while the residual is complete. The answer is the same, in a few iterations more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.tensor import Array, complex_step
+from evfem.tissue.assembly import Points, UserIntegral, points_of
+from evfem.tissue.fields import Field, Integrand, Parts, fluxes
+from evfem.tissue.space import ELEMENTS, Space, scikit_mesh, shape_functions, shape_gradients, shape_values
+
+#: cells or edges that a form is tried on, size of the trial's random displacements and gradients
+PLACES, SIZE = 16, 0.1
+
+
+def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any = None) -> UserIntegral:
+    """A form over the region, or over the outer edges of the boundary, called `on`; `law` is the region's."""
+    parts = tried(space.mesh, form, on, boundary, law).parts
+    points = facet_points(space, on) if boundary else points_of(space, space.mesh.cells_of(on))
+    return UserIntegral(form, points, parts, SimpleNamespace(x=points.x, n=points.normal, law=law))
+
+
+# -- trial
+# --------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What a form uses, and whether it has a potential, as far as random displacements show."""
+
+    parts: Parts
+    has_potential: bool
+
+
+class _Watched(Field):
+    """A field that notes in `used` which parts are asked for."""
+
+    used: set[str]
+
+    @property
+    def grad(self) -> Array:
+        """The gradient."""
+        self.used.add("grad")
+        return super().grad
+
+    @property
+    def theta(self) -> Array:
+        """The volume measure."""
+        self.used.add("theta")
+        return super().theta
+
+
+def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None) -> Trial:
+    """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown one."""
+    x, n = _edge_places(mesh, on) if boundary else _cell_places(mesh, on)
+    w = SimpleNamespace(x=x, n=n, law=law)
+    all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
+    random = np.random.default_rng(1).uniform(-SIZE, SIZE, (2, all_parts.size, *x.shape[1:]))
+    used: set[str] = set()
+    u, v = (_watched(all_parts.field(stacked), boundary, used) for stacked in random)
+    form(u, v, w)
+    parts = Parts(len(x), value=True, grad="grad" in used, theta="theta" in used)
+    state = random[0, : parts.size]
+    D = complex_step(lambda x: fluxes(form, parts, x, w), state, rank=1)
+    skew = np.abs(D - np.swapaxes(D, 0, 1)).max()
+    return Trial(parts, bool(skew <= 1e-12 * np.abs(D).max()))
+
+
+def _watched(field: Field, boundary: bool, used: set[str]) -> _Watched:
+    copy = _Watched(field, field.grad, None if boundary else field.theta)
+    copy.used = used
+    return copy
+
+
+def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
+    """Centres (dim, C, 1) of a few cells of a region."""
+    if name not in mesh.region_names:
+        raise InputError("region", name, f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}")
+    centres = mesh.points[_few(mesh.cells[mesh.cells_of(name)])].mean(axis=1)
+    return centres.T[..., None], None
+
+
+def _edge_places(mesh: Mesh, name: str) -> tuple[Floats, Floats]:
+    """Middles and outward normals (2, C, 1) of a few outer edges of a boundary."""
+    ends = mesh.points[_few(named_edges(mesh, name))[:, :2]]
+    tangent = ends[:, 1] - ends[:, 0]
+    normal = np.stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1)
+    return ends.mean(axis=1).T[..., None], normal[..., None]
+
+
+def _few(rows: Ints) -> Ints:
+    """At most `PLACES` of the rows, spread evenly."""
+    return rows[:: -(-len(rows) // PLACES)]
+
+
+# -- facets
+# --------------------------------------------------------------------------------------------------------
+
+
+def named_edges(mesh: Mesh, name: str) -> Ints:
+    """Outer edges of a boundary; raises `InputError` for an unknown name, and for one without an edge."""
+    if name not in mesh.node_sets:
+        allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
+        raise InputError("boundary", name, allowed)
+    edges = mesh.edges_of(name)
+    if not len(edges):
+        raise InputError("boundary", name, "a boundary with at least one outer edge")
+    return edges
+
+
+def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | None = None) -> Points:
+    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets; `quadrature`
+    gives places (1, Q) in [0, 1] along an edge with their weights (Q,) instead of the element's own.
+    """
+    import skfem
+
+    kind, intorder, _ = ELEMENTS[space.element]
+    grid = scikit_mesh(space.mesh)
+    facets = _facets(space, grid, name)
+    shape = shape_functions(kind)
+    basis = skfem.FacetBasis(grid, shape, facets=facets, intorder=intorder, quadrature=quadrature)
+    return Points(
+        basis.tind,
+        space.nodes[basis.tind],
+        shape_values(basis),
+        shape_gradients(basis),
+        np.asarray(basis.dx),
+        np.asarray(basis.global_coordinates()),
+        normal=np.asarray(basis.normals),
+    )
+
+
+def _facets(space: Space, grid: Any, name: str) -> Ints:
+    """scikit-fem facets of a named boundary: outer edges all of whose nodes belong to it."""
+    ends = np.sort(named_edges(space.mesh, name)[:, :2], axis=1)
+    vertices = np.unique(space.mesh.cells[:, : space.mesh.corners])
+    ours = vertices[np.sort(grid.facets, axis=0)].T
+    size = space.size
+    return np.flatnonzero(np.isin(ours[:, 0] * size + ours[:, 1], ends[:, 0] * size + ends[:, 1]))
