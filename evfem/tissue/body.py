@@ -92,8 +92,8 @@ class Body:
         return total
 
     def tangent(self, u: Floats) -> Floats:
-        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in laws
-        are symmetric).
+        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in
+        terms are symmetric, a user's form gives its symmetric part).
         """
         cells = self.tissue.tangent(u)
         for term in self.terms:

@@ -5,7 +5,8 @@ integrand of a residual, linear in v, over the reference configuration; arrays h
 those of the points. Its nodal forces and their tangent come from `evfem.tissue.assembly`.
 
 `neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop of
-evfem[fast] does; those loops are tested against them. The attraction is `evfem.contact.attraction.traction`.
+evfem[fast] does; those loops are tested against them. The attraction's form stands beside its nodal rule, in
+`evfem.contact.attraction`.
 """
 
 from __future__ import annotations

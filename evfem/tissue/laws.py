@@ -3,8 +3,8 @@
 Public form: `psi(F)` in MPa (energy per reference volume), `P(F) = dpsi/dF` (3, 3, ...) and
 `tangent(F) = dP/dF` (3, 3, 3, 3, ...) for a deformation gradient F (3, 3, ...).
 
-Split form, for plane strain (F33 = 1) and for elements whose volume change is a field of its own. F is the
-in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law uses the volume change:
+Split form, for plane strain (F33 = 1) alone and for elements whose volume change is a field of its own. F is
+the in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law uses the volume change:
 
     split_energy(F, theta)      W(F, theta), W = psi where theta = ln det F
     split_stress(F, theta)      S = dW/dF at fixed theta (2, 2, ...), q = dW/dtheta at fixed F (...)

@@ -222,7 +222,7 @@ def test_forces_equal_the_complex_step_of_an_independent_energy(element, compile
 
 
 @every_element
-def test_compiled_kernels_equal_the_array_path(element):
+def test_compiled_kernels_equal_the_plain_path(element):
     space = rectangle(element, (4, 3), warp=bend, split=lambda x, y: x + y > 1.0)
     laws = {"lower": NeoHookean(E=0.8, nu=0.3), "upper": NeoHookean(E=3.0, nu=0.4999)}
     fast, plain = Tissue(space, laws), Tissue(space, laws)

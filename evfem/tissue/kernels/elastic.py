@@ -1,8 +1,8 @@
-"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: the same sums as `Tissue`.
+"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: twins of the form `neo_hookean`.
 
 psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are
 mu (per gradient component) and lmbda (for theta). Cells come in blocks
-(`evfem.tissue.kernels.lanes`), moduli as (B, L).
+(`evfem.tissue.kernels.lanes`), moduli as (B, L). For the plane alone.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Compiled element loops for the Kelvin-Voigt stress, part of `evfem[fast]`: the same sums as `Dynamics`.
+"""Compiled element loops for the Kelvin-Voigt stress, part of `evfem[fast]`: twins of `kelvin_voigt`.
 
 S = 2 r (E - E0), r = eta / time step, E = (H + H^T + H^T H)/2 with H = grad u. Cells come in blocks
 (`evfem.tissue.kernels.lanes`), strains as (B, Q, 3, L) for 11, 22, 12, rates r as (B, L); blocks without
-viscosity are skipped.
+viscosity are skipped. For the plane alone.
 """
 
 from __future__ import annotations
