@@ -23,6 +23,10 @@ PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage
 PAD_SPARE, PAD_FEWEST   so many times more of its nodes are in play than touch, and so many more  fast model
 PAD_SPRING              stiffness of the spring that holds it without contact, relative to that   fast model
                         of a node
+SEARCH_START            where no travel of the bone settles a prescribed force, a search starts    attraction
+                        with this fraction of the largest increment
+SEARCH_END              and ends at this fraction of the force that was lacking                   attraction
+SEARCH_LIMIT            or after so many contact problems                                         attraction
 GROWTH_LIMIT            a residual so many times the smallest of the step ends it,                contact
 GROWTH_GRACE            but not before so many iterations
 SPARE                   candidates are chosen so many times more than needed, as every new        A
@@ -70,6 +74,9 @@ PAD_WEIGHT_CHANGE = 1.5
 PAD_VOLTAGE_CHANGE = 0.1
 PAD_SPARE, PAD_FEWEST = 1.2, 8
 PAD_SPRING = 1e-9
+SEARCH_START = 1.0 / 16.0
+SEARCH_END = 0.5
+SEARCH_LIMIT = 12
 GROWTH_LIMIT = 1e3
 GROWTH_GRACE = 8
 SPARE = 1.5

@@ -187,6 +187,18 @@ class LinearContactStep:
         force[near] = found.force.reshape(2, -1).T
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
+    def lacking(self, solution: StepSolution, travel: float) -> float:
+        """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step has been
+        solved with that unknown, a `travel` of the bone, given instead.
+        """
+        unknown = self.unknowns[0]
+        bone = self.bone.copy()
+        bone[unknown.axis] += travel
+        S = self.body.schur[unknown.axis - 2]
+        own = travel * (unknown.push[unknown.axis - 2] + S[unknown.axis - 2])
+        found = S @ np.concatenate([solution.moved, bone]) - self.residual[unknown.axis - 2]
+        return float(unknown.force + own - found)
+
     def _along_normal(self, moved: Floats) -> Floats:
         return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
 

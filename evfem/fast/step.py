@@ -109,11 +109,7 @@ class RememberedPad:
         coefficient of friction, and nothing else changes.
         """
         way = target.x - old.bone[0]
-        if (
-            way == 0.0
-            or old.voltage != target.drive.voltage
-            or not isinstance(getattr(self.surface, "friction", None), float)
-        ):
+        if way == 0.0 or old.voltage != target.drive.voltage or not self._same_friction(old, way):
             return False
         if self.attraction is not None and not self.attraction.air_layer:
             return False
@@ -124,6 +120,14 @@ class RememberedPad:
             held = target.bone(old.bone)[1] == old.bone[1]
         touching = old.status[old.status != OPEN]
         return bool(held and touching.size and (touching == (FORWARD if way > 0.0 else BACKWARD)).all())
+
+    def _same_friction(self, old: State, way: float) -> bool:
+        """Whether one coefficient holds wherever the pad is and will be after `way` (mm)."""
+        if not isinstance(getattr(self.surface, "friction", None), float):
+            return False
+        x = self.interface.positions(old.u)[:, 0]
+        found = np.asarray(self.surface.friction_coefficient(np.concatenate([x, x + way])))
+        return bool((found == found.flat[0]).all())
 
     def _first_guess(self, old: State, target: Target) -> State:
         """Where iterations begin: the old state, or for the first touch under a prescribed force the stored

@@ -30,6 +30,9 @@ from evfem.common.constants import (
     LARGEST_BONE_INCREMENT,
     LOST,
     REACH,
+    SEARCH_END,
+    SEARCH_LIMIT,
+    SEARCH_START,
     SHORTEST_FRACTION,
     SMALLEST_FORCE,
     SMALLEST_J,
@@ -37,6 +40,7 @@ from evfem.common.constants import (
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Drive, DrivenStep, Target
@@ -149,26 +153,35 @@ class FactorisedBody:
             after = self._linear_step(old, state, target, balance)
         except ContactNotSolved:
             # an older tangent may ask for what no contact can give
-            if self.linearisation.made_at(state):
-                raise
-            self.linearisation.factorise(state)
+            if not self.linearisation.made_at(state):
+                self.linearisation.factorise(state)
             self._anderson.reset()
-            after = self._linear_step(old, state, target, balance)
+            after = self._linear_step(old, state, target, balance, search=True)
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         height = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
         return replace(mixed, bone=np.array([after.bone[0], height]), voltage=voltage)
 
-    def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
+    def _linear_step(
+        self, old: State, state: State, target: Target, balance: Balance, search: bool = False
+    ) -> State:
+        """Solve the contact problem of the linearised body, move, shorten where cells would collapse; with
+        `search`, a travel of the bone that the problem cannot settle is searched for.
+        """
         factor = self.linearisation.factor
         saved, residual = factor.forward(-balance.forces)
         step = self._contact_step(old, state, target, residual)
-        driven = self._driven(step, state, target)
+        try:
+            driven = self._driven(step, state, target)
+            found, bone = self._limited(step, driven.solution, state, target)
+        except ContactNotSolved:
+            if not (search and step.unknowns):
+                raise
+            found, bone = self._searched(step)
+            driven = DrivenStep(found)
         if driven.change:
             saved = saved + driven.change * driven.unit
-        found, bone = self._limited(step, driven.solution, state, target)
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
         update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
         return self._moved(state, target, update)
@@ -218,9 +231,50 @@ class FactorisedBody:
         if abs(bone[1]) > self.largest_bone_increment or flies:
             # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
             # part of the way, the way the missing force pushes
-            bone[1] = np.copysign(self.largest_bone_increment, missing if flies else bone[1])
+            longest = self._longest_flight(state) if flies else self.largest_bone_increment
+            bone[1] = np.copysign(longest, missing if flies else bone[1])
             found = self._solve(replace(step, bone=bone, unknowns=()))
         return found, bone
+
+    def _longest_flight(self, state: State) -> float:
+        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as far again,
+        at least a small fraction of the largest increment.
+        """
+        gap = float(surface_state(self.interface.surface, self.interface.positions(state.u)).gap.min())
+        least = SEARCH_START * self.largest_bone_increment
+        return float(np.clip(2.0 * gap, least, self.largest_bone_increment))
+
+    def _searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
+        """The solution and the bone's increment (2,) at which the bone lacks least force, where no travel
+        settles it: an attraction that is extrapolated over a long way has none, for example.
+
+        The travel grows towards the lacking force, twice as far each time, and is halved where that
+        overshoots.
+        """
+
+        def at(travel: float) -> tuple[float, StepSolution, Floats]:
+            bone = step.bone.copy()
+            bone[step.unknowns[0].axis] += travel
+            found = self._solve(replace(step, bone=bone, unknowns=()))
+            return step.lacking(found, travel), found, bone
+
+        first = best = at(0.0)
+        travel = 0.0
+        way = float(np.copysign(SEARCH_START * self.largest_bone_increment, first[0]))
+        for _ in range(SEARCH_LIMIT):
+            try:
+                new = at(travel + way)
+            except ContactNotSolved:
+                way *= 0.5
+                continue
+            if abs(new[0]) >= abs(best[0]):
+                way *= 0.5
+                continue
+            way = -0.5 * way if new[0] * best[0] < 0.0 else 2.0 * way
+            best, travel = new, travel + (new[2] - best[2])[step.unknowns[0].axis]
+            if abs(best[0]) < SEARCH_END * abs(first[0]):
+                break
+        return best[1], best[2]
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""

@@ -2,6 +2,8 @@
 in a converged state whose physics is known; most are cases of the study of stability, beside its quick ones.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from evfem.studies.stability.case import judge
@@ -9,8 +11,8 @@ from evfem.studies.stability.study import CASES
 from tools.builders import coarse_pad
 
 from evfem.contact.surfaces import Display, Flat
-from evfem.electrostatics.laws import Layer, StrongTroxel
-from evfem.scene.motion import Press, Slide
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.run import Run, simulate
 
@@ -71,3 +73,37 @@ def test_penalised_friction_obeys_the_return_map():
         history = before[touching] + past / 20.0
         trial, limit = -20.0 * (after[touching] - history), 0.3 * pressure
         np.testing.assert_allclose(np.clip(trial, -limit, limit), shear, atol=1e-7)
+
+
+@pytest.mark.parametrize(("law", "voltage"), [(Kaczmarek(), 1500.0), (StrongTroxel(), 500.0)])
+@pytest.mark.parametrize("ridges", [False, True])
+def test_a_hovering_pad_falls_onto_the_display_under_a_small_force(law, voltage, ridges):
+    """No equilibrium with that force is near: the attraction grows faster on the way down than the finger
+    stiffens. The bone flies to the surface and a little beyond, not as far as it may, and where the linear
+    problem has no travel that settles the force, the one that lacks least is taken.
+    """
+    surface = Display(Layer(0.05, 3.35), friction=0.3)
+    motion = [Hover(gap=0.1, steps=1), Press(force=0.002, steps=2)]
+    result = simulate(Scene(replace(coarse_pad(), ridges=ridges), surface, law, voltage, motion))
+    assert result.min_gap[0] > 0.05
+    assert result.contact_width[1] > 0.1
+    asked = [0.5 * (result.applied_force[0] + 0.002), 0.002]  # from what the hovering bone carries
+    np.testing.assert_allclose(result.applied_force[1:], asked, rtol=1e-7)
+    balance = result.normal_force - result.electrostatic_force - result.applied_force
+    assert np.abs(balance).max() < 1e-7 * result.normal_force.max()
+    assert result.substeps.tolist() == [1, 1, 1]
+
+
+def test_a_bone_lacks_nothing_at_the_travel_that_settles_its_force():
+    """`lacking` is the balance of the bone, computed from displacements instead of compliances."""
+    going = Run(Scene(coarse_pad(), Flat(friction=0.3), motion=[Press(force=0.02, steps=1)]), None)
+    body, seen = going.model.equilibrium.body, []
+    solve = body._solve
+    body._solve = lambda step: seen.append((step, solve(step))) or seen[-1][1]
+    going.advance(next(going.requests()))
+    step, found = next(pair for pair in reversed(seen) if pair[0].unknowns)
+    travel = float(found.extra[0])
+    given = replace(step, bone=step.bone + np.array([0.0, travel]), unknowns=()).solve()
+    assert abs(step.lacking(given, travel)) < 1e-12
+    higher = replace(step, bone=step.bone + np.array([0.0, travel + 1e-3]), unknowns=()).solve()
+    assert step.lacking(higher, travel + 1e-3) < -1e-6  # pulled up, it lacks a downward force
