@@ -137,9 +137,10 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
     from distributed import Client, LocalCluster
 
     if scheduler == "local":
+        # any free port, of this machine alone: the usual one may belong to another cluster
         with (
             LocalCluster(
-                n_workers=workers or cores(), threads_per_worker=1, dashboard_address=None
+                n_workers=workers or cores(), threads_per_worker=1, dashboard_address="127.0.0.1:0"
             ) as cluster,
             Client(cluster) as client,
         ):

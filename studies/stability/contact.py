@@ -90,9 +90,7 @@ for _name, _table in {
     )(partial(_jump, table=_table))
 
 
-@FRICTION.case(
-    "stop and go", "two rests change nothing without time: forces of the uninterrupted slide", True
-)
+@FRICTION.case("stop and go", "two rests change nothing without time: forces of the uninterrupted slide")
 def _stop_and_go(log: Log) -> Verdict:
     flat, press, rest = Flat(friction=0.5), Press(indentation=0.3, steps=3), Press(indentation=0.3, steps=2)
     parts: list[Motion] = [Slide(1.0, steps=5), rest, Slide(1.0, steps=5), rest, Slide(1.0, steps=5)]
@@ -280,7 +278,7 @@ def _cliff(log: Log) -> Verdict:
     return abs(fallen - 0.3) < 0.02 and off < 1e-7, f"falls {fallen:.4f} mm, load within {off:.0e} N/mm"
 
 
-@MOTION.case("full unloading", "pressed, slid and lifted: undeformed, all work went into friction", True)
+@MOTION.case("full unloading", "pressed, slid and lifted: undeformed, all work went into friction")
 def _unloading(log: Log) -> Verdict:
     motion = Press(indentation=1.0, steps=8), Slide(2.0, steps=8), Press(indentation=-0.1, steps=10)
     result = log.simulate(scene(pad(), Flat(friction=0.3), *motion))

@@ -266,7 +266,7 @@ def _square(log: Log) -> Verdict:
     return good, f"F_t/F_n within {off:.0e} of 0.3, pull of all plateaus within {spread:.2%}"
 
 
-@VOLTAGE.case("3000 V in one step", "the state that a ramp of 20 steps reaches", quick=True)
+@VOLTAGE.case("3000 V in one step", "the state that a ramp of 20 steps reaches")
 def _at_once(log: Log) -> Verdict:
     ends = []
     for steps in (1, 20):

@@ -86,6 +86,7 @@ def test_fig12_texture_costs_more_than_its_friction(rendering, folder):
     assert position[0] == pytest.approx(0.03)
 
 
+@pytest.mark.slow
 def test_fig13_is_an_instant_of_fig12(rendering, stresses, folder):
     numbers = stresses["numbers"]
     assert numbers["voltage_V"] == pytest.approx(rendering["numbers"]["sinusoid.voltage_max_V"], rel=1e-9)
@@ -101,6 +102,7 @@ def test_fig13_is_an_instant_of_fig12(rendering, stresses, folder):
     assert numbers["reference.real_contact_width_mm"] < numbers["display.real_contact_width_mm"]
 
 
+@pytest.mark.slow
 def test_fig13_fields_go_to_paraview(stresses, folder):
     for name in ("reference", "display"):
         index = (folder / f"fig13_{name}.pvd").read_text()

@@ -303,7 +303,7 @@ def test_a_dask_cluster_gives_the_same_numbers(plan):
 
     alone = ev.sweep(plan, workers=1)
     with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, protocol="tcp"
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp"
     ) as cluster:
         beside = ev.sweep(plan, scheduler=cluster.scheduler_address)
     started_for_it = ev.sweep(plan, scheduler="local", workers=1)
