@@ -31,7 +31,7 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ROUNDING, UNHELD, WEAK
+from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
 from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import (
     BACKWARD,
@@ -73,16 +73,21 @@ class Candidates:
         cos, sin = 1.0 / self.surface.stretch, self.surface.slope / self.surface.stretch
         return np.stack([np.stack([-sin, cos], axis=1), np.stack([cos, sin], axis=1)], axis=1)
 
-    @property
-    def follower_rate(self) -> Floats:
+    def follower_rate(self, own: Floats) -> Floats:
         """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2): it
         turns with the profile, and friction grows where its coefficient does.
+
+        `own` (c,) is the compliance of each node along x. Where friction falls along the way faster than the
+        tissue stiffens, a node snaps forward and has no equilibrium at the slope: its friction is then left
+        at the present coefficient, and the iterations go the way of the snap.
         """
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
-        return turned + (sign * self.friction_slope * self.force[:, 0])[:, None] * axes[:, 1]
+        growth = sign * self.friction_slope * self.force[:, 0]
+        growth = np.where(growth * own < STABLE, growth, 0.0)
+        return turned + growth[:, None] * axes[:, 1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,7 +230,7 @@ class LinearContactStep:
         move the body, those of the follower stiffness included.
         """
         known, rows = self.candidates, y_before_x(near)
-        follower = FollowerStiffness.of(known, near)
+        follower = FollowerStiffness.of(known, near, np.diagonal(self.body.compliance)[0::2])
         C, W = follower.apply(self.body.among(near), free[rows])
         axes = known.axes[near]
         start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
@@ -278,9 +283,11 @@ class FollowerStiffness:
     rate: Floats
 
     @classmethod
-    def of(cls, candidates: Candidates, near: Ints) -> FollowerStiffness:
-        """Of the `near` nodes; on a flat surface no node is loaded."""
-        rate = candidates.follower_rate[near]
+    def of(cls, candidates: Candidates, near: Ints, own: Floats) -> FollowerStiffness:
+        """Of the `near` nodes, all with their `own` compliance (c,) along x; on a flat surface without slopes
+        of friction no node is loaded.
+        """
+        rate = candidates.follower_rate(own)[near]
         loaded = np.flatnonzero(rate.any(axis=1))
         return cls(near.size, loaded, rate[loaded])
 

@@ -108,3 +108,18 @@ def test_a_bone_lacks_nothing_at_the_travel_that_settles_its_force():
     assert abs(step.lacking(given, travel)) < 1e-12
     higher = replace(step, bone=step.bone + np.array([0.0, travel + 1e-3]), unknowns=()).solve()
     assert step.lacking(higher, travel + 1e-3) < -1e-6  # pulled up, it lacks a downward force
+
+
+def test_friction_that_falls_within_a_nodes_motion_is_passed_in_one_substep():
+    """From 1.2 to 0.2 over 0.02 mm: at the ramp friction falls faster than the tissue stiffens, so that a node
+    has no equilibrium there and snaps forward to the lower coefficient.
+    """
+    surface = Flat(friction=[[-5.0, 1.2], [0.5, 1.2], [0.52, 0.2], [5.0, 0.2]])
+    motion = [Press(force=0.05, steps=3), Slide(2.0, steps=10, hold="force")]
+    result = simulate(Scene(replace(coarse_pad(), ridges=True), surface, motion=motion))
+    assert result.substeps.sum() <= 15
+    x = result.mesh.points[:, 0] + result.frames[-1].displacement[:, 0]
+    frame = result.frames[-1]
+    slipping = (frame.contact_status == 2) & (frame.contact_pressure > 1e-3 * frame.contact_pressure.max())
+    ratio = np.abs(frame.shear_traction / np.where(slipping, frame.contact_pressure, 1.0))[slipping]
+    np.testing.assert_allclose(ratio, surface.friction_coefficient(x[slipping]), rtol=1e-6)
