@@ -38,10 +38,19 @@ from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     AttractionStiffness,
+    ContactNotSolved,
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    lost_stability,
     solve_with_attraction,
+)
+
+#: why there is no solution where the compliance is not positive
+LOST_STABILITY = (
+    "there is no equilibrium at rest near here: on the slopes of the profile the contact forces push the "
+    "finger aside harder than its tissue holds it; let the motion take time (speed, with dynamics = viscous "
+    "or inertial)"
 )
 
 
@@ -244,7 +253,12 @@ class LinearContactStep:
         attraction = AttractionStiffness(
             known.negative_stiffness[near], known.surface.normal_gap[near], known.gain_on_closing[near]
         )
-        found = solve_with_attraction(problem, attraction, status, self.snap)
+        try:
+            found = solve_with_attraction(problem, attraction, status, self.snap)
+        except ContactNotSolved as error:
+            if follower.loaded.size and lost_stability(problem):
+                raise ContactNotSolved(LOST_STABILITY) from error
+            raise
         pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
         if follower.loaded.size:

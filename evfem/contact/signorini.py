@@ -128,13 +128,21 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     sticking or all open; raises `ContactNotSolved` when none of them ends within `ACTIVE_SET_LIMIT` solves
     and one per node.
     """
-    most = ACTIVE_SET_LIMIT + problem.size
-    for start in (status, np.full(problem.size, STICK)):
+    most, failed = ACTIVE_SET_LIMIT + problem.size, ContactNotSolved("")
+    for start in (status, np.full(problem.size, STICK), np.full(problem.size, OPEN)):
         try:
             return _active_set(problem, start, most)
-        except ContactNotSolved:
-            continue
-    return _active_set(problem, np.full(problem.size, OPEN), most)
+        except ContactNotSolved as error:
+            failed = error
+    raise failed
+
+
+def lost_stability(problem: ContactProblem) -> bool:
+    """Whether the body gives way the more, the more it is loaded: its compliance, which contains the forces
+    that turn with the profile, is not positive.
+    """
+    C = problem.compliance
+    return bool(np.linalg.eigvalsh(0.5 * (C + C.T))[0] < 0.0)
 
 
 def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:

@@ -113,7 +113,7 @@ class Interface:
         compliance = self.compliance(old)[c]
         origin = self._origin(old)[c]
         slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
-        friction = self.friction(np.where(self.pins.held[c], origin, position[:, 0]))
+        friction = self.friction(old, c, np.where(self.pins.held[c], origin, position[:, 0]))
         return Candidates(
             surface=surface,
             slip=slip,
@@ -134,8 +134,11 @@ class Interface:
         """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
-    def friction(self, x: Floats) -> Floats:
-        """Friction coefficient at the positions x (mm)."""
+    def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
+        """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the last
+        accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask for it here;
+        `Pins` alone takes the coefficients on both sides of a jump from the surface.
+        """
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
     def shallowest_penetration(self, state: State) -> float | None:
@@ -158,7 +161,7 @@ class Interface:
         compliance = self.compliance(old)[active]
         slip = slip + compliance[:, 1] * (shear - old.contact_force[active, 1])
         x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
-        limit = self.friction(x) * normal
+        limit = self.friction(old, np.flatnonzero(active), x) * normal
         status = state.status[active]
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))

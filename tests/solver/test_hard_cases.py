@@ -10,8 +10,9 @@ from evfem.studies.stability.case import judge
 from evfem.studies.stability.study import CASES
 from tools.builders import coarse_pad
 
-from evfem.contact.surfaces import Display, Flat
+from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.errors import NotConverged
 from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.run import Run, simulate
@@ -111,8 +112,8 @@ def test_a_bone_lacks_nothing_at_the_travel_that_settles_its_force():
 
 
 def test_friction_that_falls_within_a_nodes_motion_is_passed_in_one_substep():
-    """From 1.2 to 0.2 over 0.02 mm: at the ramp friction falls faster than the tissue stiffens, so that a node
-    has no equilibrium there and snaps forward to the lower coefficient.
+    """From 1.2 to 0.2 over 0.02 mm: at the ramp friction falls faster than the tissue stiffens, so that a
+    node has no equilibrium there and snaps forward to the lower coefficient.
     """
     surface = Flat(friction=[[-5.0, 1.2], [0.5, 1.2], [0.52, 0.2], [5.0, 0.2]])
     motion = [Press(force=0.05, steps=3), Slide(2.0, steps=10, hold="force")]
@@ -123,3 +124,13 @@ def test_friction_that_falls_within_a_nodes_motion_is_passed_in_one_substep():
     slipping = (frame.contact_status == 2) & (frame.contact_pressure > 1e-3 * frame.contact_pressure.max())
     ratio = np.abs(frame.shear_traction / np.where(slipping, frame.contact_pressure, 1.0))[slipping]
     np.testing.assert_allclose(ratio, surface.friction_coefficient(x[slipping]), rtol=1e-6)
+
+
+def test_a_finger_at_rest_on_a_steep_texture_says_that_it_needs_time():
+    """With 0.05 mm of amplitude the contact forces of the wave push a loaded finger aside harder than its
+    tissue holds it: no equilibrium at rest is near, whatever the step.
+    """
+    surface = Sinusoid(terms=[[0.05, 9.7, 0.4]], friction=0.1)
+    motion = [Press(force=0.1, steps=2), Slide(1.0, steps=4)]
+    with pytest.raises(NotConverged, match=r"no equilibrium at rest near here.*dynamics = viscous"):
+        simulate(Scene(coarse_pad(), surface, motion=motion))
