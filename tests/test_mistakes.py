@@ -10,7 +10,7 @@ import evfem
 PACKAGE, TESTS = Path(evfem.__file__).parent, Path(__file__).parent
 
 
-def tests_of(file):
+def defined_in(file):
     tree = ast.parse((TESTS / file).read_text(encoding="utf-8"))
     return {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
@@ -29,7 +29,7 @@ def test_the_tests_that_see_them_are_there():
         for test in one.tests:
             file, _, name = test.partition("::")
             assert (TESTS / file).is_file(), test
-            assert not name or name.partition("[")[0] in tests_of(file), test
+            assert not name or name.partition("[")[0] in defined_in(file), test
 
 
 def test_every_room_has_its_mistakes():
