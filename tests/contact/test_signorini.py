@@ -91,6 +91,30 @@ def distinct(forces):
     return kept
 
 
+#: slip without friction (the node is 1 mm deep), first status, last status, and how many solves that takes
+WAYS = {
+    "open enters slipping forwards": (5.0, OPEN, FORWARD, 2),
+    "open enters slipping backwards": (-5.0, OPEN, BACKWARD, 2),
+    "open enters sticking where it does not move": (0.0, OPEN, STICK, 2),
+    "stick slips against its force": (5.0, STICK, FORWARD, 2),
+    "stick slips against its force backwards": (-5.0, STICK, BACKWARD, 2),
+    "slip turns by sticking": (5.0, BACKWARD, FORWARD, 3),
+    "slip turns by sticking backwards": (-5.0, FORWARD, BACKWARD, 3),
+    "slip sticks": (0.05, BACKWARD, STICK, 2),
+    "stick stays": (0.05, STICK, STICK, 1),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_status_changes_as_the_head_of_the_file_says(way):
+    """One node of unit compliance, friction 0.1: it presses with 1, and can hold a slip of 0.1."""
+    slip, first, last, solves = WAYS[way]
+    problem = ContactProblem(np.array([-1.0, slip]), np.eye(2), np.array([0.1]))
+    found = solve_contact(problem, np.array([first]))
+    assert (found.status.tolist(), found.solves) == ([last], solves)
+    np.testing.assert_allclose(found.force, [1.0, -np.clip(slip, -0.1, 0.1)], atol=1e-15)
+
+
 @pytest.mark.parametrize("k", [1, 2, 3])
 @pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
 def test_finds_the_one_solution_that_enumeration_finds(k, friction):

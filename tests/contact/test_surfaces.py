@@ -73,6 +73,18 @@ def test_friction_table_of_one_row_is_a_constant():
     assert Flat(friction=[[2.0, 0.7]]).friction_coefficient(np.array([1.0, 2.0, 3.0])).tolist() == [0.7] * 3
 
 
+def test_jumps_and_slopes_of_a_friction_table_are_those_of_the_coefficient():
+    """Just before and at a jump; central differences between the rows; a second row without a jump is none."""
+    table = Flat(friction=[[-1.0, 0.3], [0.0, 0.5], [0.0, 0.2], [1.0, 0.2], [1.0, 0.2], [3.0, 0.8], [3.0, 0.9]])
+    places = np.array([0.0, 3.0])
+    before, after = (table.friction_coefficient(places + shift) for shift in (-1e-9, 0.0))
+    np.testing.assert_allclose(table.friction_jumps, np.stack([places, before, after], axis=1), atol=1e-8)
+    x = np.array([-2.0, -0.5, 0.5, 1.5, 2.9, 4.0])
+    rise = table.friction_coefficient(x + 1e-3) - table.friction_coefficient(x - 1e-3)
+    np.testing.assert_allclose(table.friction_slope(x), rise / 2e-3, atol=1e-12)
+    assert np.unique(table.friction_slope(x).round(9)).tolist() == [0.0, 0.2, 0.3]
+
+
 def test_friction_that_starts_and_ends_with_a_jump():
     surface = Flat(friction=[[0.0, 0.1], [0.0, 0.3]])
     assert surface.friction_coefficient(np.array([-1.0, 0.0, 1.0])).tolist() == [0.1, 0.3, 0.3]

@@ -12,7 +12,8 @@ from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import COLUMNS, Saved
-from evfem.simulation.run import simulate
+from evfem.simulation.run import Run, simulate
+from evfem.solver.strategy import Strategy
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))
@@ -276,3 +277,59 @@ def test_a_resumed_run_ends_like_an_uninterrupted_one(at):
         if name not in ("seconds", "newton_iterations", "motion", "substeps"):
             np.testing.assert_allclose(getattr(resumed, name), getattr(whole, name), rtol=1e-7, atol=1e-10)
     np.testing.assert_allclose(resumed.frames[-1].displacement, whole.frames[-1].displacement, atol=1e-9)
+
+
+@pytest.mark.parametrize("at", [1, 3])
+def test_a_resumed_run_goes_on_with_everything(at):
+    """Viscous tissue, a voltage, steps in parts: all that the next step depends on is back at once, and what
+    follows is the same but for rounding, with the same number of iterations.
+    """
+    kept, rows = {}, []
+
+    class Observer:
+        def step(self, row, frame, checkpoint):
+            rows.append(row)
+            kept[row["step"]] = {name: np.copy(array) for name, array in checkpoint().items()}
+
+    motion = Press(indentation=0.4, steps=1, speed=20.0), Slide(0.3, steps=3, speed=20.0)
+    solver = Solver(dynamics="viscous", strategy=Strategy(iterations=6))
+    body = finger(block(8, 3, sag=0.4), viscosity=5e-3)
+    scene = Scene(body, Display(), Kaczmarek(), 2000.0, motion, solver=solver)
+    simulate(scene, observers=[Observer()])
+    saved = kept[at]
+    assert saved["time"] > 0.0
+    assert saved["factorised"]
+    assert saved["duration"] > 0.0
+    assert (saved["sums"] != 0.0).all()
+    assert kept[1]["substep"] < 1.0
+    run = Run(scene, Saved(saved, rows[:at]))
+    again = run.checkpoint()
+    assert again.keys() == saved.keys()
+    for name, array in saved.items():
+        np.testing.assert_array_equal(again[name], array, err_msg=name)
+    for request in run.requests():
+        run.advance(request)
+        there, here = rows[len(run.rows) - 1], run.rows[-1]
+        for name in set(COLUMNS) - {"seconds", "motion"}:
+            assert here[name] == pytest.approx(there[name], rel=1e-11, abs=1e-15), name
+    for name, array in run.checkpoint().items():
+        rounding = 1e-11 * np.abs(array).max(initial=1e-3)
+        np.testing.assert_allclose(array, kept[4][name], atol=rounding, err_msg=name)
+
+
+def test_a_motion_begins_where_the_last_one_ended():
+    """Slides are relative; presses, voltages and gaps are absolute and reached in equal parts."""
+    motion = [
+        Hover(0.2),
+        Slide(0.3, steps=2),
+        Slide(-0.1, steps=1),
+        VoltageRamp(100.0, steps=2),
+        VoltageRamp(40.0, steps=2),
+        Press(indentation=0.1, steps=2),
+        Hover(0.1, steps=1),
+    ]
+    result = run(Display(), *motion, law=Kaczmarek(), voltage=20.0)
+    slid = [0.0, 0.15, 0.3] + [0.2] * 8
+    np.testing.assert_allclose(result.position, slid, atol=1e-15)
+    np.testing.assert_allclose(result.voltage, [20, 20, 20, 20, 60, 100, 70, 40, 40, 40, 40], rtol=1e-14)
+    np.testing.assert_allclose(result.indentation, [-0.2] * 8 + [-0.05, 0.1, -0.1], rtol=1e-13)

@@ -7,11 +7,13 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
+from evfem.common.constants import CHANGES, HAIR
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model
+from evfem.solver.interface import Pins
 
 ROUND = finger(block(8, 3, sag=0.4))
 SURFACES = [Flat(y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1)]
@@ -50,3 +52,75 @@ def test_contact_forces_keep_their_size_and_press_along_the_normal(surface):
         [-np.sin(angle), np.cos(angle)]
     )
     np.testing.assert_allclose(found, expected.T, atol=1e-14)
+
+
+# -- jumps of friction
+
+JUMPS = {"rougher": [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.6]], "smoother": [[-9.0, 0.6], [0.3, 0.6], [0.3, 0.2]]}
+jumps = pytest.mark.parametrize("table", JUMPS.values(), ids=JUMPS.keys())
+
+
+def crossing(table, times):
+    """Pins of three nodes: one crosses the jump so many times, one does so in the air, one stays away."""
+    surface = Flat(friction=table)
+    pins, touching = Pins(surface.friction_jumps, 3), np.array([True, False, True])
+    pins.begin(np.array([0.2, 0.2, -1.0]))
+    for k in range(times):
+        x = 0.4 if k % 2 == 0 else 0.2
+        pins.watch(np.array([x, x, -1.0]), touching)
+    return surface, pins
+
+
+@jumps
+def test_a_node_that_keeps_crossing_a_jump_is_pinned_to_its_rougher_side(table):
+    assert not crossing(table, CHANGES - 1)[1].held.any()
+    surface, pins = crossing(table, CHANGES)
+    assert pins.held.tolist() == [True, False, False]
+    assert abs(pins.x[0] - 0.3) <= 1.001 * HAIR
+    assert surface.friction_coefficient(pins.x[:1]).tolist() == [0.6]
+    assert pins.lower[0] == 0.2
+
+
+@jumps
+def test_a_pinned_node_is_let_go_below_the_lower_limit_and_for_good(table):
+    """0.2 of 5 N/mm; it keeps up to 3 N/mm in either direction."""
+    _, pins = crossing(table, CHANGES)
+    normal = np.full(3, 5.0)
+    for shear, weak, free in ((1.1, 0.0, False), (-1.1, 0.0, False), (0.95, 0.1, False), (-0.95, 0.0, True)):
+        assert pins.release(normal, np.full(3, shear), weak) == free
+        assert pins.held[0] != free
+    for x in (0.4, 0.2, 0.4, 0.2, 0.4):
+        pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
+    assert not pins.held[0]
+    pins.begin(np.zeros(3))
+    for x in (0.4, 0.2, 0.4):
+        pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
+    assert pins.held[0]  # in the next step it may be pinned again
+
+
+@jumps
+def test_contact_takes_a_pinned_node_at_its_jump(table):
+    """There it sticks, with the rougher coefficient, wherever it was before the step."""
+    interface, old = interface_and_state(Flat(friction=table, y=-0.1), [STICK])
+    x = interface.positions(old.u)[:, 0]
+    node = int(np.argmin(np.abs(x - 0.3)))
+    place = 0.3 + (HAIR if table[-1][1] == 0.6 else -HAIR)
+    interface.pins.x[node], interface.pins.lower[node] = place, 0.2
+    u = old.u.copy()
+    u[interface.pad.nodes, 0] = 0.25
+    c, nothing = np.arange(x.size), np.zeros(x.size)
+    known = interface.candidates(old, replace(old, u=u), c, nothing, nothing)
+    others = c != node
+    assert known.slip[node] == pytest.approx(x[node] + 0.25 - place, abs=1e-12)
+    np.testing.assert_allclose(known.slip[others], 0.25, atol=1e-12)
+    assert known.friction[node] == 0.6
+    expected = interface.surface.friction_coefficient(x + 0.25)
+    np.testing.assert_array_equal(known.friction[others], expected[others])
+    # and so does the check of an iterate, which lets it go where its shear force is below the lower limit
+    status, force = np.where(others, OPEN, STICK), np.zeros((x.size, 2))
+    u = old.u.copy()
+    u[interface.pad.nodes[node]] += [place - x[node], -0.1 - interface.positions(old.u)[node, 1]]
+    for shear, obeyed in ((-2.5, True), (3.5, False), (0.5, False)):
+        force[node] = [5.0, shear]
+        assert interface.obeyed(old, replace(old, u=u, status=status, contact_force=force)) == obeyed
+    assert not interface.pins.held.any()

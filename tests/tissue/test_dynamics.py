@@ -302,3 +302,12 @@ def test_body_adds_tissue_forms_and_time():
         columns[:, i] = (ends[0] - ends[1]) / 2e-6
     np.testing.assert_allclose(K, columns, atol=1e-7 * np.abs(K).max())
     np.testing.assert_allclose(body.velocity(u), (u - start) / STEP)
+
+
+def test_the_travel_of_the_bone_leaves_no_rounding_in_the_forces():
+    """A body carried along as it is has exactly the forces that it had before."""
+    space = rectangle("q2p1", (2, 2), jitter=0.2)
+    space.mesh.node_sets["bone"] = space.mesh.node_sets["top"]
+    body = Body(space, {"lower": NeoHookean(E=1.0, nu=0.4)})
+    here = body.forces(np.zeros((space.size, 2)))
+    np.testing.assert_array_equal(body.forces(np.tile([50.0 / 3.0, -1e3 / 7.0], (space.size, 1))), here)

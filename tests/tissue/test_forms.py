@@ -127,10 +127,10 @@ def test_tissue_written_as_a_form_is_the_tissue(element):
 
 
 @every_kind
-@pytest.mark.parametrize(("on", "boundary"), [("upper", False), ("left", True)])
+@pytest.mark.parametrize(("on", "boundary"), [("upper", False), ("left", True), ("outline", True)])
 def test_tangent_is_the_derivative_of_the_forces(element, on, boundary):
     """Complex step against central differences for a form that is neither linear nor symmetric; the solver's
-    matrix gets the symmetric part."""
+    matrix gets the symmetric part, also where a cell has two edges on the boundary."""
     space = rectangle(element, (2, 2), warp=bend, split=lambda x, y: y > 0.5)
     term = make_term(space, crooked, on, boundary)
     u = wavy(space.mesh.points)

@@ -231,6 +231,7 @@ def test_compiled_kernels_equal_the_plain_path(element):
     for a, b in ((fast.forces(u), plain.forces(u)), (fast.tangent(u), plain.tangent(u))):
         np.testing.assert_allclose(a, b, atol=1e-12 * np.abs(b).max())
     assert fast.smallest_J(u) == pytest.approx(plain.smallest_J(u), rel=1e-13)
+    assert fast.energy(u) == pytest.approx(plain.energy(u), rel=1e-12)
 
 
 def test_compiled_kernels_are_used_where_numba_is_installed():

@@ -1,0 +1,186 @@
+"""A linear contact step against the equations it solves, written out for a random condensed tangent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
+from evfem.contact.pad import SurfaceState
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+
+K = 5
+
+
+def tangent(rng, coupling=0.0):
+    """A random SPD matrix on five candidates and the bone, and an unsymmetric coupling of candidates."""
+    A = rng.normal(size=(2 * K + 2, 2 * K + 2))
+    schur = 4.0 * np.eye(2 * K + 2) + 0.3 * A @ A.T
+    between = coupling * rng.normal(size=(2 * K, 2 * K))
+    return schur, between, CondensedTangent.make(schur, between if coupling else None)
+
+
+def candidates(rng, curved, **changes):
+    """Nodes of every status over a surface, their forces in the cone, gaps that are nearly closed."""
+    status = np.array([STICK, FORWARD, BACKWARD, STICK, OPEN])
+    mu, normal = np.full(K, 0.4), rng.uniform(2.0, 3.0, K)
+    shear = np.choose(status, [0.0, 0.1, -0.4, 0.4]) * normal
+    force = np.where((status == OPEN)[:, None], 0.0, np.stack([normal, shear], axis=1))
+    slope, curvature = (curved * rng.uniform(-0.5, 0.5, (2, K))) if curved else np.zeros((2, K))
+    surface = SurfaceState(np.where(status == OPEN, 0.5, 1e-3) * rng.uniform(0.5, 1.0, K), slope, curvature)
+    zero = np.zeros(K)
+    known = Candidates(
+        surface=surface,
+        slip=np.choose(status, [0.0, 0.0, 0.2, -0.2]),
+        force=force,
+        status=status,
+        friction=mu,
+        interface_compliance=np.zeros((K, 2)),
+        negative_stiffness=zero,
+        gain_on_closing=zero,
+        friction_slope=zero,
+    )
+    return replace(known, **changes)
+
+
+def axes_of(surface):
+    angle = np.arctan(surface.slope)
+    normal = np.stack([-np.sin(angle), np.cos(angle)], axis=1)
+    return normal, np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+def pushed(step, found):
+    """Forces (2 c,) on the candidates beyond the present ones: new contact forces on today's axes, what the
+    present ones turn into on a curved profile, and how slipping friction changes along a ramp.
+    """
+    known, moved = step.candidates, found.moved.reshape(-1, 2)
+    normal, tangent = axes_of(known.surface)
+    on_axes = found.force[:, :1] * normal + found.force[:, 1:] * tangent
+    angle = known.surface.curvature / (1.0 + known.surface.slope**2) * moved[:, 0]  # d atan(h')
+    turned = angle[:, None] * (known.force[:, 1:] * normal - known.force[:, :1] * tangent)
+    against = np.where(known.status == FORWARD, -1.0, np.where(known.status == BACKWARD, 1.0, 0.0))
+    rougher = against * known.friction_slope * moved[:, 0] * known.force[:, 0]
+    return (on_axes + turned + rougher[:, None] * tangent).ravel()
+
+
+def residuals(step, schur, between, found):
+    """What the solution leaves of the balance of the candidates, and of the bone along the unknowns' axes."""
+    known = step.candidates
+    normal, tangent = axes_of(known.surface)
+    present = (known.force[:, :1] * normal + known.force[:, 1:] * tangent).ravel()
+    extra = found.extra
+    pushes = np.array([unknown.push for unknown in step.unknowns]).reshape(-1, 2 * K + 2)
+    all_of = np.concatenate([found.moved, step.bone])
+    right = step.residual + extra @ pushes
+    nodes = (schur @ all_of)[:-2] - between @ found.moved - right[:-2] + present - pushed(step, found)
+    bone = [
+        ((schur @ all_of) - right)[unknown.axis - 2] - unknown.force for unknown in step.unknowns
+    ]
+    return nodes, np.array(bone)
+
+
+def laws(step, found):
+    """Violation of Signorini's and Coulomb's laws in the new state, friction counted on today's axes."""
+    known = step.candidates
+    normal, tangent = axes_of(known.surface)
+    moved = found.moved.reshape(-1, 2)
+    gap = known.surface.normal_gap + np.sum(normal * moved, axis=1)
+    gap = gap + known.interface_compliance[:, 0] * found.force[:, 0]
+    slip = known.slip + np.sum(tangent * moved, axis=1) + known.interface_compliance[:, 1] * found.force[:, 1]
+    pressing, shear = found.force.T
+    limit = known.friction * pressing
+    return max(
+        (-pressing).max(),
+        (-gap).max(),
+        np.abs(gap * pressing).max(),
+        (np.abs(shear) - limit).max(),
+        np.abs(slip[found.status == STICK]).max(initial=0.0),
+        np.abs(shear + limit)[found.status == FORWARD].max(initial=0.0),
+        np.abs(shear - limit)[found.status == BACKWARD].max(initial=0.0),
+    )
+
+
+def check(step, schur, between):
+    found = step.solve()
+    nodes, bone = residuals(step, schur, between, found)
+    np.testing.assert_allclose(nodes, 0.0, atol=1e-10)
+    np.testing.assert_allclose(bone, 0.0, atol=1e-10)
+    assert laws(step, found) < 1e-10
+    return found
+
+
+def step_of(rng, curved, coupling=0.0, unknowns=(), **changes):
+    schur, between, body = tangent(rng, coupling)
+    residual = rng.normal(size=2 * K + 2)
+    bone = np.array([0.02, 0.0 if unknowns else -0.03])
+    known = candidates(rng, curved, **changes)
+    extra = {
+        "force": ExtraUnknown(-schur[:, -1], 1, -6.0),
+        "voltage": ExtraUnknown(rng.normal(size=2 * K + 2), 0, 0.5),
+    }
+    step = LinearContactStep(body, known, residual, bone, tuple(extra[name] for name in unknowns))
+    return step, schur, between
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("curved", [0.0, 1.0], ids=["flat", "curved"])
+@pytest.mark.parametrize("coupling", [0.0, 0.2], ids=["alone", "coupled"])
+def test_candidates_and_bone_are_in_balance(seed, curved, coupling):
+    step, *matrices = step_of(np.random.default_rng(seed), curved, coupling)
+    found = check(step, *matrices)
+    assert (found.status != OPEN).any()
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("curved", [0.0, 1.0], ids=["flat", "curved"])
+@pytest.mark.parametrize("unknowns", [("force",), ("voltage",), ("force", "voltage")])
+def test_prescribed_forces_are_reached_on_any_profile(seed, curved, unknowns):
+    """The forces that turn with the profile count in the balance of the bone as in that of the nodes."""
+    step, *matrices = step_of(np.random.default_rng(seed), curved, 0.1, unknowns)
+    found = check(step, *matrices)
+    assert found.extra.size == len(unknowns)
+    assert (found.status != OPEN).any()
+
+
+def test_friction_that_grows_along_the_way_is_felt():
+    rng = np.random.default_rng(3)
+    step, *matrices = step_of(rng, 1.0, 0.0, ("force",), friction_slope=rng.uniform(0.5, 1.0, K))
+    check(step, *matrices)
+
+
+@pytest.mark.parametrize("unknowns", [(), ("force",)])
+def test_an_interface_that_yields_adds_its_own_way(unknowns):
+    compliance = np.random.default_rng(4).uniform(0.01, 0.1, (K, 2))
+    step, *matrices = step_of(np.random.default_rng(1), 1.0, 0.0, unknowns, interface_compliance=compliance)
+    check(step, *matrices)
+
+
+def test_a_node_that_was_far_from_contact_does_not_penetrate():
+    """An open node is no part of the first contact problem; pushed down by the others it joins."""
+    joined = 0
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        step, *matrices = step_of(rng, 0.0)
+        down = np.zeros(2 * K + 2)
+        down[2 * K - 1] = -4.0
+        # free to fall but for what the present forces hold: only contact stops it
+        found = check(replace(step, residual=step.residual + down), *matrices)
+        joined += found.status[-1] != OPEN
+    assert joined > 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nodes_and_bone_feel_how_the_attraction_changes(seed):
+    """Open nodes by their negative stiffness times the change of their gap, closed ones by the gain."""
+    rng = np.random.default_rng(seed)
+    gain, stiffness = rng.uniform(0.5, 1.0, K), rng.uniform(0.3, 0.6, K)
+    attracted = {"gain_on_closing": gain, "negative_stiffness": stiffness}
+    step, *matrices = step_of(rng, 0.0, 0.0, ("force",), **attracted)
+    found = step.solve()
+    nodes, bone = residuals(step, *matrices, found)
+    weaker = np.where(found.status == OPEN, stiffness * found.moved[1::2], -gain)
+    np.testing.assert_allclose(nodes.reshape(-1, 2), np.stack([0.0 * weaker, weaker], axis=1), atol=1e-10)
+    np.testing.assert_allclose(bone, 0.0, atol=1e-10)
+    assert laws(step, found) < 1e-10
+    assert (found.status == OPEN).any()
+    assert (found.status != OPEN).any()

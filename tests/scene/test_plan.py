@@ -1,0 +1,75 @@
+"""What a scene needs: terms that are left out must not matter, and the numbers are those of the mesh."""
+
+import numpy as np
+import pytest
+from tools.builders import finger
+from tools.meshes import block
+
+import evfem as ev
+from evfem.scene.plan import largest_voltage, plan, plan_on, rigid_share, scene_mesh
+from evfem.simulation.model import make_model
+
+BLOCK = block(40, 2, sag=1.0)
+
+
+def hovering(E=0.05, gap=0.25, voltage=1000.0, law=None, motion=()):
+    return ev.Scene(
+        finger(BLOCK, E=E), ev.Display(), law or ev.Kaczmarek(), voltage, [ev.Hover(gap), *motion]
+    )
+
+
+@pytest.mark.parametrize("law", [ev.Kaczmarek(), ev.StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
+@pytest.mark.parametrize("voltage", [300.0, 1000.0])
+def test_deforming_changes_the_attraction_by_less_than_the_plan_says(law, voltage):
+    """Beside the run that leaves nothing out: a form of no weight keeps the tissue in."""
+    scene = hovering(voltage=voltage, law=law)
+
+    @ev.form
+    def nothing(u, v, w):
+        return 0.0 * (u[0] * v[0] + u[1] * v[1])
+
+    soft = ev.simulate(scene.with_term(nothing, ev.Region("tissue"))).electrostatic_force[0]
+    mesh, _ = scene_mesh(scene)
+    rigid = make_model(hovering(E=1e9, voltage=voltage, law=law)).equilibrium
+    state = rigid.rest(np.array([0.0, 0.25]), voltage)
+    change = abs(soft / -state.attraction[:, 1].sum() - 1.0)
+    share = rigid_share(scene, mesh)
+    assert 1e-7 < change < share < 100.0 * change
+
+
+def test_a_hovering_pad_is_rigid_only_below_a_tenth_of_a_thousandth():
+    shares = {}
+    for voltage in (10.0, 1000.0):
+        scene = hovering(voltage=voltage)
+        mesh, _ = scene_mesh(scene)
+        shares[voltage] = rigid_share(scene, mesh)
+        assert plan(scene).has("tissue") == (shares[voltage] >= 1e-4)
+    # the traction goes with the square of the voltage
+    assert shares[1000.0] == pytest.approx(1e4 * shares[10.0], rel=1e-9)
+    assert plan(hovering(voltage=1000.0)).has("tissue")
+    assert not plan(hovering(voltage=10.0)).has("tissue")
+
+
+@pytest.mark.parametrize("motion", [ev.Press(indentation=0.1), ev.Slide(1.0)], ids=["press", "slide"])
+def test_whoever_moves_otherwise_than_hovering_deforms(motion):
+    assert plan(hovering(voltage=10.0, motion=[motion])).has("tissue")
+
+
+def test_the_largest_voltage_of_any_source_counts():
+    profile = ev.VoltageProfile([0.0, 1.0], [10.0, -300.0])
+    assert largest_voltage(hovering(voltage=profile)) == 300.0
+    ramps = [ev.VoltageRamp(-500.0), ev.VoltageRamp(0.0)]
+    assert largest_voltage(hovering(voltage=20.0, motion=ramps)) == 500.0
+    from_nothing = hovering(voltage=0.0, motion=ramps)
+    assert plan(from_nothing).has("electricity")
+    assert not plan(hovering(voltage=0.0)).has("electricity")
+
+
+def test_numbers_are_those_of_the_mesh():
+    """40 by 2 quads of nine nodes: 81 by 5 nodes, the uppermost 81 move as one; all 81 of the pad are free."""
+    scene = hovering()
+    mesh, element = scene_mesh(scene)
+    found = plan_on(scene, mesh, element)
+    assert (found.element, found.nodes, found.cells) == ("q2p1", 81 * 5, 80)
+    assert found.unknowns == 2 * 81 * 4 + 2 == make_model(hovering(E=0.01)).body.size
+    assert (found.pad_nodes, found.steps) == (81, 1)

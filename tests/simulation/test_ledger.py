@@ -1,0 +1,325 @@
+"""Every column of the history and every field against a formula of its own, from displacements and nodal
+forces alone.
+"""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tools.builders import INSULATOR, SKIN
+from tools.grids import fine_points
+from tools.meshes import block
+
+from evfem.contact.surfaces import Sinusoid
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.simulation.run import simulate
+from evfem.tissue.laws import NeoHookean
+
+LAW = NeoHookean(E=0.1, nu=0.4, density=1e-6)
+MU, LAMBDA = 0.1 / 2.8, 0.1 * 0.4 / (1.4 * 0.2)
+TAU, V, G0 = 2e-3, 2000.0, 0.03
+WAVES = Sinusoid(friction=0.3, terms=[[0.04, 5.0, 0.3]], insulator=INSULATOR)
+#: hills that touch one by one, tissue with viscosity and mass, a voltage that changes while contact rests
+MOTION = (
+    Hover(0.025),
+    Press(indentation=0.08, steps=4),
+    VoltageRamp(0.5 * V, steps=2),
+    Slide(0.4, steps=10, speed=20.0),
+    Press(indentation=0.03, steps=2),
+)
+FINGER = MeshedFinger(block(20, 2, sag=0.05), {"tissue": LAW}, SKIN, TAU)
+
+
+@cache
+def run():
+    """The result, the scene's model, and the state before the first and after every step; no step in parts."""
+    top = np.max(WAVES.height(np.linspace(-2.0, 2.0, 4001)))
+    lowest = np.min(_outline()[:, 1] - WAVES.height(_outline()[:, 0]))
+    surface = WAVES.shifted(lowest - G0)
+    assert surface.y < -top + 0.1
+    solver = Solver(element="q2", dynamics="inertial")
+    scene = Scene(FINGER, surface, Kaczmarek(), V, MOTION, direction="normal", solver=solver)
+    states = []
+
+    class Observer:
+        def step(self, row, frame, checkpoint):
+            states.append(SimpleNamespace(**{k: np.copy(a) for k, a in checkpoint().items()}))
+
+    result = simulate(scene, observers=[Observer()])
+    assert (result.substeps == 1).all()
+    return result, make_model(scene), [_start(make_model(scene)), *states]
+
+
+def _outline():
+    mesh = FINGER.mesh(2)
+    return mesh.points[mesh.node_sets["pad"]]
+
+
+def _start(model):
+    """Undeformed, G0 above first touch, under the whole voltage: the bone holds the attraction."""
+    bone = np.array([0.0, -G0])
+    u = np.tile(bone, (len(model.mesh.points), 1))
+    place = model.mesh.points[model.pad.nodes] + bone
+    pull = model.attraction.forces(place, V, np.zeros(len(place), dtype=bool))
+    zero = np.zeros_like(pull)
+    return SimpleNamespace(
+        u=u, bone=bone, contact_force=zero, status=np.zeros(len(place)), attraction=pull,
+        reaction=-pull.sum(axis=0), velocity=0.0 * u, time=0.0,
+    )  # fmt: skip
+
+
+def positions(state):
+    model = run()[1]
+    return model.mesh.points[model.pad.nodes] + state.u[model.pad.nodes]
+
+
+def column(name, function):
+    """A column beside a function of each step's (state before, state after)."""
+    result, _, states = run()
+    return getattr(result, name), np.array([function(a, b) for a, b in zip(states, states[1:], strict=False)])
+
+
+def forces(state):
+    """Contact forces (P, 2) in the laboratory frame by the angle of the profile."""
+    angle = np.arctan(WAVES.slope(positions(state)[:, 0]))
+    normal, shear = state.contact_force.T
+    x, y = -np.sin(angle) * normal + np.cos(angle) * shear, np.cos(angle) * normal + np.sin(angle) * shear
+    return np.stack([x, y], axis=1)
+
+
+def test_the_scene_has_everything_in_it():
+    result = run()[0]
+    for name in ("friction_dissipation", "viscous_dissipation", "kinetic_energy", "electrostatic_work"):
+        assert abs(getattr(result, name)[-3]) > 1e-12, name
+    # forces along x of both kinds, contact in islands, nodes that slip and nodes that stick
+    assert np.abs(result.electrostatic_force_x).max() > 1e-3 * result.electrostatic_force.max()
+    assert (result.real_contact_width < 0.8 * result.contact_width)[5:10].all()
+    seen = np.unique(np.concatenate([state.status for state in run()[2]]))
+    assert set(seen.tolist()) == {0, 1, 2, 3}
+
+
+def test_where_the_bone_is_and_what_acts_on_it():
+    for name, function in {
+        "position": lambda _, s: s.bone[0],
+        "indentation": lambda _, s: -s.bone[1] - G0,
+        "applied_force": lambda _, s: -s.reaction[1],
+        "applied_tangential_force": lambda _, s: s.reaction[0],
+        "normal_force": lambda _, s: forces(s)[:, 1].sum(),
+        "tangential_force": lambda _, s: -forces(s)[:, 0].sum(),
+        "electrostatic_force": lambda _, s: -s.attraction[:, 1].sum(),
+        "electrostatic_force_x": lambda _, s: s.attraction[:, 0].sum(),
+        "min_gap": lambda _, s: (
+            positions(s)[:, 1] - run()[1].surface.y - WAVES.height(positions(s)[:, 0])
+        ).min(),
+    }.items():
+        found, expected = column(name, function)
+        np.testing.assert_allclose(found, expected, atol=1e-12 * np.abs(expected).max(), err_msg=name)
+    result = run()[0]
+    np.testing.assert_allclose(result.indentation[[0, 4]], [-0.025, 0.08], rtol=1e-13)
+    np.testing.assert_allclose(result.voltage[[0, 5, 6]], [V, 0.75 * V, 0.5 * V], rtol=1e-13)
+    np.testing.assert_allclose(result.time[[0, 6, 7, 16, 18]], [0.0, 0.0, 2e-3, 0.02, 0.02], rtol=1e-12)
+
+
+@cache
+def quadrature():
+    _, weight, value, gradient, nodes = fine_points(run()[1].body.space)
+    return weight, value, gradient, nodes
+
+
+def seconds(before, after):
+    return float(after.time - before.time)
+
+
+def test_the_bone_carries_contact_attraction_and_inertia():
+    """Sum of forces on the whole finger = mass times acceleration, M = rho times the integral."""
+    weight, value, _, nodes = quadrature()
+
+    def momentum(velocity):
+        return 1e-6 * np.einsum("aeq,eai,eq->i", value, velocity[nodes], weight)
+
+    def acting(before, after):
+        steady = -(forces(after) + after.attraction).sum(axis=0)
+        if not seconds(before, after):
+            return steady
+        return steady + (momentum(after.velocity) - momentum(before.velocity)) / seconds(before, after)
+
+    result = run()[0]
+    _, expected = column("step", acting)
+    found = np.stack([result.applied_tangential_force, -result.applied_force], axis=1)
+    np.testing.assert_allclose(found, expected, atol=1e-7 * np.abs(expected).max())
+    # inertia is seen in that balance
+    steady = np.array([(forces(s) + s.attraction).sum(axis=0) for s in run()[2][1:]])
+    assert np.abs(found + steady).max() > 1e-4 * np.abs(found).max()
+
+
+def test_velocities_and_the_kinetic_energy():
+    weight, value, _, nodes = quadrature()
+
+    def kinetic(before, after):
+        dt = seconds(before, after)
+        velocity = (after.u - before.u) / dt if dt else np.zeros_like(after.u)
+        np.testing.assert_allclose(after.velocity, velocity, atol=1e-12)
+        there = np.einsum("aeq,eai->ieq", value, velocity[nodes])
+        return 0.5 * 1e-6 * np.sum(there**2 * weight)
+
+    found, expected = column("kinetic_energy", kinetic)
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+def gradients(state):
+    """F (2, 2, E, Q) at the points of a quadrature of higher order than the solver's."""
+    _, _, gradient, nodes = quadrature()
+    F = np.einsum("ajeq,eai->ijeq", gradient, state.u[nodes])
+    return F + np.eye(2)[:, :, None, None]
+
+
+def test_the_stored_energy_is_that_of_the_law():
+    weight = quadrature()[0]
+
+    def stored(_, state):
+        F = gradients(state)
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        psi = 0.5 * MU * (np.sum(F**2, axis=(0, 1)) - 2.0 - 2.0 * np.log(J)) + 0.5 * LAMBDA * np.log(J) ** 2
+        return np.sum(psi * weight)
+
+    found, expected = column("stored_energy", stored)
+    np.testing.assert_allclose(found, expected, rtol=2e-3)
+
+
+def test_the_viscous_dissipation_is_that_of_each_step():
+    """2 eta (E - E0) : (E - E0) / dt, eta = tau mu."""
+    weight = quadrature()[0]
+
+    def strain(state):
+        F = gradients(state)
+        return 0.5 * (np.einsum("kieq,kjeq->ijeq", F, F) - np.eye(2)[:, :, None, None])
+
+    def lost(before, after):
+        dt = seconds(before, after)
+        change = strain(after) - strain(before)
+        return 2.0 * TAU * MU / dt * np.sum(np.sum(change**2, axis=(0, 1)) * weight) if dt else 0.0
+
+    found, each = column("viscous_dissipation", lost)
+    np.testing.assert_allclose(found, np.cumsum(each), rtol=2e-3)
+
+
+def test_works_are_force_times_way_by_trapezoids():
+    found, each = column("external_work", lambda a, b: 0.5 * (a.reaction + b.reaction) @ (b.bone - a.bone))
+    np.testing.assert_allclose(found, np.cumsum(each), atol=1e-12 * np.abs(found).max())
+    found, each = column(
+        "electrostatic_work",
+        lambda a, b: np.sum(0.5 * (a.attraction + b.attraction) * (positions(b) - positions(a))),
+    )
+    np.testing.assert_allclose(found, np.cumsum(each), atol=1e-12 * np.abs(found).max())
+
+
+def test_friction_dissipates_on_the_way_along_the_profile():
+    """The arc's length by Gauss's rule; nodes that stick, or have let go, dissipate nothing."""
+    s, weight = np.polynomial.legendre.leggauss(8)
+
+    def lost(before, after):
+        x0, x1 = positions(before)[:, 0], positions(after)[:, 0]
+        middle, half = 0.5 * (x0 + x1), 0.5 * (x1 - x0)
+        way = half * (np.sqrt(1.0 + WAVES.slope(middle + np.outer(s, half)) ** 2) * weight[:, None]).sum(axis=0)
+        shear = 0.5 * (before.contact_force[:, 1] + after.contact_force[:, 1])
+        return -np.sum((shear * way)[after.status >= 2])
+
+    found, each = column("friction_dissipation", lost)
+    np.testing.assert_allclose(found, np.cumsum(each), atol=1e-3 * found.max())
+
+
+def shares(state):
+    """Left and right end of every pad node's share of the outline: 1/6, 4/6, 1/6 of each edge."""
+    result, model, _ = run()
+    left, right = np.full(len(model.mesh.points), np.inf), np.full(len(model.mesh.points), -np.inf)
+    x = model.mesh.points[:, 0] + state.u[:, 0]
+    for start, end, middle in result.mesh.edges_of("pad"):
+        a, L = x[start], x[end] - x[start]
+        for node, begin, finish in ((start, 0.0, 1 / 6), (middle, 1 / 6, 5 / 6), (end, 5 / 6, 1.0)):
+            left[node] = min(left[node], a + begin * L)
+            right[node] = max(right[node], a + finish * L)
+    return left[model.pad.nodes], right[model.pad.nodes]
+
+
+def test_widths_of_contact():
+    def overall(_, state):
+        left, right = shares(state)
+        touching = state.status > 0
+        return right[touching].max() - left[touching].min() if touching.any() else 0.0
+
+    def real(_, state):
+        left, right = shares(state)
+        return (right - left)[state.status > 0].sum()
+
+    for name, function in (("contact_width", overall), ("real_contact_width", real)):
+        found, expected = column(name, function)
+        np.testing.assert_allclose(found, expected, atol=1e-12, err_msg=name)
+        assert found[0] == 0.0
+        assert found[-1] > 0.0
+
+
+# -- fields ----------------------------------------------------------------------------------------------
+
+
+def each_frame():
+    result, model, states = run()
+    yield from zip(result.frames, states[1:], [model] * len(states), strict=False)
+
+
+def test_fields_of_the_pad():
+    for frame, state, model in each_frame():
+        left, right = shares(state)
+        x, y = positions(state).T
+        expected = {
+            "gap": y - model.surface.y - WAVES.height(x),
+            "contact_pressure": state.contact_force[:, 0] / (right - left),
+            "shear_traction": state.contact_force[:, 1] / (right - left),
+            "electrostatic_traction": np.sqrt((state.attraction**2).sum(axis=1)) / (right - left),
+            "contact_status": np.choose(state.status, [0, 1, 2, 2]),
+        }
+        off = np.setdiff1d(np.arange(len(model.mesh.points)), model.pad.nodes)
+        for name, values in expected.items():
+            field = getattr(frame, name)
+            np.testing.assert_allclose(field[model.pad.nodes], values, rtol=1e-9, atol=1e-14, err_msg=name)
+            assert (np.isnan(field[off]) if name == "gap" else field[off] == 0).all(), name
+        np.testing.assert_array_equal(frame.displacement, state.u)
+        assert frame.position == state.bone[0]
+
+
+def test_stresses_are_the_means_of_cauchys_over_the_cells():
+    """sigma = (mu (F F^T - 1) + lambda ln J) / J with F33 = 1; largest first, so that signs count."""
+    weight = quadrature()[0]
+    whole = weight.sum(axis=1)
+    for frame, state, _ in each_frame():
+        F = gradients(state)
+        J = F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0]
+        b, volume = np.einsum("ikeq,jkeq->ijeq", F, F), LAMBDA * np.log(J)
+        sigma = [
+            (MU * (b[0, 0] - 1.0) + volume) / J,
+            (MU * (b[1, 1] - 1.0) + volume) / J,
+            volume / J,
+            MU * b[0, 1] / J,
+        ]
+        expected = np.stack([(s * weight).sum(axis=1) / whole for s in sigma], axis=1)
+        largest = np.abs(expected).max(axis=0)
+        np.testing.assert_allclose(frame.cauchy_stress / largest, expected / largest, atol=2e-3)
+        np.testing.assert_allclose(frame.J, (J * weight).sum(axis=1) / whole, rtol=1e-5)
+
+
+def test_von_mises_is_the_length_of_the_deviator():
+    """sqrt(3/2 s : s), s = sigma - tr(sigma)/3; a uniaxial stress is its own measure."""
+    for frame, _, _ in each_frame():
+        xx, yy, zz, xy = frame.cauchy_stress.T
+        full = np.zeros((len(xx), 3, 3))
+        full[:, 0, 0], full[:, 1, 1], full[:, 2, 2] = xx, yy, zz
+        full[:, 0, 1] = full[:, 1, 0] = xy
+        deviator = full - np.trace(full, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+        expected = np.sqrt(1.5 * np.einsum("eij,eij->e", deviator, deviator))
+        np.testing.assert_allclose(frame.von_mises, expected, rtol=1e-12)
+    assert frame.von_mises.max() > 0.0
+    assert pytest.approx(np.sqrt(1.5 * ((2 / 3) ** 2 + 2 * (1 / 3) ** 2))) == 1.0

@@ -1,0 +1,289 @@
+"""What an accepted step promises: each condition is broken once, all others kept, and the state refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.meshes import block
+
+from evfem.contact.pad import make_pad
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.contact.surfaces import Flat, Sinusoid
+from evfem.mesh.mesh import raised
+from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
+from evfem.solver.equilibrium import Equilibrium
+from evfem.solver.interface import Interface, PenaltyInterface
+from evfem.solver.state import Balance, Limits, Record, StepFailed
+from evfem.solver.strategy import Strategy
+
+TOLERANCE, MU = 1e-6, 0.5
+MESH = raised(block(4, 2))
+PAD = make_pad(MESH)
+#: statuses of pad nodes in a row, with forces along normal and tangent (N/mm) that obey Coulomb's law
+NODES = {
+    OPEN: (0.0, 0.0),
+    STICK: (1.0, 0.3),
+    FORWARD: (0.8, -MU * 0.8),
+    BACKWARD: (0.6, MU * 0.6),
+}
+SLIP, GAP = 1e-3, 1e-2
+
+
+class Script:
+    """A body whose iterates and residuals are known beforehand: first the state in question, then a good
+    one.
+    """
+
+    def __init__(self, states, residuals):
+        self.size, self.record = len(MESH.points), Record()
+        self.states, self.residuals, self.admitted = states, residuals, []
+
+    def known(self, old, target):
+        return None
+
+    def begin(self, old, target, frozen, start):
+        return self.states[0]
+
+    def balance(self, state, attraction, target):
+        residual = self.residuals[self.record.iterations]
+        return state, Balance(np.zeros(2), residual, attraction)
+
+    def advance(self, old, state, target, balance):
+        return self.states[self.record.iterations + 1]
+
+    def accepted(self, old, state):
+        return state
+
+    def admit(self, state, gap):
+        self.admitted.append(gap)
+
+    def forget(self):
+        pass
+
+    def findings(self, state, balance):
+        return ""
+
+
+def legal(surface, kind=Interface):
+    """An interface, a state before a step and one after it that obeys everything: every fourth node is open,
+    sticks, has slipped forwards, backwards.
+    """
+    interface = kind(PAD, MESH.points, surface, TOLERANCE)
+    script = Script([], [])
+    equilibrium = Equilibrium(script, interface, None, Limits(TOLERANCE))
+    old = equilibrium.rest(np.zeros(2), 0.0)
+    status = np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size)
+    force = np.array([NODES[s] for s in status.tolist()])
+    x, y = MESH.points[PAD.nodes].T
+    moved = np.select([status == FORWARD, status == BACKWARD], [SLIP, -SLIP], 0.0)
+    u = old.u.copy()
+    u[PAD.nodes, 0] = moved
+    ground = surface.y + surface.height(x + moved)
+    u[PAD.nodes, 1] = ground - y + np.where(status == OPEN, GAP, 0.0)
+    new = replace(old, u=u, status=status, contact_force=force, reaction=np.array([0.1, -2.0]))
+    return interface, old, new
+
+
+def node(status):
+    return int(np.flatnonzero(np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size) == status)[0])
+
+
+def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2):
+    """Number of the iterate that the solver accepts, and what it has admitted as candidates."""
+    script = Script(states, residuals)
+    limits = Limits(TOLERANCE, Strategy(iterations=tries))
+    target = target or Target.held(old.bone, 0.0)
+    found = Equilibrium(script, interface, None, limits).step(old, target)
+    return next(k for k, state in enumerate(states) if state is found), script.admitted
+
+
+def shifted(state, where, change, axis):
+    """The state with one node displaced."""
+    u = state.u.copy()
+    u[PAD.nodes[where], axis] += change
+    return replace(state, u=u)
+
+
+def pushed(state, where, change, axis):
+    """The state with one contact force changed."""
+    force = state.contact_force.copy()
+    force[where, axis] += change
+    return replace(state, contact_force=force)
+
+
+SURFACES = [Flat(friction=MU, y=0.0), Sinusoid(friction=MU, terms=[[0.1, 2.0, 0.4]], y=0.0)]
+surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"])
+
+
+@surfaces
+def test_a_state_that_obeys_everything_is_accepted(surface):
+    interface, old, good = legal(surface)
+    assert accepted(interface, old, [good, good]) == (0, [])
+
+
+#: a good state with one thing changed, to be wrong by so much (mm or N/mm)
+BREAKERS = {
+    "lifted": lambda s, by: shifted(s, node(STICK), by, 1),
+    "sunk": lambda s, by: shifted(s, node(FORWARD), -by, 1),
+    "drifted": lambda s, by: shifted(s, node(STICK), by, 0),
+    "drifted back": lambda s, by: shifted(s, node(STICK), -by, 0),
+    "beyond the cone": lambda s, by: pushed(s, node(STICK), MU - 0.3 + by, 1),
+    "beyond the cone below": lambda s, by: pushed(s, node(STICK), -MU - 0.3 - by, 1),
+    "less than friction": lambda s, by: pushed(s, node(FORWARD), by, 1),
+    "more than friction": lambda s, by: pushed(s, node(BACKWARD), by, 1),
+    "forward going back": lambda s, by: shifted(s, node(FORWARD), -SLIP - by, 0),
+    "backward going forth": lambda s, by: shifted(s, node(BACKWARD), SLIP + by, 0),
+    "penetrated": lambda s, by: shifted(s, node(OPEN), -GAP - by, 1),
+}
+
+
+@pytest.mark.parametrize("name", BREAKERS)
+def test_each_condition_of_contact_is_asked_for(name):
+    """Allowed is the tolerance times the distance of the corners, 1 mm, or times the largest contact force,
+    1 N/mm.
+    """
+    interface, old, good = legal(SURFACES[0])
+    half, twice = (BREAKERS[name](good, part * TOLERANCE) for part in (0.5, 2.0))
+    assert accepted(interface, old, [half, good])[0] == 0
+    number, admitted = accepted(interface, old, [twice, good])
+    assert number == 1
+    # who has sunk in without being a candidate becomes one, and nobody else does
+    expected = [-2.0 * TOLERANCE] if name == "penetrated" else []
+    assert admitted == pytest.approx(expected, rel=1e-6)
+
+
+def test_tension_is_refused():
+    """A node that slips without friction may carry any normal force but for its sign."""
+    interface, old, good = legal(Flat(friction=0.0, y=0.0))
+    status = np.where(good.status == OPEN, OPEN, FORWARD)
+    force = np.where(status == OPEN, 0.0, 1.0)[:, None] * [1.0, 0.0]
+    good = replace(good, status=status, contact_force=force)
+    assert accepted(interface, old, [good, good])[0] == 0
+    for pull, number in ((0.5 * TOLERANCE, 0), (2.0 * TOLERANCE, 1)):
+        assert accepted(interface, old, [pushed(good, node(STICK), -1.0 - pull, 0), good])[0] == number
+    # and with friction as well: its shear force is that of Coulomb's law for the pulling force
+    interface, old, good = legal(SURFACES[0])
+    pulling = good.contact_force.copy()
+    pulling[node(FORWARD)] = [-0.1, MU * 0.1]
+    assert accepted(interface, old, [replace(good, contact_force=pulling), good])[0] == 1
+
+
+def test_gaps_and_slips_on_a_slope_are_those_along_the_profile():
+    """A slope of 1 at the middle node: it may be 1.4 times higher than on the flat, and move 0.7 times less."""
+    surface = Sinusoid(friction=MU, terms=[[1.0, 1.0, 0.0]], y=0.0)
+    middle = int(np.argmin(np.abs(MESH.points[PAD.nodes, 0])))
+    interface, old, good = legal(surface)
+    status, force = np.full(good.status.size, OPEN), np.zeros_like(good.contact_force)
+    status[middle], force[middle] = STICK, [1.0, 0.3]
+    lifted = np.where(np.arange(status.size) == middle, 0.0, 0.5)
+    x, y = MESH.points[PAD.nodes].T
+    u = old.u.copy()
+    u[PAD.nodes, 1] = surface.height(x) - y + lifted
+    good = replace(good, u=u, status=status, contact_force=force)
+    for change, number in ((1.3, 0), (1.5, 1)):
+        assert accepted(interface, old, [shifted(good, middle, change * TOLERANCE, 1), good])[0] == number
+    for change, number in ((0.6, 0), (0.8, 1)):
+        moved = shifted(good, middle, change * TOLERANCE, 0)
+        moved = shifted(moved, middle, float(np.sin(change * TOLERANCE)), 1)
+        assert accepted(interface, old, [moved, good])[0] == number
+
+
+def test_the_residual_and_the_place_of_the_bone_are_asked_for():
+    interface, old, good = legal(SURFACES[0])
+    for residual, number in ((1.0 * TOLERANCE, 0), (1.001 * TOLERANCE, 1)):
+        assert accepted(interface, old, [good, replace(good)], (residual, 0.0))[0] == number
+    for bone in ([1e-15, 0.0], [0.0, 1e-15]):
+        elsewhere = replace(good, bone=np.array(bone))
+        assert accepted(interface, old, [elsewhere, good])[0] == 1
+
+
+@pytest.mark.parametrize("residual", [np.nan, np.inf])
+def test_a_residual_that_is_no_number_fails_the_step(residual):
+    interface, old, good = legal(SURFACES[0])
+    with pytest.raises(StepFailed, match="not finite"):
+        accepted(interface, old, [good, good], (residual, 0.0))
+
+
+def test_iterates_that_are_never_right_fail_the_step():
+    interface, old, good = legal(SURFACES[0])
+    drifted = BREAKERS["drifted"](good, 2.0 * TOLERANCE)
+    with pytest.raises(StepFailed, match="no equilibrium in 2 iterations"):
+        accepted(interface, old, [drifted] * 3, (0.0, 0.0, 0.0))
+
+
+def wishing(force, x=0.1):
+    return Target(x, Indentation(0.0), FollowFriction(force, 1000.0))
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_wish_that_the_voltage_could_meet_is_not_passed_over(way):
+    """At 0 V more friction than wished for is all right, less is not; nothing in `good` sticks, so that the
+    wish has to be met. The reaction along x is the friction that the bone feels.
+    """
+    interface, old, good = legal(SURFACES[0])
+    good = replace(good, bone=np.array([0.1 * way, 0.0]), reaction=np.array([way * 0.1, -2.0]))
+    slack = TOLERANCE * 2.0
+    for missing, number in ((-10.0, 0), (0.5 * slack, 0), (2.0 * slack, 1)):
+        target = wishing(way * (0.1 + missing), 0.1 * way)
+        assert accepted(interface, old, [good, replace(good)], target=target)[0] == number
+
+
+def test_a_voltage_that_is_kept_needs_a_pad_that_sticks():
+    """Where a wish cannot be met the old voltage is kept, but only as long as some node sticks."""
+    interface, old, good = legal(SURFACES[0])
+    slipping = replace(good, status=np.where(good.status == STICK, OPEN, good.status))
+    u, force = good.u.copy(), good.contact_force.copy()
+    u[PAD.nodes[good.status == STICK], 1] += GAP
+    force[good.status == STICK] = 0.0
+    slipping = replace(slipping, u=u, contact_force=force)
+
+    class Helpless(FollowFriction):
+        """A wish that has no answer, and then the voltage as it was."""
+
+        def accepts(self, forward, reaction, slack):
+            return False
+
+        def fallback(self, old, found):
+            return GivenVoltage(old.voltage)
+
+    for state in (good, slipping):
+        script = Script([state, state], (0.0, 0.0, 0.0))
+        script.advance = lambda old, state, target, balance: state
+        equilibrium = Equilibrium(script, interface, None, Limits(TOLERANCE, Strategy(iterations=1)))
+        target = Target(0.0, Indentation(0.0), Helpless(1.0, 1000.0))
+        if state is good:
+            assert equilibrium.step(old, target) is good
+        else:
+            with pytest.raises(StepFailed, match="wished friction force"):
+                equilibrium.step(old, target)
+
+
+def test_a_yielding_interface_is_held_to_its_own_law():
+    """g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t A) = 0 with the tributary length A of before."""
+    surface, penalties = SURFACES[0], (50.0, 20.0)
+    interface, old, good = legal(surface, PenaltyInterface)
+    interface.penalties = penalties
+    before = np.zeros_like(good.contact_force)
+    before[:, 1] = 0.05
+    old = replace(old, contact_force=before)
+    A = PAD.length(MESH.points[PAD.nodes, 0])
+    normal, shear = good.contact_force.T
+    x, y = MESH.points[PAD.nodes].T
+    touching, sticks = good.status != OPEN, good.status == STICK
+    u = good.u.copy()
+    u[PAD.nodes, 1] -= np.where(touching, normal / (penalties[0] * A), 0.0)
+    creep = -(shear - 0.05) / (penalties[1] * A)
+    # slipping nodes have slipped by 1 um more than the interface gives way
+    sign = np.select([good.status == FORWARD, good.status == BACKWARD], [1.0, -1.0], 0.0)
+    u[PAD.nodes, 0] = np.where(touching, creep + SLIP * sign, 0.0)
+    good = replace(good, u=u)
+    assert accepted(interface, old, [good, replace(good)])[0] == 0
+    assert sticks.any()
+    k = node(STICK)
+    for broken in (
+        shifted(good, k, 2.0 * TOLERANCE, 1),
+        shifted(good, k, 2.0 * TOLERANCE, 0),
+        shifted(good, node(FORWARD), -SLIP - 2.0 * TOLERANCE, 0),
+        shifted(good, node(BACKWARD), SLIP + 2.0 * TOLERANCE, 0),
+    ):
+        assert accepted(interface, old, [broken, good])[0] == 1

@@ -1,0 +1,90 @@
+"""Finite elements behind the outer iteration: what counts as out of balance, and how far an update may go."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import finger
+from tools.meshes import block
+
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import Kaczmarek
+from evfem.scene.motion import Press
+from evfem.scene.scene import Scene
+from evfem.simulation.model import make_model
+from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
+from evfem.solver.state import StepFailed
+
+ROUND = finger(block(8, 3, sag=0.4))
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was for."""
+    scene = Scene(ROUND, Display(), Kaczmarek(), 1000.0, [Press(indentation=0.2)])
+    model = make_model(scene)
+    target = Target.held(model.bone(0.0, 0.2), 1000.0)
+    state = model.equilibrium.step(model.equilibrium.rest(model.bone(0.0, 0.0), 1000.0), target)
+    return model.equilibrium.body, state, target
+
+
+def residual(pressed, state=None, **controls):
+    body, accepted, target = pressed
+    state = accepted if state is None else state
+    return body.balance(state, accepted.attraction, replace(target, **controls))[1].residual
+
+
+def test_an_equilibrium_is_balanced(pressed):
+    assert residual(pressed) < 1e-8
+    assert np.abs(pressed[1].reaction).max() > 1e-3
+
+
+@pytest.mark.parametrize("missing", [0.01, -0.01])
+def test_a_prescribed_force_counts_like_the_forces_of_the_nodes(pressed, missing):
+    """Relative to the largest reaction, which is the vertical one."""
+    reaction = pressed[1].reaction
+    height = Force(float(-reaction[1] + missing))
+    assert residual(pressed, height=height) == pytest.approx(0.01 / np.abs(reaction).max(), rel=1e-5)
+    assert residual(pressed, height=Indentation(9.0)) < 1e-8
+
+
+@pytest.mark.parametrize("missing", [0.01, -0.01])
+def test_a_wished_friction_force_counts_while_the_voltage_is_free(pressed, missing):
+    reaction = pressed[1].reaction
+    drive = FollowFriction(float(reaction[0] + missing), 2000.0)
+    drive.begin(pressed[1])
+    assert residual(pressed, drive=drive) == pytest.approx(0.01 / np.abs(reaction).max(), rel=1e-5)
+    drive.begin(replace(pressed[1], voltage=0.0))  # at its lower bound
+    assert residual(pressed, drive=drive) < 1e-8
+    assert residual(pressed, drive=GivenVoltage(5.0)) < 1e-8
+
+
+def test_forces_that_add_up_count_by_their_sum(pressed):
+    """Every touching node pushed with as little as can pass alone: together they are so many times more."""
+    body, state, _ = pressed
+    touching = state.touching
+    extra = 1e-5 * touching[:, None] * [1.0, 0.0]
+    found = residual(pressed, replace(state, contact_force=state.contact_force + extra))
+    largest = np.abs(state.reaction).max()
+    assert touching.sum() >= 3
+    assert found == pytest.approx(1e-5 * touching.sum() / largest, rel=1e-3)
+    assert body.size == len(state.u)
+
+
+@pytest.mark.parametrize(("squeeze", "fraction"), [(0.9, 1.0), (1.2, 0.5), (3.0, 0.25), (30.0, 1.0 / 32.0)])
+def test_an_update_is_halved_until_no_volume_is_lost(pressed, squeeze, fraction):
+    """A block pressed flat along y has J = 1 - squeeze everywhere: the largest of 1, 1/2, 1/4 ... that
+    leaves more than 0.05.
+    """
+    body = pressed[0]
+    points = body.body.space.mesh.points
+    delta = np.zeros_like(points)
+    delta[:, 1] = -squeeze * points[:, 1]
+    assert body._largest_fraction(np.zeros_like(points), delta) == fraction
+
+
+def test_an_update_of_which_next_to_nothing_can_be_taken_fails_the_step(pressed):
+    body = pressed[0]
+    points = body.body.space.mesh.points
+    with pytest.raises(StepFailed, match="collapse"):
+        body._largest_fraction(np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]]))
