@@ -164,7 +164,8 @@ def _picture(result: Result, path: Path) -> None:
         figure.savefig(temporary, format="png", dpi=150)
 
 
-COLUMNS = {
+#: column of the history -> its head in the table of forces
+HEADS = {
     "position": "position",
     "indentation": "indent.",
     "voltage": "voltage",
@@ -180,15 +181,15 @@ WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 def table(rows: Sequence[Row], most: int = 12) -> str:
     """At most about `most` rows of a history, always the last of each motion, in 80 columns.
 
-    >>> row = dict.fromkeys(COLUMNS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
+    >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
     >>> print(table([row]))
     step motion  position indent. voltage   applied    normal tangential electrost.
                        mm      mm       V      N/mm      N/mm       N/mm       N/mm
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
-    lines = [_line("step", "motion", list(COLUMNS.values())), _line("", "", UNITS)]
+    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", UNITS)]
     for row in (rows[i] for i in chosen(rows, most)):
-        numbers = [_number(float(row[name]), _digits(name)) for name in COLUMNS]
+        numbers = [_number(float(row[name]), _digits(name)) for name in HEADS]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)
 

@@ -1,5 +1,6 @@
 """The benchmark's meshes and those that come with the package: what their recipes make."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -13,6 +14,8 @@ from evfem.studies.benchmark import LEVELS, benchmark_mesh
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.mesh.quality import scaled_jacobian
+
+README = (evfem.meshes.FOLDER / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("level", LEVELS)
@@ -52,11 +55,22 @@ def test_ready_made_meshes_are_what_the_recipe_makes(name, tmp_path):
     path = evfem.meshes.path(name)
     meshfile.write(RECIPES[name](), tmp_path / name)
     fresh, kept = meshfile.read(tmp_path / name), meshfile.read(path)
-    np.testing.assert_allclose(kept.points, fresh.points, atol=1e-12)
-    np.testing.assert_array_equal(kept.cells, fresh.cells)
-    np.testing.assert_array_equal(kept.region, fresh.region)
-    readme = (path.parent / "README.md").read_text()
-    assert f"`{name}` | {len(kept.cells)} {kept.kind}s, {len(kept.points)} |" in readme
+    again = f"{name} is not what its recipe makes; `python -m evfem.meshes.make` writes it again"
+    assert (kept.kind, kept.points.shape) == (fresh.kind, fresh.points.shape), again
+    np.testing.assert_allclose(kept.points, fresh.points, atol=1e-12, err_msg=again)
+    for part in ("cells", "region"):
+        assert np.array_equal(getattr(kept, part), getattr(fresh, part)), again
+    assert (kept.region_names, set(kept.node_sets)) == (fresh.region_names, set(fresh.node_sets)), again
+    listed = f"`{name}` | {len(kept.cells)} {kept.kind}s, {len(kept.points)} |"
+    assert listed in README, f"meshes/README.md does not say {listed}"
+
+
+@pytest.mark.parametrize(
+    ("family", "recipe"), [("finger-*", "finger-coarse-ridged.vtu"), ("benchmark-*", "benchmark-L0.vtu")]
+)
+def test_the_readme_of_the_meshes_names_their_regions_with_their_numbers(family, recipe):
+    listed = re.findall(rf"^\| `(\w+)` \| region of `{re.escape(family)}` \| (\d+) \|", README, re.M)
+    assert {name: int(number) for name, number in listed} == RECIPES[recipe]().region_names
 
 
 def test_ready_made_meshes_are_listed_and_small():

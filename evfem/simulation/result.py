@@ -38,6 +38,8 @@ RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
 SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
+#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
+NEEDED = ("motion", *INTEGERS, *RESUMED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +77,9 @@ _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 class Result:
     """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
 
+    A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of saved
+    results and checkpoints. `Ledger.row` computes its value; a whole number also stands in `INTEGERS`.
+
     `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are the sums
     of the contact forces on the finger, +y and -x components; `electrostatic_force` is the downward
     attraction.
@@ -105,6 +110,7 @@ class Result:
     substeps: Ints
     newton_iterations: Ints
     seconds: Floats
+    # a field before this line is a column of the history
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -195,17 +201,24 @@ class Result:
         save_arrays(path, arrays)
 
 
-COLUMNS = tuple(spec.name for spec in fields(Result))[:-3]
+_NAMES = [spec.name for spec in fields(Result)]
+COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
 
 
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    No object is unpickled, and no more memory is taken than the file is long (at most 4 GB).
+    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file without
+    one of those is refused as of another version. No object is unpickled, and no more memory is taken than
+    the file is long (at most 4 GB).
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
+    lacking = [f"history/{name}" for name in NEEDED if f"history/{name}" not in arrays]
+    if lacking:
+        given = f"{path}, of another version: without {', '.join(lacking)}"
+        raise InputError("result", given, f"a file written by Result.save of evfem {evfem.__version__}")
     try:
-        columns: dict[str, Any] = {name: _checked_column(name, arrays[f"history/{name}"]) for name in COLUMNS}
+        columns = {name: _column_of(arrays, name) for name in COLUMNS}
         mesh = _mesh_from(arrays)
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
@@ -216,6 +229,11 @@ def load(path: str | Path) -> Result:
         return Result(**columns, frames=frames, mesh=mesh, provenance=provenance)
     except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error
+
+
+def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
+    column = arrays.get(f"history/{name}")
+    return np.full(len(arrays["history/step"]), np.nan) if column is None else _checked_column(name, column)
 
 
 def _checked_column(name: str, column: np.ndarray) -> Any:
@@ -329,7 +347,8 @@ class Checkpoint:
         try:
             owner, version = str(arrays["scene"]), str(arrays["version"])
             rows = json.loads(str(arrays["rows"]))
-            if owner == scene_digest:
+            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows else []
+            if owner == scene_digest and not odd:
                 _check_rows(rows)
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
             raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
@@ -338,6 +357,9 @@ class Checkpoint:
             raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
             raise InputError("checkpoint", f"{self.path}, written by another scene", allowed)
+        if odd:
+            given = f"{self.path}, of another version: with missing or unknown columns {', '.join(odd)}"
+            raise InputError("checkpoint", given, allowed)
         state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
         return Saved(state, rows)
 
@@ -348,7 +370,7 @@ def _check_rows(rows: Any) -> None:
         raise ValueError("no rows")
     for step, row in enumerate(rows, 1):
         if set(row) != set(COLUMNS):
-            raise ValueError("columns of another version")
+            raise ValueError(f"columns of row {step}")
         numbers = [value for name, value in row.items() if name != "motion"]
         if row["step"] != step or not isinstance(row["motion"], str):
             raise ValueError(f"row {step}")

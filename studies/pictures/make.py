@@ -1,14 +1,32 @@
-"""The picture of the README: its ten lines, drawn."""
+"""The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them again.
 
+Those of the gallery come from their studies, `evfem study NAME --out docs/pictures`.
+"""
+
+import re
+import shutil
+import sys
+from contextlib import chdir
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import evfem as ev
 from evfem import plotting
 
-PICTURE = Path(__file__).with_name("slide.png")
+README = Path(__file__).with_name("slide.png")
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+#: picture in docs/pictures -> the page that shows it, and the file that this page's code writes; the code of
+#: "paraview.png" needs evfem[vtk]
+OF_PAGES = {
+    "howto-layers.png": ("howto/finger.md", "layers.png"),
+    "tutorial-forces.png": ("tutorial.md", "forces.png"),
+    "tutorial-deformed.png": ("tutorial.md", "deformed.png"),
+    "paraview.png": ("howto/paraview.md", "pad.png"),
+}
+CODE = re.compile(r"^(<!-- not run: .+? -->\n)?```python\n(.*?)^```$", re.M | re.S)
 
 
-def main(path: Path = PICTURE) -> None:
+def draw_readme(path: Path = README) -> None:
     """Run the README's example and draw forces, pad and contact pressure."""
     from matplotlib.figure import Figure
 
@@ -27,5 +45,23 @@ def main(path: Path = PICTURE) -> None:
     figure.savefig(path, dpi=90)
 
 
+def draw_from_page(picture: str) -> None:
+    """Run the Python blocks of the page in a folder of their own and keep the picture that they write."""
+    page, written = OF_PAGES[picture]
+    code = "\n".join(block for mark, block in CODE.findall((DOCS / page).read_text("utf-8")) if not mark)
+    with TemporaryDirectory() as folder, chdir(folder):
+        exec(compile(code, page, "exec"), {"__name__": "page"})
+        shutil.copyfile(written, DOCS / "pictures" / picture)
+
+
+def main(names: list[str]) -> None:
+    """Draw the named pictures, or all of them."""
+    for name in names or [README.name, *OF_PAGES]:
+        if name == README.name:
+            draw_readme()
+        else:
+            draw_from_page(name)
+
+
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -9,6 +9,7 @@ does not run here.
 
 import doctest
 import re
+import runpy
 import shlex
 import subprocess
 import sys
@@ -18,7 +19,7 @@ from pathlib import Path
 import pytest
 
 import evfem
-from evfem import cli
+from evfem import cli, studies
 from evfem.scene import file as scenefile
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps import file as sweepfile
@@ -38,8 +39,9 @@ TEXTS = [
 ]
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+FORMS = "docs/howto/form.md"
 #: pages that are still to be filled to the width of the others
-UNFILLED = {"docs/theory.md", "docs/howto/form.md"}
+UNFILLED = {"docs/theory.md", FORMS}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`
 NAME = re.compile(r"`((?:ev|evfem)(?:\.\w+)+)")
 DOI = re.compile(r"\b10\.\d{4,}/(?:[\w.-]|\(\w+\)|/)*\w")
@@ -237,6 +239,25 @@ def test_tests_that_the_page_on_verification_names_are_there():
     names = set(re.findall(r"`(test_\w+)`", read("docs/verification.md")))
     assert names
     assert names <= {path.stem for path in (ROOT / "tests").rglob("test_*.py")}
+
+
+def test_every_picture_has_a_recipe():
+    """A study of its name draws it, or the code of a page, as the script of the pictures says."""
+    recipes = runpy.run_path(str(ROOT / "studies/pictures/make.py"), run_name="recipes")["OF_PAGES"]
+    pictures = {path.name for path in (DOCS / "pictures").iterdir()}
+    assert pictures - set(recipes) <= {f"{name}.png" for name in studies.NAMES}
+    assert set(recipes) <= pictures
+    for picture, (page, written) in recipes.items():
+        code = "".join(text for kind, text, _, _ in blocks(page) if kind == "python")
+        assert f"pictures/{picture})" in read(f"docs/{page}"), picture
+        assert f'"{written}"' in code, picture
+
+
+def test_the_page_on_forms_names_the_regions_and_boundaries_of_the_finger():
+    told = re.search(r"The regions of `FingerPad` are (.+?);.+?boundaries (.+?)\.", read(FORMS), re.S)
+    mesh = evfem.FingerPad(resolution="coarse").mesh(1)
+    regions, boundaries = (set(re.findall(r"`(\w+)`", names)) for names in told.groups())
+    assert (regions, boundaries) == (set(mesh.region_names), set(mesh.node_sets))
 
 
 def test_the_version_is_the_same_wherever_it_is_said():

@@ -11,8 +11,9 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
-from evfem.simulation.result import COLUMNS, Checkpoint, Result, csv_header, csv_line, load, versions
+from evfem.simulation.result import COLUMNS, NEEDED, Checkpoint, Result, csv_header, csv_line, load, versions
 
+#: the promised columns, and their order in history.csv
 CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
     "applied_tangential_force, normal_force, tangential_force, electrostatic_force, electrostatic_force_x, "
@@ -115,13 +116,31 @@ def test_missing_files_and_missing_arrays_get_a_sentence(tmp_path):
     fake_result().save(tmp_path / "run.npz")
     with np.load(tmp_path / "run.npz") as archive:
         arrays = {name: archive[name] for name in archive.files}
-    np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "history/time"})
-    with pytest.raises(InputError, match="history/time"):
+    np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "mesh/points"})
+    with pytest.raises(InputError, match=r"damaged.*mesh/points"):
         load(tmp_path / "less.npz")
     arrays["frames/gap"] = arrays["frames/gap"][:, :-1]
     np.savez(tmp_path / "short.npz", **arrays)
     with pytest.raises(InputError, match="gap of shape"):
         load(tmp_path / "short.npz")
+
+
+@pytest.mark.parametrize("lacking", COLUMNS)
+def test_a_result_of_a_version_with_fewer_columns_is_read_or_refused_as_such(lacking, tmp_path):
+    result = fake_result()
+    result.save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as archive:
+        arrays = {name: archive[name] for name in archive.files}
+    del arrays[f"history/{lacking}"]
+    np.savez(tmp_path / "old.npz", **arrays)
+    if lacking in NEEDED:
+        with pytest.raises(InputError, match=f"of another version: without history/{lacking};"):
+            load(tmp_path / "old.npz")
+        return
+    old = load(tmp_path / "old.npz")
+    np.testing.assert_array_equal(getattr(old, lacking), np.full(4, np.nan))
+    for name in {*COLUMNS} - {lacking}:
+        np.testing.assert_array_equal(getattr(old, name), getattr(result, name))
 
 
 def test_a_disk_that_refuses_leaves_the_old_file_alone(tmp_path, monkeypatch):
@@ -190,6 +209,20 @@ def test_a_checkpoint_comes_back_for_its_own_scene_alone(tmp_path):
     np.testing.assert_array_equal(saved.arrays["displacement"], np.arange(6.0) / 7)
     with pytest.raises(InputError, match="another scene"):
         point.read("b" * 64)
+
+
+def test_a_checkpoint_with_other_columns_is_refused_as_of_another_version(tmp_path):
+    point, rows = Checkpoint(tmp_path / "checkpoint.npz"), [fake_row(1), fake_row(2)]
+    point.write("a" * 64, state(), [{k: v for k, v in row.items() if k != "min_gap"} for row in rows])
+    with pytest.raises(InputError, match="of another version: with missing or unknown columns min_gap;"):
+        point.read("a" * 64)
+    point.write("a" * 64, state(), [row | {"extra": 1.0} for row in rows])
+    with pytest.raises(InputError, match="of another version: with missing or unknown columns extra;"):
+        point.read("a" * 64)
+    del rows[1]["min_gap"]
+    point.write("a" * 64, state(), rows)
+    with pytest.raises(InputError, match="damaged: columns of row 2"):
+        point.read("a" * 64)
 
 
 def test_a_checkpoint_that_is_damaged_or_no_checkpoint_gets_a_sentence(tmp_path):
