@@ -305,10 +305,11 @@ def _study(given: argparse.Namespace) -> int:
     for name in names:
         if name not in studies.NAMES:
             raise InputError("study", name, f"{', '.join(studies.NAMES)}, all")
+    sample = _sample(given)
     for name in dict.fromkeys(names):
         print(f"study {name}", file=sys.stderr, flush=True)
         with notices.status(name):
-            studies.run(name, quick=given.quick, out=given.out, sample=_sample(given))
+            studies.run(name, given.quick, given.out, sample)
         print(given.out / f"{name}.json", flush=True)
     return DONE
 

@@ -27,20 +27,26 @@ from .tables import Tables
 OVER, LOOK = 75, 0.2
 
 
+class Stopped(Exception):
+    """The process was ended in the middle of its work, which has no end."""
+
+
 class Apart:
     """A process that judges one scene after the other."""
 
     def __init__(self) -> None:
         self._process: BaseProcess | None = None
         self._line: Connection | None = None
-        self._working = False
+        self._working = self._stopped = False
 
     def judge(self, tables: Tables, with_twins: bool, limit_s: float) -> Ending:
-        """How a scene ends; a `timeout` beyond so many CPU seconds, an `error` if the process dies."""
-        begin = time.perf_counter()
-        line = self._ready()
-        self._working = True
+        """How a scene ends; a `timeout` beyond so many CPU seconds, an `error` if the process dies.
+
+        Raises `Stopped` if it is ended by `stop`.
+        """
+        begin, self._working = time.perf_counter(), True
         try:
+            line = self._ready()
             line.send((tables, with_twins, limit_s))
             return line.recv()
         except (EOFError, OSError):
@@ -54,15 +60,17 @@ class Apart:
         return Ending("error", said, "process died")
 
     def stop(self) -> None:
-        """End the process: at once if it works."""
-        if self._process is None or self._line is None:
-            return
-        if self._working:
+        """End the process, in the middle of its work if it has any."""
+        self._stopped = True
+        if self._process is not None and self._working:
             self._process.kill()
-        self._line.close()
+        elif self._line is not None:
+            self._line.close()
 
     def _ready(self) -> Connection:
         """The line to a process that waits for work. Raises InputError where none can start."""
+        if self._stopped:
+            raise Stopped
         if self._line is not None:
             return self._line
         context = get_context("spawn")
@@ -78,6 +86,9 @@ class Apart:
         return self._line
 
     def _ended(self) -> int | None:
+        """The exit status of a process that has died; raises `Stopped` if it was told to."""
+        if self._stopped:
+            raise Stopped
         assert self._process is not None
         self._process.join()
         status, self._process, self._line = self._process.exitcode, None, None

@@ -75,7 +75,8 @@ def judge(tables: Tables, with_twins: bool) -> Ending:
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         # surfaces finer than the nodes and the like are what a campaign is about
         warnings.simplefilter("ignore")
-        return _judged(tables, Path(folder), with_twins)
+        ending = _judged(tables, Path(folder), with_twins)
+    return replace(ending, said=" ".join(ending.said.split()))
 
 
 def _judged(tables: Tables, folder: Path, with_twins: bool) -> Ending:

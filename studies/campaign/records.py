@@ -28,15 +28,17 @@ TABLE, FAILURES, MINIMAL = "ends.csv", "failures", "minimal"
 COLUMNS = ("seed", "scene", *(spec.name for spec in fields(Ending)), "digest")
 WHOLE, REAL = ("requested", "steps", "unknowns", "iterations", "substeps", "cuts"), ("cpu_s", "remainder")
 
+#: modules beside this one that decide on an end
+JUDGES = ("ending", "invariants", "tables", "twins")
+
 Key = tuple[int, int]
 
 
 def code_digest() -> str:
     """A fingerprint of the package, and of what judges its scenes."""
-    total = hashlib.sha256()
-    for folder in (Path(evfem.__file__).parent, Path(__file__).parent):
-        for path in sorted(folder.rglob("*.py")):
-            total.update(path.read_bytes())
+    package, here, total = Path(evfem.__file__).parent, Path(__file__).parent, hashlib.sha256()
+    for path in [*sorted(package.rglob("*.py")), *(here / f"{name}.py" for name in JUDGES)]:
+        total.update(path.read_bytes())
     return total.hexdigest()
 
 

@@ -17,7 +17,7 @@ from .shrinking import shrunk
 from .tables import Tables
 
 #: CPU seconds after which a scene is given up
-LIMIT_S = 120.0
+LIMIT_S = 60.0
 #: every so many scenes is run with its twins, which take as long again or longer
 TWINS = 4
 

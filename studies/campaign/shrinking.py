@@ -13,7 +13,7 @@ from .ending import Ending
 from .tables import Tables, copied, steps_of
 
 #: CPU seconds for one scene, the least for one attempt, and how many times the scene's own
-BUDGET_S, LEAST_S, FACTOR = 120.0, 5.0, 2.0
+BUDGET_S, LEAST_S, FACTOR = 40.0, 3.0, 2.0
 #: keys without which a table is simpler, in groups that go together first
 PLAIN = {
     "electrostatics": (("air_layer", "direction", "gap_eps_r", "coupling"), ("insulator_eps_r",)),

@@ -34,7 +34,7 @@ ASSUMPTIONS = {
     "time": f"CPU seconds of a scene alone, at most {LIMIT_S:g}, relative to the median of the "
     f"{NEIGHBOURS} scenes nearest in requested steps",
     "twins": f"every {TWINS}th scene is also mirrored, and where no path counts run with half the steps",
-    "remainder": "of the books: works less stored, kinetic and dissipated energy, over the largest; worst row",
+    "remainder": "works less stored, kinetic and dissipated energy over the largest of them, in any row",
     "meshes": "coarse ones of any size, with 6,000 displacement unknowns or so",
 }
 
