@@ -17,7 +17,7 @@ from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import evfem
 from evfem.common import notices
@@ -97,6 +97,10 @@ def _study_options(study: argparse.ArgumentParser) -> None:
     out = study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
     _complete(out, FOLDERS)
     study.add_argument("--quick", action="store_true", help="coarser and shorter")
+    drawn = study.add_argument_group("campaign alone", "scenes drawn at random")
+    drawn.add_argument("--scenes", type=int, metavar="N", help="how many; default: 300, 6 with --quick")
+    drawn.add_argument("--seed", type=int, metavar="S", help="which ones; default: 0")
+    drawn.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
 
 
 def _mesh_options(mesh: argparse.ArgumentParser) -> None:
@@ -117,7 +121,7 @@ def _results(command: argparse.ArgumentParser) -> None:
 def _study_names() -> str:
     """Help on the names of studies; a checkout that is not installed has none."""
     try:
-        return f"{', '.join(_studies().NAMES)}, or all (all but peers)"
+        return f"{', '.join(_studies().NAMES)}, or all (all but {' and '.join(_studies().APART)})"
     except InputError:
         return "name of a study, or all"
 
@@ -297,16 +301,24 @@ def _study(given: argparse.Namespace) -> int:
     studies = _studies()
     names: list[str] = []
     for name in given.names:
-        names += [n for n in studies.NAMES if n != "peers"] if name == "all" else [name]
+        names += [n for n in studies.NAMES if n not in studies.APART] if name == "all" else [name]
     for name in names:
         if name not in studies.NAMES:
             raise InputError("study", name, f"{', '.join(studies.NAMES)}, all")
+    sample = _sample(given)
     for name in dict.fromkeys(names):
         print(f"study {name}", file=sys.stderr, flush=True)
         with notices.status(name):
-            studies.run(name, quick=given.quick, out=given.out)
+            studies.run(name, given.quick, given.out, sample)
         print(given.out / f"{name}.json", flush=True)
     return DONE
+
+
+def _sample(given: argparse.Namespace) -> Any:
+    """Which scenes are drawn; None where nothing is said."""
+    said = {name: getattr(given, name) for name in ("scenes", "seed", "workers")}
+    said = {name: value for name, value in said.items() if value is not None}
+    return _studies().Sample(**said) if said else None
 
 
 def _studies() -> ModuleType:

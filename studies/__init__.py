@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from evfem.errors import InputError
 
-#: every study, in the order in which "all" runs them; it leaves `peers` out
+#: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMES = (
     "section321",
     "laws",
@@ -26,16 +27,47 @@ NAMES = (
     "stability",
     "work_precision",
     "peers",
+    "campaign",
 )
+#: studies that "all" leaves out: one needs packages of others, one takes hours
+APART = ("peers", "campaign")
 #: studies that have a folder of their own, and the module in it that runs them
-MODULES = {"stability": "stability.study", "work_precision": "precision.study", "peers": "peers.study"}
+MODULES = {
+    "stability": "stability.study",
+    "work_precision": "precision.study",
+    "peers": "peers.study",
+    "campaign": "campaign.study",
+}
 
 
-def run(name: str, quick: bool = False, out: Path | None = None) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Sample:
+    """What a study that draws scenes draws: how many (None: its own number), of which seed, in how many
+    processes (None: one for each core).
+    """
+
+    scenes: int | None = None
+    seed: int = 0
+    workers: int | None = None
+
+    def __post_init__(self) -> None:
+        for key, least in (("scenes", 1), ("seed", 0), ("workers", 1)):
+            value = getattr(self, key)
+            if value is not None and value < least:
+                raise InputError(key, value, f"a whole number, at least {least}")
+
+
+def run(
+    name: str, quick: bool = False, out: Path | None = None, sample: Sample | None = None
+) -> dict[str, Any]:
     """Run the study `name`; with `out`, write NAME.json, NAME.csv and NAME.png into that folder.
 
-    Returns the dictionary with study, numbers, paper, assumptions and provenance.
+    `sample` is for `campaign` alone. Returns the dictionary with study, numbers, paper, assumptions and
+    provenance.
     """
     if name not in NAMES:
         raise InputError("study", name, ", ".join(NAMES))
-    return import_module(f".{MODULES.get(name, name)}", __package__).main(quick=quick, out=out)
+    if sample is not None and name != "campaign":
+        raise InputError("study", f"scenes, seed or workers for {name}", "these options with campaign alone")
+    main = import_module(f".{MODULES.get(name, name)}", __package__).main
+    return main(quick=quick, out=out) if sample is None else main(quick=quick, out=out, sample=sample)

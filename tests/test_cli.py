@@ -344,14 +344,29 @@ def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
     assert files(tmp_path) == []
 
 
-def test_all_means_every_study_but_the_peers(monkeypatch, tmp_path):
+def test_all_means_every_study_but_those_that_stand_apart(monkeypatch, tmp_path):
     from evfem import studies
 
     ran = []
-    monkeypatch.setattr(studies, "NAMES", ("laws", "peers", "fig05"))
-    monkeypatch.setattr(studies, "run", lambda name, quick, out: ran.append((name, quick, out)))
+    monkeypatch.setattr(studies, "NAMES", ("laws", "peers", "fig05", "campaign"))
+    monkeypatch.setattr(studies, "run", lambda *words: ran.append(words))
     assert cli.main(["study", "fig05", "all", "--out", str(tmp_path)]) == 0
-    assert ran == [("fig05", False, tmp_path), ("laws", False, tmp_path)]
+    assert ran == [("fig05", False, tmp_path, None), ("laws", False, tmp_path, None)]
+
+
+def test_scenes_of_a_campaign_are_chosen_by_options_that_others_refuse(monkeypatch, tmp_path):
+    from evfem.studies.campaign import study
+
+    from evfem import studies
+
+    ran = []
+    monkeypatch.setattr(study, "main", lambda quick, out, sample: ran.append(sample))
+    assert cli.main(["study", "campaign", "--scenes", "7", "--seed", "3", "--out", str(tmp_path)]) == 0
+    assert ran == [studies.Sample(scenes=7, seed=3)]
+    for words in (["laws", "--seed", "3"], ["campaign", "--scenes", "0"], ["campaign", "--seed", "-1"]):
+        status, _, err = called(tmp_path, "study", *words)
+        assert status == 2
+        assert "allowed:" in err
 
 
 def test_version_and_help_are_quick_to_load_and_print():

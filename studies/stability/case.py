@@ -169,7 +169,7 @@ class Found:
 
 def judge(case: Case) -> Found:
     """Run a case; nothing it raises gets lost."""
-    _warm_up()
+    warm_up()
     log, begin = Log(), time.process_time()
     try:
         with warnings.catch_warnings():
@@ -207,7 +207,7 @@ def judge(case: Case) -> Found:
 
 
 @cache
-def _warm_up() -> None:
+def warm_up() -> None:
     """Load and compile what the first simulation of a process would have to pay for."""
     from evfem.contact.surfaces import Display
     from evfem.electrostatics.laws import Kaczmarek

@@ -1,0 +1,1 @@
+"""The study `campaign`: scenes that nobody chose, drawn from everything a scene file can say."""

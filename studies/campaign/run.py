@@ -1,0 +1,83 @@
+"""A campaign as it runs: workers that take the next scene, then shrink what failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from queue import SimpleQueue
+from typing import Any
+
+from evfem.common import notices
+
+from .apart import Apart
+from .drawing import draw
+from .ending import Ending
+from .records import Key, Records
+from .shrinking import shrunk
+from .tables import Tables
+
+#: CPU seconds after which a scene is given up
+LIMIT_S = 60.0
+#: every so many scenes is run with its twins, which take as long again or longer
+TWINS = 4
+
+Task = Callable[[Apart, Key], None]
+
+
+def run(keys: Sequence[Key], records: Records, workers: int) -> None:
+    """Judge the scenes that have no end yet and shrink those that failed; what is done is on disk."""
+    todo = [key for key in keys if records.known(key, draw(*key)) is None]
+    apart = [Apart() for _ in range(workers)]
+
+    def end(one: Apart, key: Key) -> None:
+        tables = draw(*key)
+        records.add(key, tables, one.judge(tables, _with_twins(key), LIMIT_S))
+
+    def shrink(one: Apart, key: Key) -> None:
+        def judge(tables: Tables, limit_s: float) -> Ending:
+            return one.judge(tables, _with_twins(key), limit_s)
+
+        records.add_minimal(key, *shrunk(draw(*key), records.ends[key], judge))
+
+    try:
+        _each(end, todo, apart, "scene", len(keys) - len(todo))
+        _each(shrink, [key for key in keys if records.shrinks(key)], apart, "failure")
+    finally:
+        for one in apart:
+            one.stop()
+
+
+def _with_twins(key: Key) -> bool:
+    return key[1] % TWINS == 0
+
+
+def _each(task: Task, keys: Sequence[Key], apart: Sequence[Apart], unit: str, done: int = 0) -> None:
+    """Do a task for every key, as many at a time as there are processes; progress is shown."""
+    free: SimpleQueue[Apart] = SimpleQueue()
+    for one in apart:
+        free.put(one)
+
+    def with_one(key: Key) -> None:
+        one = free.get()
+        try:
+            task(one, key)
+        finally:
+            free.put(one)
+
+    total = done + len(keys)
+    bar = notices.bar(total, unit, done, notices.drawable() and bool(keys))
+    with ThreadPoolExecutor(len(apart)) as pool:
+        futures: list[Future[Any]] = [pool.submit(with_one, key) for key in keys]
+        try:
+            for count, future in enumerate(as_completed(futures), done + 1):
+                future.result()
+                bar.update(1)
+                if bar.disable:
+                    notices.milestone(unit, count, total)
+        except BaseException:  # Ctrl-C: what is running is ended, what waits is not begun
+            pool.shutdown(wait=False, cancel_futures=True)
+            for one in apart:
+                one.stop()
+            raise
+        finally:
+            bar.close()

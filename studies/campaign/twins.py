@@ -1,0 +1,69 @@
+"""Scenes that must give the same as another: the mirrored one, and where no path counts, half the steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+
+from .invariants import FORCE, Broken, remainder
+
+#: columns that are compared, and which of them change sign in a mirror
+ODD = ("position", "tangential_force", "applied_tangential_force", "electrostatic_force_x")
+COMPARED = (*ODD, "indentation", "normal_force", "applied_force", "electrostatic_force")
+#: relative differences that two correct results may have
+MIRRORED, HALVED = 1e-4, 1e-5
+#: a change of the remainder of the books in one row above this is taken for a snap
+SNAP = 0.01
+
+
+def smooth(result: Result) -> bool:
+    """Whether a run took every step whole and nothing in it snapped.
+
+    Beyond a cut or a snap the way of the iterations decides which of several equilibria is found.
+    """
+    jumps = np.abs(np.diff(remainder(result), prepend=0.0))
+    return int(result.provenance["solver"]["cuts"]) == 0 and bool((jumps < SNAP).all())
+
+
+def free_of_path(scene: Scene) -> bool:
+    """Whether the end of a scene does not depend on the steps towards it.
+
+    Friction, time and penalties (whose nodes yield by the lengths of the step before) make it depend on
+    them, and so do attractions that lag behind by a step.
+    """
+    return (
+        not scene.ground.has_friction
+        and scene.solver.dynamics == "quasistatic"
+        and scene.solver.contact == "exact"
+        and scene.air_layer
+        and scene.coupling != "staggered_once"
+    )
+
+
+def mirror_broken(one: Result, other: Result) -> Broken | None:
+    """Whether the rows of the mirrored scene are those of the scene."""
+    if len(one.step) != len(other.step):
+        return Broken("mirror", int(min(len(one.step), len(other.step))) + 1, 1.0, 0.0)
+    scale, rows = _scale(one), []
+    for name in COMPARED:
+        sign = -1.0 if name in ODD else 1.0
+        apart = np.abs(getattr(one, name) - sign * getattr(other, name))
+        rows.append(apart / (scale if "force" in name else 1.0))
+    worst = np.max(rows, axis=0)
+    row = int(np.argmax(worst))
+    return Broken("mirror", row + 1, float(worst[row]), MIRRORED) if worst[row] > MIRRORED else None
+
+
+def steps_broken(one: Result, other: Result) -> Broken | None:
+    """Whether the last row of the scene with half the steps is that of the scene."""
+    names = [name for name in COMPARED if "force" in name]
+    apart = max(abs(float(getattr(one, name)[-1] - getattr(other, name)[-1])) for name in names)
+    value = apart / _scale(one)
+    return Broken("half the steps", len(one.step), value, HALVED) if value > HALVED else None
+
+
+def _scale(result: Result) -> float:
+    names = ("normal_force", "applied_force", "electrostatic_force", "tangential_force")
+    return max(FORCE, *(float(np.abs(getattr(result, name)).max(initial=0.0)) for name in names))

@@ -1,0 +1,444 @@
+"""The campaign: scenes nobody chose end in equilibria, and nothing that is broken passes its checks."""
+
+import csv
+import importlib
+import importlib.util
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evfem.errors import NotConverged
+from evfem.simulation.run import simulate
+
+studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
+NAMES = "apart drawing ending invariants records run shrinking study tables twins"
+apart, drawing, ending, invariants, records, run, shrinking, study, tables, twins = (
+    importlib.import_module(f"{studies.__name__}.campaign.{name}") for name in NAMES.split(" ")
+)
+Ending = ending.Ending
+
+
+# -- drawing
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    return [drawing.draw(5, number) for number in range(150)]
+
+
+def test_every_drawn_scene_is_valid_and_so_is_its_mirror_image(drawn):
+    for one in drawn:
+        scene = tables.scene_of(one)
+        assert tables.scene_of(tables.mirrored(one)).total_steps == scene.total_steps
+        assert tables.scene_of(tables.with_half_steps(one)).total_steps == 2 * scene.total_steps
+
+
+def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
+    charged = [one["electrostatics"] for one in drawn if "electrostatics" in one]
+    for one in charged:
+        volts = [abs(one.get("voltage", 0.0)), *(u for _, u in one.get("voltage_profile", []))]
+        assert max(volts) <= 3000.0
+        assert max(volts) <= 60e3 * one["insulator_thickness"] * (1.0 + 1e-9)
+        assert 0.005 <= one["insulator_thickness"] <= 0.5
+    for one in drawn:
+        friction = np.atleast_2d(one["surface"]["friction"])[:, -1]
+        assert friction.min() >= 0.0
+        assert friction.max() <= 1.5
+
+
+def test_everything_that_a_scene_file_can_say_is_drawn(drawn):
+    def seen(name, key):
+        return {one.get(name, {}).get(key) for one in drawn}
+
+    assert seen("surface", "kind") == {"flat", "sinusoid", "profile"}
+    assert seen("solver", "element") == {None, "q1", "q1_fbar", "q2", "q2p1"}
+    assert seen("solver", "dynamics") == {None, "viscous", "inertial"}
+    assert seen("solver", "contact") == {None, "penalty"}
+    assert {"strong_troxel", "kaczmarek"} < seen("electrostatics", "law")
+    assert {"staggered", "staggered_once"} < seen("electrostatics", "coupling")
+    assert {"normal"} < seen("electrostatics", "direction")
+    assert {False} < seen("electrostatics", "air_layer")
+    assert seen("finger", "ridges") == {True, False}
+    motions = [motion for one in drawn for motion in one["motion"]]
+    assert {motion["kind"] for motion in motions} == {"press", "slide", "hover", "voltage"}
+    assert {motion.get("hold") for motion in motions} == {None, "force"}
+    rows = [one["surface"]["friction"] for one in drawn if isinstance(one["surface"]["friction"], list)]
+    widths = np.concatenate([np.diff(np.array(table)[:, 0]) for table in rows])
+    assert (widths == 0.0).any()  # jumps
+    assert ((widths > 0.0) & (widths < 0.02)).any()  # ramps within a node spacing
+
+
+def test_a_scene_depends_on_its_seed_and_number_alone():
+    assert drawing.draw(1, 7) == drawing.draw(1, 7)
+    assert drawing.draw(1, 7) != drawing.draw(1, 8)
+    assert drawing.draw(1, 7) != drawing.draw(2, 7)
+
+
+def test_a_mirror_image_of_the_mirror_image_is_the_scene(drawn):
+    for one in drawn:
+        again = tables.mirrored(tables.mirrored(one))
+        again["surface"].setdefault("terms", None)
+        expected = tables.copied(one)
+        if one["surface"]["kind"] != "sinusoid" or "terms" in one["surface"]:
+            expected["surface"].setdefault("terms", None)
+            assert again == expected
+
+
+def test_a_mirrored_profile_is_as_high_on_the_other_side(drawn):
+    for one in drawn:
+        surface, image = tables.scene_of(one).surface, tables.scene_of(tables.mirrored(one)).surface
+        x = np.linspace(-5.0, 5.0, 37)
+        np.testing.assert_allclose(image.height(-x), surface.height(x), rtol=0, atol=1e-12)
+        off = x + 1e-4  # a jump holds to its right on either side of the mirror
+        np.testing.assert_allclose(image.friction_coefficient(-off), surface.friction_coefficient(off))
+
+
+def test_files_beside_a_scene_say_the_same(drawn, tmp_path):
+    one = next(t for t in drawn if "points" in t["surface"])
+    loaded = tables.loads(tables.text_of(tables.with_files(one, tmp_path)), tmp_path)
+    assert (tmp_path / "profile.csv").exists()
+    assert loaded.digest() == tables.scene_of(one).digest()
+
+
+# -- invariants
+
+SCENE = {
+    "version": 1,
+    "finger": {"resolution": "coarse", "ridges": False},
+    "surface": {"kind": "flat", "friction": 0.4},
+    "electrostatics": {
+        "law": "kaczmarek",
+        "voltage": 800.0,
+        "insulator_thickness": 0.09,
+        "insulator_eps_r": 3.35,
+    },
+    "solver": {"element": "q1"},
+    "motion": [
+        {"kind": "press", "indentation": 0.6, "steps": 2},
+        {"kind": "slide", "distance": 2.0, "steps": 4},
+        {"kind": "voltage", "voltage": 0.0, "steps": 1},
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def correct():
+    scene = tables.scene_of(SCENE)
+    return scene, simulate(scene)
+
+
+def test_a_correct_result_breaks_no_invariant(correct):
+    assert invariants.broken(*correct) == []
+
+
+def _column(name, change):
+    def corrupt(result):
+        values = np.array(getattr(result, name), dtype=float)
+        values[3] = change(values[3])
+        return replace(result, **{name: values})
+
+    return corrupt
+
+
+def _field(name, change, row=3):
+    def corrupt(result):
+        frames, field = list(result.frames), np.array(getattr(result.frames[row], name))
+        frames[row] = replace(frames[row], **{name: change(field, frames[row])})
+        return replace(result, frames=frames)
+
+    return corrupt
+
+
+def _one_open_node_pushed(pressure, frame):
+    node = np.flatnonzero((frame.contact_status == 0) & (frame.gap > 0.0))[0]
+    pressure[node] = 1e-6
+    return pressure
+
+
+CORRUPTED = {
+    "finite": _column("stored_energy", lambda v: np.nan),
+    "balance": _column("applied_force", lambda v: v * 1.00001),
+    "cone": _column("tangential_force", lambda v: v * 1.5),
+    "held": _column("indentation", lambda v: v + 1e-4),
+    "penetration": _column("min_gap", lambda v: -1e-5),
+    "signs": _column("electrostatic_force", lambda v: -v),
+    "friction_dissipation falls": _column("friction_dissipation", lambda v: 0.0),
+    "viscous_dissipation falls": _column("viscous_dissipation", lambda v: 1e-3),
+    "pull": _field("contact_pressure", lambda p, f: p - 1e-4 * p.max()),
+    "nodal cone": _field("shear_traction", lambda s, f: 1.001 * s),
+    "open nodes": _field("contact_pressure", _one_open_node_pushed),
+    "volume": _field("J", lambda J, f: np.where(J.min() == J, -0.1, J)),
+}
+
+
+@pytest.mark.parametrize("name", CORRUPTED)
+def test_an_invariant_sees_what_breaks_it(correct, name):
+    scene, result = correct
+    found = invariants.broken(scene, CORRUPTED[name](result))
+    assert name in [one.name for one in found]
+    assert next(one.step for one in found if one.name == name) in (4, 5)
+
+
+def test_a_target_that_is_missed_is_seen(correct):
+    scene, result = correct
+    other = result.indentation.copy()
+    other[:] += 1e-3
+    assert "targets" in [one.name for one in invariants.broken(scene, replace(result, indentation=other))]
+
+
+def test_attraction_without_voltage_is_seen(correct):
+    scene, result = correct
+    other = result.electrostatic_force.copy()
+    assert other[-1] == 0.0
+    other[-1] = 1e-12
+    assert "no attraction" in [
+        one.name for one in invariants.broken(scene, replace(result, electrostatic_force=other))
+    ]
+
+
+def test_a_node_held_at_a_jump_of_friction_breaks_nothing():
+    rough = SCENE | {"surface": {"kind": "flat", "friction": [[1.5, 0.2], [1.5, 0.9]]}}
+    scene = tables.scene_of(rough)
+    result = simulate(scene)
+    frame = result.frames[4]
+    x = result.mesh.points[:, 0] + frame.displacement[:, 0]
+    assert ((np.abs(x - 1.5) < invariants.NEAR) & (frame.contact_status == 1)).any()
+    assert invariants.broken(scene, result) == []
+
+
+def test_the_remainder_of_the_books_is_what_no_column_has(correct):
+    _, result = correct
+    rest = invariants.remainder(result)
+    more = replace(result, external_work=result.external_work + 0.5 * invariants.largest_energy(result))
+    assert np.all(invariants.remainder(more) > rest)
+
+
+# -- twins
+
+
+def test_the_mirror_image_of_a_scene_gives_the_mirrored_rows(correct):
+    _, result = correct
+    other = simulate(tables.scene_of(tables.mirrored(SCENE)))
+    assert twins.smooth(result)
+    assert twins.mirror_broken(result, other) is None
+    assert twins.mirror_broken(result, result).name == "mirror"  # not its own mirror image
+    pushed = other.normal_force.copy()
+    pushed[2] *= 1.001
+    assert twins.mirror_broken(result, replace(other, normal_force=pushed)).step == 3
+
+
+def test_steps_count_only_where_there_is_a_path(correct):
+    scene, _ = correct
+    assert not twins.free_of_path(scene)
+    plain = SCENE | {"surface": {"kind": "flat", "friction": 0.0}, "motion": SCENE["motion"][:1]}
+    assert twins.free_of_path(tables.scene_of(plain))
+    one, finer = (simulate(tables.scene_of(t)) for t in (plain, tables.with_half_steps(plain)))
+    assert twins.steps_broken(one, finer) is None
+    pushed = finer.normal_force.copy()
+    pushed[-1] *= 1.0001
+    assert twins.steps_broken(one, replace(finer, normal_force=pushed)).name == "half the steps"
+
+
+# -- ends
+
+
+def ended(monkeypatch, raised):
+    def stops(scene):
+        raise raised
+
+    monkeypatch.setattr(ending, "simulate", stops)
+    return ending.judge(SCENE, False)
+
+
+def test_classes_of_ends(monkeypatch):
+    assert ended(monkeypatch, NotConverged(2, [1.0], "contact: 3 of 40 nodes keep changing; x")).kind == (
+        "contact: N of N nodes keep changing"
+    )
+    assert ended(monkeypatch, NotConverged(2, [1.0], "no equilibrium in 40 iterations")).outcome == (
+        "not_converged"
+    )
+    explained = NotConverged(2, [1.0], "there is no equilibrium: the attraction exceeds ...")
+    assert ended(monkeypatch, explained).outcome == "explained"
+    found = ended(monkeypatch, ZeroDivisionError("by\nzero"))
+    assert (found.outcome, found.said, found.good) == ("error", "ZeroDivisionError: by zero", False)
+    assert ending.judge(SCENE | {"version": 2}, False).outcome == "refused"
+
+
+def test_rows_before_a_failure_are_checked_too(monkeypatch, correct):
+    bad = CORRUPTED["balance"](correct[1])
+    found = ended(monkeypatch, NotConverged(7, [1.0], "the residual grows", bad))
+    assert (found.outcome, found.kind, found.steps) == ("invariants_broken", "balance", 7)
+
+
+def test_a_scene_is_judged_with_its_twins():
+    plain = SCENE | {"surface": {"kind": "flat", "friction": 0.0}, "motion": SCENE["motion"][:1]}
+    found = ending.judge(plain, True)
+    assert (found.outcome, found.steps, found.requested) == ("equilibrium", 2, 2)
+    assert found.cpu_s > 0.0
+
+
+# -- shrinking
+
+
+def test_a_failure_is_shrunk_to_what_makes_it():
+    asked = []
+
+    def judge(one, limit_s):
+        asked.append(one)
+        slides = any(motion["kind"] == "slide" for motion in one["motion"])
+        bad = slides and one["surface"]["friction"] != 0.0 and one.get("solver", {}).get("element") == "q1"
+        return Ending("not_converged" if bad else "equilibrium", kind="why", cpu_s=0.01)
+
+    start = drawing.draw(5, 3) | {"solver": {"element": "q1", "tolerance": 1e-9}}
+    start = start | {"surface": {"kind": "flat", "friction": [[0.0, 0.5], [1.0, 0.7]]}}
+    start = start | {"motion": [*SCENE["motion"], {"kind": "slide", "distance": 1.0, "steps": 9}]}
+    found, end = shrinking.shrunk(start, judge(start, 1.0), judge)
+    assert end.outcome == "not_converged"
+    assert [motion["kind"] for motion in found["motion"]] == ["slide"]
+    assert found["motion"][0]["steps"] == 1
+    assert found["solver"]["element"] == "q1"
+    assert "electrostatics" not in found
+    assert found["finger"] == {"resolution": "coarse", "ridges": False}
+    assert isinstance(found["surface"]["friction"], float)
+    assert all(one != start for one in asked[1:])
+
+
+def test_shrinking_stops_when_its_time_is_used_up():
+    asked = []
+
+    def judge(one, limit_s):
+        asked.append(one)
+        return Ending("not_converged", cpu_s=0.6 * shrinking.BUDGET_S)
+
+    shrinking.shrunk(SCENE, Ending("not_converged"), judge)
+    assert len(asked) == 2
+
+
+def test_another_reason_is_another_end():
+    one = Ending("not_converged", kind="cells would collapse")
+    assert not one.same_as(replace(one, kind="the residual grows"))
+    assert one.same_as(replace(one, cpu_s=3.0))
+
+
+# -- the campaign
+
+
+class Fake:
+    """Judges in no time: every fifth scene fails."""
+
+    asked = ()
+
+    def judge(self, one, with_twins, limit_s):
+        number = next((n for n in range(30) if drawing.draw(0, n) == one), None)
+        Fake.asked = (*Fake.asked, number)
+        bad = number is not None and number % 5 == 0
+        outcome = "not_converged" if bad else "equilibrium"
+        return Ending(outcome, "said", "why", 8, 4, 6000, 20, 8, 0, 0.5 + (number == 1) * 49.5, 0.1)
+
+    def stop(self):
+        pass
+
+
+@pytest.fixture
+def fake(monkeypatch):
+    Fake.asked = ()
+    monkeypatch.setattr(run, "Apart", Fake)
+    return Fake
+
+
+def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
+    result = studies.run("campaign", out=tmp_path, sample=studies.Sample(scenes=10, workers=2))
+    numbers = result["numbers"]
+    assert (numbers["scenes"], numbers["equilibrium"], numbers["not_converged"]) == (10.0, 8.0, 2.0)
+    assert numbers["explained"] == numbers["invariants_broken"] == 0.0
+    assert numbers["slowest_over_median"] == pytest.approx(100.0)
+    assert sorted(p.name for p in tmp_path.iterdir() if p.is_file()) == [
+        f"campaign.{end}" for end in ("csv", "json", "png")
+    ]
+    assert json.loads((tmp_path / "campaign.json").read_text())["numbers"] == numbers
+    with open(tmp_path / "campaign" / "ends.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["scene"] for row in rows] == [str(n) for n in range(10)]
+    for folder in ("failures", "minimal"):
+        names = sorted(p.name for p in (tmp_path / "campaign" / folder).iterdir())
+        assert names == ["seed0-scene0000.toml", "seed0-scene0005.toml"]
+    failure = tmp_path / "campaign" / "failures" / "seed0-scene0005.toml"
+    assert failure.read_text().startswith("# seed 0, scene 5: not_converged; said\n")
+    assert tables.loads(failure.read_text()).digest() == tables.scene_of(drawing.draw(0, 5)).digest()
+
+
+def test_finished_scenes_are_not_run_again_unless_the_code_is_another(fake, tmp_path, monkeypatch):
+    def asked(scenes):
+        fake.asked = ()
+        studies.run("campaign", out=tmp_path, sample=studies.Sample(scenes=scenes, workers=1))
+        return [number for number in fake.asked if number is not None]
+
+    assert asked(6) == [0, 1, 2, 3, 4, 5]
+    assert asked(6) == []
+    assert asked(8) == [6, 7]
+    monkeypatch.setattr(records, "code_digest", lambda: "another")
+    again = records.Records(tmp_path / "campaign", code="another")
+    assert again.known((0, 3), drawing.draw(0, 3)) is None
+
+
+def test_what_is_done_is_kept_when_a_campaign_is_interrupted(fake, tmp_path, monkeypatch):
+    def judge(self, one, with_twins, limit_s):
+        if one == drawing.draw(0, 3):
+            raise KeyboardInterrupt
+        return Ending("equilibrium", cpu_s=0.1)
+
+    monkeypatch.setattr(Fake, "judge", judge)
+    with pytest.raises(KeyboardInterrupt):
+        studies.run("campaign", out=tmp_path, sample=studies.Sample(scenes=6, workers=1))
+    kept = records.Records(tmp_path / "campaign")
+    assert {(0, 0), (0, 1), (0, 2)} <= set(kept.ends)
+    assert (0, 3) not in kept.ends
+
+
+def test_slowness_compares_with_scenes_of_the_same_size():
+    small = [Ending("equilibrium", requested=4, cpu_s=1.0)] * 30
+    large = [Ending("equilibrium", requested=400, cpu_s=100.0)] * 30
+    assert study.slowness([*small, *large]).max() == 1.0
+
+
+@pytest.mark.slow
+def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
+    one = apart.Apart()
+    try:
+        long = SCENE | {"motion": [{"kind": "press", "indentation": 0.6, "steps": 4000}]}
+        assert one.judge(long, False, 1.0).outcome == "timeout"
+        assert one.judge(SCENE, False, 60.0).outcome == "equilibrium"
+    finally:
+        one.stop()
+
+
+# -- the property
+
+#: scenes that do not end well yet, and why
+KNOWN = {2: "friction_dissipation falls", 4: "1 of 45 nodes keep changing"}
+
+
+def scenes(start, stop):
+    """Numbers of scenes; the known ones must still fail, so that a mended one is struck off."""
+    marks = {n: pytest.mark.xfail(reason=reason, strict=True) for n, reason in KNOWN.items()}
+    return [pytest.param(n, marks=marks.get(n, ())) for n in range(start, stop)]
+
+
+def ends_well(number):
+    found = ending.judge(drawing.draw(0, number), number % run.TWINS == 0)
+    assert found.good, f"scene {number} of seed 0: {found.outcome}; {found.said}"
+
+
+@pytest.mark.solver
+@pytest.mark.parametrize("number", scenes(0, 10))
+def test_a_scene_nobody_chose_ends_in_equilibria(number):
+    ends_well(number)
+
+
+@pytest.mark.slow
+@pytest.mark.solver
+@pytest.mark.parametrize("number", scenes(10, 40))
+def test_more_scenes_nobody_chose_end_in_equilibria(number):
+    ends_well(number)
