@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from evfem.protocols import Observer
     from evfem.runfolder import RunFolder
     from evfem.scene.scene import Scene
+    from evfem.simulation.result import Row
 
 DONE, BAD_INPUT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 2, 3, 4, 130
 STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
@@ -87,7 +88,7 @@ def _scene_argument(command: argparse.ArgumentParser) -> None:
 def _run_options(run: argparse.ArgumentParser) -> None:
     _scene_argument(run)
     _results(run)
-    run.add_argument("--resume", action="store_true", help="go on with the interrupted run in the folder")
+    _again(run, "go on with the interrupted run in the folder", "replace what an earlier run left there")
     run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
     run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
 
@@ -118,6 +119,13 @@ def _results(command: argparse.ArgumentParser) -> None:
     _complete(out, FOLDERS)
 
 
+def _again(command: argparse.ArgumentParser, resume: str, overwrite: str) -> None:
+    """What to do with what an earlier run left in the folder: at most one of the two."""
+    either = command.add_mutually_exclusive_group()
+    either.add_argument("--resume", action="store_true", help=resume)
+    either.add_argument("--overwrite", action="store_true", help=overwrite)
+
+
 def _study_names() -> str:
     """Help on the names of studies; a checkout that is not installed has none."""
     try:
@@ -132,9 +140,7 @@ def _sweep_options(sweep: argparse.ArgumentParser) -> None:
     )
     _complete(file, FILES)
     _results(sweep)
-    sweep.add_argument(
-        "--resume", action="store_true", help="do not compute finished points of the folder again"
-    )
+    _again(sweep, "keep the points of another sweep in the folder", "remove all points that are there")
     sweep.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
     sweep.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
@@ -240,16 +246,29 @@ def _scene(path: Path | None) -> Scene:
 
 def _run(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
-    from evfem.runfolder import RunFolder, saved
-    from evfem.simulation.run import simulate
+    from evfem.common.storage import alone_in
+    from evfem.runfolder import RunFolder, finished, kept, saved
 
     path = given.out or Path(f"{scene.name}-out")
-    resume = saved(path, scene) if given.resume else None
-    folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
-    progress = sys.stderr.isatty()
+    with alone_in(path):
+        resume = None
+        if not given.overwrite:
+            resume = (saved if given.resume else kept)(path, scene)
+        folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
+        if resume is not None and finished(path, scene, resume):
+            notices.tell(f"the run in {path} is complete, nothing is left to compute")
+            return _report(folder.path, resume.rows, scene.total_steps)
+        return _simulate(folder)
+
+
+def _simulate(folder: RunFolder) -> int:
+    """Run the scene of a folder, which keeps whatever has converged."""
+    from evfem.simulation.run import simulate
+
+    scene, path, progress = folder.scene, folder.path, sys.stderr.isatty()
     observers: list[Observer] = [folder] if progress else [folder, _Milestones()]
     try:
-        result = simulate(scene, progress=progress, observers=observers, resume=resume)
+        result = simulate(scene, progress=progress, observers=observers, resume=folder.resume)
     except NotConverged as error:
         _finish(folder, error.result)
         raise
@@ -258,23 +277,25 @@ def _run(given: argparse.Namespace) -> int:
             raise
         _finish(folder, None)
         return _say(f"interrupted; {len(folder.rows)} steps are in {path}, go on with --resume", INTERRUPTED)
-    if resume is not None and len(resume.rows) == scene.total_steps:
-        notices.tell(f"the run in {path} is complete, nothing is left to compute")
-    _finish(folder, result)
-    return DONE
+    return _finish(folder, result)
 
 
-def _finish(folder: RunFolder, result: object) -> None:
+def _finish(folder: RunFolder, result: object) -> int:
     """Write what is left to write and print the table; a second Ctrl-C does not tear the files."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    folder.close(result)  # type: ignore[arg-type]
+    return _report(folder.path, folder.rows, folder.scene.total_steps)
+
+
+def _report(path: Path, rows: Sequence[Row], total: int) -> int:
+    """Print the table of a run, how far it came, and where its results are."""
     from evfem.runfolder import table
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    summary = folder.close(result)  # type: ignore[arg-type]
-    if folder.rows:
-        print(table(folder.rows))
-    done = f"{summary['steps']} of {summary['requested_steps']} steps in {summary['seconds']:.1f} s"
-    print(f"{done}; results in {folder.path}")
-    sys.stdout.flush()
+    if rows:
+        print(table(rows))
+    seconds = sum(float(row["seconds"]) for row in rows)
+    print(f"{len(rows)} of {total} steps in {seconds:.1f} s; results in {path}", flush=True)
+    return DONE
 
 
 class _Milestones:
@@ -337,11 +358,20 @@ def _sweep(given: argparse.Namespace) -> int:
 
     plan = load(given.sweep)
     path = given.out or Path(f"{plan.name}-out")
-    workers, scheduler = given.workers, given.scheduler
     try:
-        result = sweep(plan, path, resume=given.resume, workers=workers, scheduler=scheduler, progress=True)
+        result = sweep(
+            plan,
+            path,
+            resume=given.resume,
+            overwrite=given.overwrite,
+            workers=given.workers,
+            scheduler=given.scheduler,
+            progress=True,
+        )
     except KeyboardInterrupt:
-        return _say(f"interrupted; finished points are in {path}, go on with --resume", INTERRUPTED)
+        return _say(
+            f"interrupted; finished points are in {path}, the same command goes on there", INTERRUPTED
+        )
     wrong = [row for row in result.rows if row["status"] != "done"]
     for row in wrong[:3]:
         notices.tell(f"point {row['point']}: {row['message']}")

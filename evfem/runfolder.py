@@ -2,7 +2,8 @@
 
 Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint
 to go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only
-files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names.
+files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names. `kept` and
+`saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -140,6 +142,33 @@ def saved(path: Path, scene: Scene) -> Saved | None:
     if (path / MANIFEST).is_file() and _without_a_row(path / HISTORY):
         return None
     raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
+
+
+def kept(path: Path, scene: Scene) -> Saved | None:
+    """The finished run of `scene` in the folder `path`; None where nothing is there that could be lost.
+
+    Raises InputError where results of another scene are, or of a run of this one that is not finished.
+    """
+    refuse_others(path / MANIFEST, _present(path), "evfem")
+    if not (path / STATE).is_file() and _without_a_row(path / HISTORY):
+        return None
+    try:
+        found = Checkpoint(path / STATE).read(scene.digest())
+    except InputError as error:
+        raise InputError("--out", error.given, "another folder, or --overwrite to replace it") from error
+    if not finished(path, scene, found):
+        done = f"{path}, where {len(found.rows)} of {scene.total_steps} steps of this scene are done"
+        raise InputError("--out", done, "--resume to go on there, or --overwrite to begin anew")
+    return found
+
+
+def finished(path: Path, scene: Scene, found: Saved) -> bool:
+    """Whether a run has come to its end, and everything about it is in the folder."""
+    if len(found.rows) != scene.total_steps:
+        return False
+    with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
+        return json.loads((path / SUMMARY).read_text(encoding="utf-8"))["complete"] is True
+    return False
 
 
 def _without_a_row(history: Path) -> bool:

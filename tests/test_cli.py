@@ -111,18 +111,72 @@ def test_the_fields_are_those_of_the_history(finished):
     np.testing.assert_allclose(moved, np.tile([0.5, -0.2, 0.0], (len(bone), 1)), atol=1e-12)
 
 
-def test_a_second_run_replaces_results_and_leaves_other_files_alone(place):
-    assert run_process(place, "run", "square.toml", "--out", "here")[0] == 0
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def test_another_scene_replaces_results_only_when_told_and_leaves_other_files_alone(place):
+    assert called(place, "run", "square.toml", "--out", "here")[0] == 0
     (place / "here" / "notes.txt").write_text("mine")
     (place / "here" / "fields.vtu").write_text("mine too")
+    before = contents(place / "here")
     shorter = SCENE.replace("steps = 3", "steps = 1")
     (place / "square.toml").write_text(shorter)
-    status, _, err = run_process(place, "run", "square.toml", "--out", "here", "--no-fields", "--no-plots")
-    assert (status, "Traceback" in err) == (0, False)
+    words = ("run", "square.toml", "--out", "here", "--no-fields", "--no-plots")
+    status, out, err = called(place, *words)
+    assert (status, out) == (2, "")
+    assert err == (
+        "evfem: --out: given here/checkpoint.npz, written by another scene; "
+        "allowed: another folder, or --overwrite to replace it\n"
+    )
+    assert contents(place / "here") == before
+    assert called(place, *words, "--overwrite")[0] == 0
     kept = [".evfem-files", "checkpoint.npz", "fields.vtu", "history.csv", "notes.txt", "summary.json"]
     assert files(place / "here") == kept
     assert (place / "here" / "notes.txt").read_text() == "mine"
     assert len(history(place / "here")) == 3
+
+
+def test_a_finished_result_is_kept_and_said_to_be_complete(finished):
+    folder = finished[0]
+    before = contents(folder / "square-out")
+    for more in ((), ("--resume",), ("--no-fields",)):
+        status, out, err = called(folder, "run", "square.toml", *more)
+        assert (status, err) == (0, "evfem: the run in square-out is complete, nothing is left to compute\n")
+        assert out == finished[2]
+        assert contents(folder / "square-out") == before
+
+
+def test_resuming_and_overwriting_exclude_each_other(place):
+    status, _, err = called(place, "run", "square.toml", "--resume", "--overwrite")
+    assert status == 2
+    assert "not allowed with" in err
+
+
+def test_a_run_whose_folder_is_in_use_ends_with_a_sentence_and_touches_nothing(place):
+    """The first one computes on, is killed, and leaves no lock behind."""
+    (place / "square.toml").write_text(MANY_STEPS.replace("steps = 30", "steps = 3000"))
+    words, environment = process_of("run", "square.toml", "--no-plots", "--no-fields")
+    rows = place / "square-out" / "history.csv"
+    with subprocess.Popen(words, cwd=place, env=environment, stderr=subprocess.DEVNULL) as first:
+        while first.poll() is None and not (rows.exists() and len(rows.read_bytes().splitlines()) > 3):
+            time.sleep(0.002)
+        for more in ((), ("--resume",), ("--overwrite",)):
+            status, out, err = run_process(place, "run", "square.toml", *more)
+            assert (status, out) == (4, "")
+            assert err == "evfem: cannot use square-out: another run is at work in it\n"
+        assert first.poll() is None
+        first.kill()
+    done = len(history(place / "square-out"))
+    before = contents(place / "square-out")
+    status, out, err = called(place, "run", "square.toml")
+    assert (status, out) == (2, "")
+    assert f"where {done} of 3002 steps of this scene are done; allowed: --resume to go on there" in err
+    assert contents(place / "square-out") == before
+    assert not [name for name in before if "lock" in name]
+    (place / "square.toml").write_text(SCENE)
+    assert called(place, "run", "square.toml", "--overwrite", "--no-plots")[0] == 0
+    assert len(history(place / "square-out")) == 5
 
 
 @pytest.mark.parametrize("name", ["history.csv", "fields_00002.vtu", "checkpoint.npz"])
@@ -209,6 +263,7 @@ def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
     (place / "file").write_text("not a folder")
     status, out, err = run_process(place, "run", "square.toml", "--out", "file/results")
     assert (status, out) == (4, "")
+    assert err.count("\n") == 1  # before anything is computed
     assert "file/results" in err.splitlines()[-1]
     assert "Traceback" not in err
 
@@ -278,17 +333,6 @@ def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end
     for resumed, row in zip(history(results), uninterrupted, strict=True):
         for name in ("position", "normal_force", "tangential_force", "friction_dissipation", "stored_energy"):
             assert float(resumed[name]) == pytest.approx(float(row[name]), rel=1e-6, abs=1e-9)
-
-
-def test_a_finished_run_can_be_resumed_without_harm(finished):
-    folder = finished[0]
-    before = history(folder / "square-out")
-    status, out, err = run_process(folder, "run", "square.toml", "--resume")
-    assert err == "evfem: the run in square-out is complete, nothing is left to compute\n"
-    assert status == 0
-    assert history(folder / "square-out") == before
-    assert len(indexed_files(folder / "square-out")) == 3
-    assert out.splitlines()[-1].startswith("5 of 5 steps")
 
 
 def test_a_checkpoint_of_another_scene_is_refused(place):

@@ -140,14 +140,15 @@ DAMAGES = {
 }
 
 
+@pytest.mark.parametrize("more", [(), ("--resume",)])
 @pytest.mark.parametrize("case", DAMAGES)
-def test_a_checkpoint_that_cannot_be_used_is_one_sentence_and_nothing_is_touched(place, case):
+def test_a_checkpoint_that_cannot_be_used_is_one_sentence_and_nothing_is_touched(place, case, more):
     damage, words = DAMAGES[case]
     damage(place / "stopped" / "checkpoint.npz")
     before = contents(place / "stopped")
-    status, error = run(place, "--resume")
+    status, error = run(place, *more)
     assert status == 2, error
-    assert words in error
+    assert words in error if more else "--overwrite" in error
     assert error.count("\n") == 1
     assert contents(place / "stopped") == before
 
@@ -160,15 +161,16 @@ def test_a_whole_checkpoint_is_used(place):
     assert len(list((place / "stopped").glob("fields_*.vtu"))) == 20
 
 
+@pytest.mark.parametrize("more", [(), ("--resume",)])
 @pytest.mark.parametrize("written", [[], ["history.csv"], ["history.csv", "fields_00001.vtu"]])
-def test_resuming_a_run_killed_before_its_first_step_was_stored_begins_it(place, written):
+def test_a_run_killed_before_its_first_step_was_stored_begins_again(place, written, more):
     for path in (place / "stopped").iterdir():
         if path.name not in (".evfem-files", *written):
             path.unlink()
     if written:
         (place / "stopped" / "history.csv").write_text(csv_header())
     (place / "stopped" / ".history.csv.123.tmp").write_text("half")
-    status, error = run(place, "--resume", "--no-fields")
+    status, error = run(place, "--no-fields", *more)
     assert status == 0, error
     names = [".evfem-files", "checkpoint.npz", "history.csv", "summary.json"]
     assert sorted(contents(place / "stopped")) == names
@@ -177,10 +179,27 @@ def test_resuming_a_run_killed_before_its_first_step_was_stored_begins_it(place,
 def test_a_history_without_its_checkpoint_is_not_overwritten(place):
     (place / "stopped" / "checkpoint.npz").unlink()
     before = contents(place / "stopped")
-    status, error = run(place, "--resume")
+    for more, words in (
+        (("--resume",), "without checkpoint.npz"),
+        ((), "checkpoint.npz, which does not exist"),
+    ):
+        status, error = run(place, *more)
+        assert status == 2
+        assert words in error
+        assert contents(place / "stopped") == before
+
+
+def test_a_run_killed_after_its_last_step_is_not_yet_complete(place):
+    """What comes at the end, summary and picture, is written by a run that goes on."""
+    assert run(place, "--resume")[0] == 0
+    summary = (place / "stopped" / "summary.json").read_text()
+    (place / "stopped" / "summary.json").write_text(summary.replace('"complete": true', '"complete": false'))
+    status, error = run(place)
     assert status == 2
-    assert "without checkpoint.npz" in error
-    assert contents(place / "stopped") == before
+    assert "where 20 of 20 steps of this scene are done; allowed: --resume to go on there" in error
+    assert run(place, "--resume")[0] == 0
+    assert '"complete": true' in (place / "stopped" / "summary.json").read_text()
+    assert "is complete" in run(place)[1]
 
 
 def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(place):
@@ -261,7 +280,7 @@ def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
             f"{storage.__name__}.{'os.replace' if name == 'replace' else 'open'}", refuse, raising=False
         )
     monkeypatch.setattr(Path, "write_text", refuse)
-    status, error = run(place)
+    status, error = run(place, "--overwrite")
     monkeypatch.undo()
     assert status == 4
     assert "Permission denied" in error.splitlines()[-1]

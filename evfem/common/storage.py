@@ -1,7 +1,8 @@
 """Files that are either complete or untouched: written beside their place, then moved there in one step.
 
 This holds when the process is killed at any moment and when the disk is full; nothing is forced through the
-disk's own cache, so a power failure may cost the last steps.
+disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other processes out of
+a folder.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Literal
 
 import numpy as np
 
+from evfem.common.notices import LOG
 from evfem.errors import InputError, StorageError
 
 #: what reading a cut off, damaged or foreign archive can raise
@@ -86,6 +88,45 @@ def disk(doing: str) -> Iterator[None]:
         raise
     except OSError as error:
         raise StorageError(f"cannot {doing}: {error.strerror or error}") from error
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Inside, this is the only process at work in `folder`, which is made, and removed if it is left empty.
+
+    The lock belongs to the opened folder, so that nothing is written for it and it ends with the process,
+    however that ends. Raises StorageError where another one has it, or the disk refuses.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    with disk(f"use {folder}"):
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = _lock(folder)
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # at the first one that is not empty
+            for path in made:
+                path.rmdir()
+        if lock is not None:
+            os.close(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no locks."""
+    try:
+        from fcntl import LOCK_EX, LOCK_NB, flock
+    except ModuleNotFoundError:  # Windows
+        LOG.info("no locks on this system: start no second run into %s", folder)
+        return None
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        flock(lock, LOCK_EX | LOCK_NB)
+    except BlockingIOError as error:
+        os.close(lock)
+        raise StorageError(f"cannot use {folder}: another run is at work in it") from error
+    except OSError as error:  # some disks in a network
+        LOG.info("no lock on %s (%s): start no second run into it", folder, error.strerror or error)
+    return lock
 
 
 def write_names(manifest: str | Path, names: Iterable[str]) -> None:

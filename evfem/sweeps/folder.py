@@ -2,14 +2,15 @@
 
 A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on, or one
 changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
-(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance.
+(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance, from the
+start, so that the folder can tell which sweep was its last.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -18,6 +19,7 @@ from typing import Any
 
 from evfem.common.storage import disk, refuse_others, replacing, write_names, write_text
 from evfem.common.tables import csv_text
+from evfem.errors import InputError
 
 POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
 MANIFEST = ".evfem-sweep"
@@ -47,25 +49,53 @@ class Answer:
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A folder of a sweep; `resume` keeps the points that are finished in it."""
+    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all points."""
 
     path: Path
     resume: bool = False
+    overwrite: bool = False
 
-    def open(self) -> None:
-        """Make the folder, or clear what an earlier sweep left in it; files of others are never touched."""
+    def __post_init__(self) -> None:
+        if self.resume and self.overwrite:
+            raise InputError("overwrite", "resume and overwrite", "one of the two")
+
+    def open(self, keys: Collection[str], plan: str) -> None:
+        """Make the folder of the sweep with these keys and the fingerprint `plan`, or clear it.
+
+        Raises InputError, with nothing touched, where files of others are in the way, or points that this
+        sweep does not have.
+        """
         ours = (TABLE, PARQUET, PROVENANCE, POINTS)
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
             present = [name for name in ours if (self.path / name).exists()]
             refuse_others(self.path / MANIFEST, present, "a sweep")
+            if not (self.resume or self.overwrite):
+                self._refuse_another(keys, plan)
             write_names(self.path / MANIFEST, ours)
             (self.path / POINTS).mkdir(exist_ok=True)
             files = [p for folder in (self.path, self.path / POINTS) for p in folder.iterdir()]
             for file in files:
                 old = file.name in ours or POINT_FILE.fullmatch(file.name)
-                if LEFT.fullmatch(file.name) or (old and not self.resume and file.name != POINTS):
+                if LEFT.fullmatch(file.name) or (old and self.overwrite and file.name != POINTS):
                     file.unlink()
+
+    def _refuse_another(self, keys: Collection[str], plan: str) -> None:
+        """InputError where the folder has points of another sweep; one that grew is no other."""
+        points = self.path / POINTS
+        names = [p.name for p in points.iterdir() if POINT_FILE.fullmatch(p.name)] if points.exists() else []
+        others = sum(name.removesuffix(".json") not in keys for name in names)
+        if others and self._last() != plan:
+            given = f"{self.path}, with {others} points of another sweep or version"
+            raise InputError(
+                "--out", given, "another folder, --resume to keep them, --overwrite to remove them"
+            )
+
+    def _last(self) -> str | None:
+        """Fingerprint of the sweep that was started last in the folder."""
+        with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+            return json.loads((self.path / PROVENANCE).read_text(encoding="utf-8"))["digest"]
+        return None
 
     def write(self, key: str, answer: Answer) -> None:
         """Keep a point, in one step."""

@@ -8,6 +8,7 @@ import time as clock
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ import evfem
 from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
+from evfem.common.storage import alone_in
 from evfem.errors import InputError, NotConverged
 from evfem.scene.file import loads
 from evfem.simulation.result import origin
@@ -58,6 +60,7 @@ def sweep(
     out: str | Path | None = None,
     *,
     resume: bool = False,
+    overwrite: bool = False,
     workers: int | None = None,
     scheduler: str | None = None,
     progress: bool = False,
@@ -65,11 +68,12 @@ def sweep(
     """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of all.
 
     The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and a file per
-    point; with `resume` what is finished there is not computed again. `workers` processes (None: one per
+    point; what is finished there is not computed again. A folder with points of another sweep is refused,
+    unless `resume` says to keep them or `overwrite` to remove all points. `workers` processes (None: one per
     core; 1: none but this one) or the Dask cluster at the address `scheduler` ("local" starts one) do the
     work; the numbers are the same. A point that the scene reader refuses, that does not converge or that
     fails otherwise is a row with its status and message. Raises InputError if no point at all is a valid
-    scene, StorageError when the disk refuses.
+    scene, StorageError when the disk refuses or another sweep is at work in the folder.
 
     >>> from evfem.sweeps.file import loads as read
     >>> text = '''
@@ -92,12 +96,14 @@ def sweep(
     """
     plan = plan if isinstance(plan, Sweep) else load(plan)
     pool = open_pool(workers, scheduler)
-    run = _Run(plan, None if out is None else SweepFolder(Path(out), resume), progress)
-    try:
-        compute(evaluate, run.waiting(), pool, run.keep)
-    finally:
-        run.close()
-    return run.result()
+    folder = None if out is None else SweepFolder(Path(out), resume, overwrite)
+    with nullcontext() if folder is None else alone_in(folder.path):
+        run = _Run(plan, folder, progress)
+        try:
+            compute(evaluate, run.waiting(), pool, run.keep)
+        finally:
+            run.close()
+        return run.result()
 
 
 class _Run:
@@ -116,8 +122,9 @@ class _Run:
         if len(refused) == len(set(self.keys)):
             first = self.answers[self.keys[0]].message
             raise InputError("sweep", f"no valid point: {first}", "at least one valid scene")
+        self.digest = digest(sorted(set(self.keys)))
         if folder is not None:
-            folder.open()
+            folder.open(set(self.keys), self.digest)
             for key in set(self.keys) - set(self.answers):
                 if (kept := folder.read(key)) is not None:
                     self.answers[key] = kept
@@ -125,7 +132,11 @@ class _Run:
         if progress and refused:
             count = sum(key in refused for key in self.keys)
             notices.tell(f"{count} of {len(self.keys)} points are no valid scene")
+        if progress and folder is not None and not self.waiting():
+            notices.tell(f"the sweep in {folder.path} is complete, nothing is left to compute")
         self.written = clock.perf_counter()
+        if folder is not None:
+            folder.write_provenance(self.result().provenance)
         self.bar = _Progress(len(set(self.keys)), self.answers, progress)
 
     def _key(self, text: str) -> str:
@@ -190,6 +201,7 @@ class _Run:
             "sweep": plan.name,
             "points": {"requested": len(self.points), **{name: counted[name] for name in STATUS}},
             "reused": self.reused,
+            "digest": self.digest,
             "complete": len(rows) == len(self.points),
             "wall_seconds": clock.perf_counter() - self.began,
             **origin(),

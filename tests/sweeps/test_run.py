@@ -120,7 +120,7 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
     monkeypatch.setitem(
         ev.sweep.__globals__, "evaluate", lambda job: computed.append(job[0]) or evaluate(job)
     )
-    again = ev.sweep(plan, out, workers=1, resume=True)
+    again = ev.sweep(plan, out, workers=1)
     assert computed == []
     assert again.provenance["reused"] == 4
     assert table(out) == before
@@ -131,7 +131,7 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
     foreign.write_text(foreign.read_text().replace("point-1", "point-0"))
     stamp = kept.stat().st_mtime_ns
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.05, 0.1, 0.2]\n"))
-    third = ev.sweep(plan, out, workers=1, resume=True)
+    third = ev.sweep(plan, out, workers=1)  # it grew, so that nothing of it belongs to another
     assert len(computed) == 3 + 2
     assert kept.stat().st_mtime_ns == stamp
     for row in before[:4]:
@@ -146,6 +146,31 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
     # and so with another mesh
     meshfile.write(block(height=1.9), tmp_path / "block.vtu")
     assert ev.sweep(plan, out, workers=1, resume=True).provenance["reused"] == 0
+
+
+def test_points_of_another_sweep_are_kept_unless_told_otherwise(plan, tmp_path, capsys):
+    out = tmp_path / "out"
+    ev.sweep(plan, out, workers=1)
+    before = {p: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.1, 0.15]\n"))
+    assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1"]) == 2
+    assert capsys.readouterr().err == (
+        f"evfem: --out: given {out}, with 2 points of another sweep or version; "
+        "allowed: another folder, --resume to keep them, --overwrite to remove them\n"
+    )
+    assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
+    with pytest.raises(InputError, match="resume and overwrite"):
+        ev.sweep(plan, out, workers=1, resume=True, overwrite=True)
+    # told to keep them, the folder has both, and the one started last goes on by itself
+    assert ev.sweep(plan, out, workers=1, resume=True).provenance["reused"] == 2
+    assert len(list((out / "points").iterdir())) == 6
+    assert ev.sweep(plan, out, workers=1).provenance["reused"] == 4
+    assert "is complete" not in capsys.readouterr().err
+    assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1"]) == 3
+    assert f"evfem: the sweep in {out} is complete, nothing is left to compute" in capsys.readouterr().err
+    # told to remove them, it begins anew
+    assert ev.sweep(plan, out, workers=1, overwrite=True).provenance["reused"] == 0
+    assert len(list((out / "points").iterdir())) == 4
 
 
 def test_equal_points_are_computed_once(plan, monkeypatch):
@@ -173,7 +198,7 @@ def test_points_that_fail_are_rows_with_their_message(plan, tmp_path, monkeypatc
     assert result.rows[2]["message"] == "ZeroDivisionError: by nothing"
     # what failed for an unknown reason is tried again, what did not converge is not
     monkeypatch.undo()
-    again = ev.sweep(plan, tmp_path / "out", workers=1, resume=True)
+    again = ev.sweep(plan, tmp_path / "out", workers=1)
     assert again["status"] == ["not_converged"] * 2 + ["done"] * 2 + ["refused"] * 2
 
 
@@ -194,7 +219,7 @@ def test_files_of_others_are_never_touched(plan, tmp_path):
     for name in ("mine.csv", "points/mine.json", f"points/.{64 * 'a'}.json.123.tmp"):
         (out / name).write_text("mine")
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.15]\n"))
-    ev.sweep(plan, out, workers=1)
+    ev.sweep(plan, out, workers=1, overwrite=True)
     assert {p.name for p in out.iterdir()} == {
         ".evfem-sweep", "mine.csv", "points", "sweep.csv", "sweep.json", "sweep.parquet"
     }  # fmt: skip
@@ -286,13 +311,29 @@ def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
     for name in kept:
         assert sweepfolder.SweepFolder(out).read(name.removesuffix(".json")).status == "done"
     if number == signal.SIGINT:
-        assert "interrupted; finished points are in" in message
+        assert f"interrupted; finished points are in {out}, the same command goes on there" in message
         assert len(table(out)) == len(kept) + 12
-    assert cli.main(["sweep", str(plan), "--out", str(out), "--resume", "--workers", "1"]) == 3
+    assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1"]) == 3
     assert len(table(out)) == 36
     now = {p.name: p.stat().st_mtime_ns for p in (out / "points").iterdir()}
     assert len(now) == 24
     assert {name: now[name] for name in kept} == kept
+
+
+def test_a_folder_in_which_a_sweep_is_at_work_is_refused(plan, tmp_path, capsys):
+    plan.write_text(LONG)
+    out = tmp_path / "out"
+    run = started(plan, out, "--workers", "1")
+    until(lambda: (out / "points").is_dir() and list((out / "points").glob("[!.]*")))
+    for more in ((), ("--resume",), ("--overwrite",)):
+        assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1", *more]) == 4
+        assert capsys.readouterr().err == f"evfem: cannot use {out}: another run is at work in it\n"
+    with pytest.raises(StorageError, match="another run is at work"):
+        ev.sweep(plan, out, workers=1)
+    assert run.poll() is None
+    run.kill()
+    run.communicate()
+    assert len(ev.sweep(plan, out, workers=1).rows) == 36
 
 
 # -- Dask ------------------------------------------------------------------------------------------------
