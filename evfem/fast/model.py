@@ -132,10 +132,11 @@ class FastModel:
         """Run `scene` fast, do `checks` of its steps again with the full model, and if these forces differ by
         more than `tolerance` (relative to the largest of the run) run all of it in full, with a warning.
 
-        The result has the usual columns, forces and works among them; `stored_energy` is NaN and there are no
-        fields. Its `provenance["fast"]` says `error` (largest relative difference of each force over
-        the checks), `checked` (which steps), `outside` (how far N and T have left those of the run it was
-        made from, as a share of their range; 0 inside) and `fallback`. With `checks=0` no error is stated.
+        The result has the usual columns, forces and works among them; `stored_energy`,
+        `integrator_dissipation` and `snap_dissipation` are NaN and there are no fields. Its
+        `provenance["fast"]` says `error` (largest relative difference of each force over the checks),
+        `checked` (which steps), `outside` (how far N and T have left those of the run it was made from, as a
+        share of their range; 0 inside) and `fallback`. With `checks=0` no error is stated.
         Raises InputError for other scenes than the class allows, `NotConverged`.
         """
         parts = self._parts_for(scene)
@@ -322,9 +323,19 @@ class FastRun(Run):
 
 
 class NoTissue:
-    """In place of the body: its energy is not known."""
+    """In place of the body: its forces and its energy are not known."""
 
     dynamics = None
+
+    @staticmethod
+    def forces(u: Floats) -> Floats:
+        """Not numbers."""
+        return np.full_like(u, np.nan)
+
+    @staticmethod
+    def given_forces(u: Floats) -> Floats:
+        """Nothing: there are no forms of the user's."""
+        return np.zeros_like(u)
 
     @staticmethod
     def energy(u: Floats) -> float:

@@ -1,9 +1,9 @@
 """From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
 
 Beside the state a run carries over from step to step: the contact candidates, the substep that worked
-last, the sums of works, and a factorisation made some steps ago. Of the last one the checkpoint keeps
-where it was made; a resumed run makes it there again, and the iterations that follow are the same to the last
-bit (with one thread, on the same machine and backend).
+last, the works so far with the forces that they go on from, and a factorisation made some steps ago. Of the
+last one the checkpoint keeps where it was made; a resumed run makes it there again, and the iterations that
+follow are the same to the last bit (with one thread, on the same machine and backend).
 """
 
 from __future__ import annotations
@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 
 from evfem.errors import InputError
+from evfem.simulation.ledger import Ledger
+from evfem.simulation.model import Model
 from evfem.simulation.result import Saved
+from evfem.simulation.works import SUMS, Books
 from evfem.solver.state import Reusable, State, TangentPoint
 
 #: statuses of a pad node are 0 to this
@@ -56,6 +59,24 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             duration=float(arrays["factor_duration"]),
         )
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
+
+
+def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
+    """The works so far, and what is known of the last accepted state."""
+    end = ledger.end or Books.nothing(state.u.shape)
+    return {
+        "sums": np.array([ledger.sums[name] for name in SUMS]),
+        "internal_forces": end.forces,
+        "given_forces": end.given,
+        "energies": np.array([end.stored, end.springs, end.kinetic]),
+    }
+
+
+def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
+    """The ledger from the arrays of a checkpoint."""
+    sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+    end = Books(arrays["internal_forces"], arrays["given_forces"], *arrays["energies"].tolist())
+    return Ledger(model, sums, end)
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:

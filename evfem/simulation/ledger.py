@@ -1,9 +1,5 @@
-r"""What is reported of a run: one row per requested step, works and energies summed over its parts, and the
-fields.
-
-Works are trapezoidal over every accepted part: the bone's reaction on its travel, the attraction on the pad's
-displacement (with the attraction the part begins with, at its own voltage), and friction
-:math:`-\frac12(\lambda_t^0 + \lambda_t)\,s` on the slip along the profile.
+"""What is reported of a run: one row per requested step, works and energies summed over its parts
+(`evfem.simulation.works`), and the fields.
 """
 
 from __future__ import annotations
@@ -14,39 +10,35 @@ from typing import Any
 import numpy as np
 
 from evfem.contact.pad import surface_state
-from evfem.contact.signorini import FORWARD, OPEN, STICK
+from evfem.contact.signorini import FORWARD, OPEN
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
+from evfem.simulation.works import SUMS, Books, Part, unloaded
 from evfem.solver.state import State
-
-SUMS = ("external_work", "electrostatic_work", "friction_dissipation", "viscous_dissipation")
 
 
 @dataclass
 class Ledger:
-    """Running sums of a run, by the names of the history's columns."""
+    """Running sums of a run, by the names of the history's columns, and the books at the end of its last
+    part.
+    """
 
     model: Model
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
+    end: Books | None = None
 
     def accept(self, old: State, new: State) -> None:
         """Add the works of one converged part."""
-        model = self.model
-        nodes = model.pad.nodes
-        self.sums["external_work"] += float(0.5 * (old.reaction + new.reaction) @ (new.bone - old.bone))
-        moved = new.u[nodes] - old.u[nodes]
-        self.sums["electrostatic_work"] += float(np.sum(0.5 * (old.attraction + new.attraction) * moved))
-        before, after = (surface_state(model.surface, model.equilibrium.positions(s.u)) for s in (old, new))
-        slip = 0.5 * (before.stretch + after.stretch) * moved[:, 0]
-        slip[(new.status == STICK) | (new.status == OPEN)] = 0.0
-        shear = 0.5 * (old.contact_force[:, 1] + new.contact_force[:, 1])
-        self.sums["friction_dissipation"] -= float(np.sum(shear * slip))
-        if model.body.dynamics is not None:
-            self.sums["viscous_dissipation"] += model.body.dynamics.dissipation(new.u)
+        part = Part(self.model, old if self.end else unloaded(old), new)
+        begin = self.end or Books.nothing(old.u.shape)
+        self.end = part.end()
+        for name, work in part.works(begin, self.end).items():
+            self.sums[name] += work
 
     def row(self, state: State, step: int, motion_index: int, motion: str, time: float) -> dict[str, Any]:
         """The forces, widths and energies of a state; costs are added by the caller."""
-        model, dynamics = self.model, self.model.body.dynamics
+        model, end = self.model, self.end
+        assert end is not None
         position = model.equilibrium.positions(state.u)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
@@ -69,8 +61,8 @@ class Ledger:
             "real_contact_width": real,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
             **self.sums,
-            "stored_energy": model.body.energy(state.u),
-            "kinetic_energy": 0.0 if dynamics is None else dynamics.kinetic_energy(state.velocity),
+            "stored_energy": end.stored + end.springs,
+            "kinetic_energy": end.kinetic,
         }
 
 

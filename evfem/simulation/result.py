@@ -31,7 +31,7 @@ from evfem.scene.scene import Scene
 
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-3"
+CHECKPOINT_FORMAT = "evfem-checkpoint-4"
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 #: what is shown of the last step, with units
@@ -107,6 +107,8 @@ class Result:
     friction_dissipation: Floats
     viscous_dissipation: Floats
     kinetic_energy: Floats
+    integrator_dissipation: Floats
+    snap_dissipation: Floats
     substeps: Ints
     newton_iterations: Ints
     seconds: Floats

@@ -19,8 +19,16 @@ from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene
-from evfem.simulation.checkpoint import reusable_arrays, reusable_of, state_arrays, state_of, usable
-from evfem.simulation.ledger import SUMS, Ledger, frame_of
+from evfem.simulation.checkpoint import (
+    ledger_arrays,
+    ledger_of,
+    reusable_arrays,
+    reusable_of,
+    state_arrays,
+    state_of,
+    usable,
+)
+from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.solver.control import (
@@ -256,7 +264,7 @@ class Run:
             **reusable_arrays(self.state, self.model.equilibrium.reusable()),
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
-            "sums": np.array([self.ledger.sums[name] for name in SUMS]),
+            **ledger_arrays(self.ledger, self.state),
         }
 
     def _restore(self, saved: Saved) -> None:
@@ -264,7 +272,7 @@ class Run:
         self.state = state_of(arrays)
         self.model.equilibrium.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
-        self.ledger.sums = dict(zip(SUMS, arrays["sums"].tolist(), strict=True))
+        self.ledger = ledger_of(self.model, arrays)
         self.rows = list(saved.rows)
 
 

@@ -65,7 +65,8 @@ class Body:
         self.space = space
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics
-        self.terms = tuple(terms) if dynamics is None else (*terms, dynamics)
+        self.given = tuple(terms)
+        self.terms = self.given if dynamics is None else (*terms, dynamics)
         bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
         free = np.setdiff1d(np.arange(space.size), bone)
         self.size = dim * free.size + dim
@@ -89,6 +90,13 @@ class Body:
         total = self.tissue.forces(u - u[self.space.mesh.node_sets["bone"][0]])
         for term in self.terms:
             total = total + term.forces(u)
+        return total
+
+    def given_forces(self, u: Floats) -> Floats:
+        """The share (N, dim) of the user's forms in `forces`."""
+        total = np.zeros_like(u)
+        for term in self.given:
+            total += term.forces(u)
         return total
 
     def tangent(self, u: Floats) -> Floats:

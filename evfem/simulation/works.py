@@ -1,0 +1,240 @@
+r"""Works and dissipations of one accepted part of a run, each from its own definition.
+
+Between two equilibria 0 and 1, with :math:`\Delta` the change of a quantity and :math:`\bar f = (f_0 +
+f_1)/2`: internal forces f (tissue, viscosity, mass), forms of the user :math:`f_u`, attraction :math:`f_e`,
+contact :math:`\lambda` and the reaction r of the bone b balance at both ends, :math:`f + f_u = f_e + \lambda
++ r`. So the trapezoidal works telescope to the solver's tolerance,
+
+.. math:: \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + \bar f_e\cdot\Delta u
+          = \bar f\cdot\Delta u - \bar\lambda\cdot\Delta u .
+
+The history has
+
+- ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u`, given by bone and user's forms;
+- ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
+  evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
+- ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
+- ``kinetic_energy`` :math:`T = v\cdot M v/2`;
+- ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` over the slip s along the profile, with
+  :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
+- ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
+
+What separates them is found term by term, without the work of the bone, and so closes the books only where
+the forces of the accepted states balance:
+
+.. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
+          + (W_e - \bar f_e\cdot\Delta u) .
+
+First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a share that
+telescopes; then the work of nodes that land, leave or begin to slip; then what the way adds to the
+attraction's work. Over a motion the sum falls with the square of the step, in time with the step, and is
+``integrator_dissipation``.
+
+A quasi-static part may contain a **snap**: stability is lost on the way, and the end is far away however
+small the part. Then L does not fall with the step. It is the energy set free, and ``snap_dissipation``. A
+part snaps if L > 0 and either the body, the loads at their final values, moves along forces that grow faster
+than the tissue's,
+
+.. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
+          w = \Delta u - \Delta b,
+
+or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small parts, and
+only say which of two columns has L.
+
+The first part begins without any load: voltage and user's forms count as raised within it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact.pad import surface_state
+from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.simulation.model import Model
+from evfem.solver.state import State
+
+SUMS = (
+    "external_work",
+    "electrostatic_work",
+    "friction_dissipation",
+    "viscous_dissipation",
+    "integrator_dissipation",
+    "snap_dissipation",
+)
+#: share of the work of the change of the internal forces that no small smooth part sets free
+SNAP = 0.5
+#: share of the same work, of every force on its whole way, that is rounding
+NOISE = 1e-7
+
+
+def _gauss(points: int) -> tuple[Floats, Floats]:
+    """Places and weights on (0, 1)."""
+    x, weight = np.polynomial.legendre.leggauss(points)
+    return 0.5 + 0.5 * x, 0.5 * weight
+
+
+#: places on the way where the attraction is taken, dense at both ends, where it changes fastest; the weights
+#: contain the derivative of the places
+_AT, _WEIGHT = _gauss(8)
+WAY, SHARE = _AT**2 * (3.0 - 2.0 * _AT), 6.0 * _AT * (1.0 - _AT) * _WEIGHT
+#: and where the friction coefficient is
+SLIDE, PART = _gauss(4)
+
+
+@dataclass(frozen=True, eq=False)
+class Books:
+    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those of the
+    user's forms, stored energy of the tissue, that of the interface's springs, kinetic energy.
+    """
+
+    forces: Floats
+    given: Floats
+    stored: float
+    springs: float
+    kinetic: float
+
+    @classmethod
+    def nothing(cls, shape: tuple[int, ...]) -> Books:
+        """Before the first part, displacements of this shape."""
+        none = np.zeros(shape)
+        return cls(none, none, 0.0, 0.0, 0.0)
+
+
+def unloaded(state: State) -> State:
+    """The state before the first part, without its voltage and what follows from it."""
+    attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
+    return replace(state, voltage=0.0, attraction=attraction, reaction=reaction)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One accepted part of a run of `model`, from `old` to `new`."""
+
+    model: Model
+    old: State
+    new: State
+
+    def end(self) -> Books:
+        """What is held of the part's end."""
+        body, new = self.model.body, self.new
+        given = body.given_forces(new.u)
+        kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
+        springs = float(0.5 * np.sum(self._compliance * new.contact_force**2))
+        return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
+
+    def works(self, begin: Books, end: Books) -> dict[str, float]:
+        """What the part adds to each of `SUMS`, N mm per mm of depth."""
+        old, new, dynamics = self.old, self.new, self.model.body.dynamics
+        moved = new.u - old.u
+        given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
+        given -= _mean_work(begin.given, end.given, moved)
+        pulled, friction = self.electrostatic(), self.friction()
+        viscous = 0.0 if dynamics is None else dynamics.dissipation(new.u)
+        lost = _mean_work(begin.forces, end.forces, moved) - viscous
+        lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
+        lost -= self._contact() + friction
+        lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        snap = self._snaps(end.forces - begin.forces, lost)
+        added = (given, pulled, friction, viscous, 0.0 if snap else lost, lost if snap else 0.0)
+        return dict(zip(SUMS, added, strict=True))
+
+    def electrostatic(self) -> float:
+        """Work of the attraction W_e, N mm per mm of depth."""
+        model, old, new = self.model, self.old, self.new
+        moved = (new.u - old.u)[model.pad.nodes]
+        trapezoidal = _mean_work(old.attraction, new.attraction, moved)
+        if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
+            return trapezoidal
+        open_ = ~(old.touching | new.touching)
+        # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
+        along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
+        if not (along[:, 1].any() or model.attraction.direction == "normal"):
+            return trapezoidal
+        begin, end = (model.equilibrium.interface.resting(state) for state in (old, new))
+        integral = 0.0
+        for way, share in zip(WAY, SHARE, strict=True):
+            voltage = float(np.sqrt((1.0 - way) * old.voltage**2 + way * new.voltage**2))
+            force = model.attraction.forces(begin + way * (end - begin), voltage, old.touching)
+            integral += float(share * np.sum(force * along))
+        return trapezoidal + integral - _mean_work(old.attraction, new.attraction, along)
+
+    def friction(self) -> float:
+        """Dissipation by friction D_f, N mm per mm of depth."""
+        slip, x0, x1 = self._slip, self._x[0], self._x[1]
+        length = np.abs(slip)
+        if not length.any():
+            return 0.0
+        pressed = [np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new)]
+        total = 0.0
+        for way, part in zip(SLIDE, PART, strict=True):
+            mu = self.model.equilibrium.interface.friction(x0 + way * (x1 - x0))
+            normal = (1.0 - way) * pressed[0] + way * pressed[1]
+            total += float(part * np.sum(mu * normal * length))
+        return total
+
+    @cached_property
+    def _x(self) -> tuple[Floats, Floats]:
+        """x of the pad nodes (P,) before and after."""
+        x0, x1 = (self.model.equilibrium.positions(state.u)[:, 0] for state in (self.old, self.new))
+        return x0, x1
+
+    @cached_property
+    def _compliance(self) -> Floats:
+        """Compliance of the interface (P, 2) in this part, mm per N/mm."""
+        return self.model.equilibrium.interface.compliance(self.old)
+
+    @cached_property
+    def _slip(self) -> Floats:
+        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
+        model, old, new = self.model, self.old, self.new
+        interface = model.equilibrium.interface
+        stretch = [surface_state(model.surface, interface.positions(s.u)).stretch for s in (old, new)]
+        slip = 0.5 * (stretch[0] + stretch[1]) * (self._x[1] - self._x[0])
+        slip = slip + self._compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
+        status = np.where(new.touching | (old.status == STICK), new.status, old.status)
+        # a node may stick at a jump of friction that it has slipped up to
+        carried = (status == STICK) & (np.abs(slip) > interface.tolerance * interface.length)
+        forward = ((status == FORWARD) & (slip > 0.0)) | carried
+        return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
+
+    def _contact(self) -> float:
+        """Trapezoidal work of the contact forces, N mm per mm of depth."""
+        equilibrium = self.model.equilibrium
+        before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
+        return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
+
+    def _snaps(self, change: Floats, lost: float) -> bool:
+        """Whether stability was lost on the way; `change` (N, dim) of the internal forces, `lost` is L."""
+        dynamics, new, old = self.model.body.dynamics, self.new, self.old
+        if dynamics is not None and dynamics.step > 0.0:
+            return False
+        moved = new.u - old.u
+        along = moved - (new.bone - old.bone)
+        work = float(np.sum(change * along))
+        noise = NOISE * float(np.abs(change * moved).sum())
+        if not lost > noise:
+            return False
+        return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
+
+    def _pulled_along(self, along: Floats) -> float:
+        """Work of the change of attraction and friction on the way `along` (P, dim) that the bone does not
+        go, the loads at their final values.
+        """
+        model, old, new = self.model, self.old, self.new
+        carried = replace(old, u=old.u + (new.bone - old.bone))
+        work = 0.0
+        if model.attraction is not None:
+            at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
+            work += float(np.sum((at[1] - at[0]) * along))
+        friction = model.equilibrium.interface.friction
+        less = friction(model.equilibrium.positions(carried.u)[:, 0]) - friction(self._x[1])
+        return work + float(np.sum(less * new.contact_force[:, 0] * np.sign(self._slip) * along[:, 0]))
+
+
+def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:
+    """Work of the mean of two forces."""
+    return float(0.5 * np.sum((before + after) * moved))
