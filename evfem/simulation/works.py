@@ -171,7 +171,7 @@ class Part:
         pressed = [np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new)]
         total = 0.0
         for way, part in zip(SLIDE, PART, strict=True):
-            mu = self.model.equilibrium.interface.friction(x0 + way * (x1 - x0))
+            mu = self._coefficient(x0 + way * (x1 - x0))
             normal = (1.0 - way) * pressed[0] + way * pressed[1]
             total += float(part * np.sum(mu * normal * length))
         return total
@@ -200,6 +200,10 @@ class Part:
         carried = (status == STICK) & (np.abs(slip) > interface.tolerance * interface.length)
         forward = ((status == FORWARD) & (slip > 0.0)) | carried
         return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
+
+    def _coefficient(self, x: Floats) -> Floats:
+        """Friction coefficient of the pad nodes (P,) at the positions x (P,)."""
+        return self.model.equilibrium.interface.friction(self.old, np.arange(x.size), x)
 
     def _contact(self) -> float:
         """Trapezoidal work of the contact forces, N mm per mm of depth."""
@@ -230,8 +234,8 @@ class Part:
         if model.attraction is not None:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
-        friction = model.equilibrium.interface.friction
-        less = friction(model.equilibrium.positions(carried.u)[:, 0]) - friction(self._x[1])
+        x = model.equilibrium.positions(carried.u)[:, 0]
+        less = self._coefficient(x) - self._coefficient(self._x[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * np.sign(self._slip) * along[:, 0]))
 
 

@@ -73,9 +73,7 @@ def residuals(step, schur, between, found):
     all_of = np.concatenate([found.moved, step.bone])
     right = step.residual + extra @ pushes
     nodes = (schur @ all_of)[:-2] - between @ found.moved - right[:-2] + present - pushed(step, found)
-    bone = [
-        ((schur @ all_of) - right)[unknown.axis - 2] - unknown.force for unknown in step.unknowns
-    ]
+    bone = [((schur @ all_of) - right)[unknown.axis - 2] - unknown.force for unknown in step.unknowns]
     return nodes, np.array(bone)
 
 

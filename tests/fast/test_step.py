@@ -38,7 +38,9 @@ def _parts():
 
 def outlook(state, **changes):
     """What the state itself would be the answer to, with changes."""
-    return replace(Target(float(state.bone[0]), Indentation(float(state.bone[1])), GivenVoltage(1000.0)), **changes)
+    return replace(
+        Target(float(state.bone[0]), Indentation(float(state.bone[1])), GivenVoltage(1000.0)), **changes
+    )
 
 
 def test_iterations_begin_with_a_pad_that_has_moved_with_the_bone(slid):

@@ -225,7 +225,9 @@ def test_friction_dissipates_on_the_way_along_the_profile():
     def lost(before, after):
         x0, x1 = positions(before)[:, 0], positions(after)[:, 0]
         middle, half = 0.5 * (x0 + x1), 0.5 * (x1 - x0)
-        way = half * (np.sqrt(1.0 + WAVES.slope(middle + np.outer(s, half)) ** 2) * weight[:, None]).sum(axis=0)
+        way = half * (np.sqrt(1.0 + WAVES.slope(middle + np.outer(s, half)) ** 2) * weight[:, None]).sum(
+            axis=0
+        )
         shear = 0.5 * (before.contact_force[:, 1] + after.contact_force[:, 1])
         return -np.sum((shear * way)[after.status >= 2])
 
