@@ -54,6 +54,8 @@ TURNED                  a bone that moved less than this fraction of its next wa
                         along it
 HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
                         mm: far above rounding, far below any mesh
+SHORT_RAMP              ramps of friction shorter than this fraction of a node distance are       jumps
+                        jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
@@ -95,6 +97,7 @@ ROUNDING = 1e-12
 UNHELD = 1e-10
 TURNED = 1e-9
 HAIR = 1e-9
+SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
 STAGGERED_LIMIT = 200

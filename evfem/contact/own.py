@@ -70,6 +70,11 @@ class OwnSurface:
         """Jumps of a table of friction; a method of the user's has none."""
         return self.plain.friction_jumps
 
+    @property
+    def friction_ramps(self) -> Array:
+        """Ramps of a table of friction; a method of the user's has none."""
+        return self.plain.friction_ramps
+
     def height(self, x: Array) -> Array:
         """Height (mm) of the unshifted profile at x (mm)."""
         return np.asarray(self.own.height(x))

@@ -103,6 +103,19 @@ class _Surface:
         jumps = np.stack([place[last], mu[first], mu[last]], axis=1)
         return jumps[jumps[:, 1] != jumps[:, 2]]
 
+    @property
+    def friction_ramps(self) -> Array:
+        """Ramps of the friction coefficient, (R, 4): begin and end in mm, coefficients there.
+
+        >>> Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.1, 0.6]]).friction_ramps.tolist()
+        [[2.0, 2.1, 0.5, 0.6]]
+        """
+        if isinstance(self.friction, float):
+            return np.zeros((0, 4))
+        place, mu = np.array(self.friction).T
+        ramps = np.stack([place[:-1], place[1:], mu[:-1], mu[1:]], axis=1)
+        return ramps[(ramps[:, 0] < ramps[:, 1]) & (ramps[:, 2] != ramps[:, 3])]
+
     def shifted(self, y: float) -> Self:
         """The same surface with its height shifted by `y` (mm)."""
         moved = copy(self)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import CHANGES, HAIR, SHORTEST_LENGTH, SMALLEST_FORCE
+from evfem.common.constants import CHANGES, HAIR, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates
 from evfem.contact.pad import Pad, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
@@ -72,15 +72,27 @@ class Pins:
         return bool(loose.any())
 
 
+def steps_of_friction(surface: Any, short: float) -> Floats:
+    """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J, 3) in
+    ascending order: position, coefficient before and behind. A ramp that a node crosses in one iteration is
+    to it a jump at its rougher end.
+    """
+    jumps, ramps = surface.friction_jumps, getattr(surface, "friction_ramps", np.zeros((0, 4)))
+    begin, end, before, behind = ramps[ramps[:, 1] - ramps[:, 0] < short].T
+    place = np.where(behind > before, end, begin)
+    both = np.concatenate([jumps, np.stack([place, before, behind], axis=1)])
+    return both[np.argsort(both[:, 0], kind="stable")]
+
+
 class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
 
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
         self.points = points[pad.nodes]
-        self.pins = Pins(surface.friction_jumps, pad.nodes.size)
         ends = self.points[pad.edges[:, :2]]
         self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
+        self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""

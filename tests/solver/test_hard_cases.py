@@ -134,3 +134,14 @@ def test_a_finger_at_rest_on_a_steep_texture_says_that_it_needs_time():
     motion = [Press(force=0.1, steps=2), Slide(1.0, steps=4)]
     with pytest.raises(NotConverged, match=r"no equilibrium at rest near here.*dynamics = viscous"):
         simulate(Scene(coarse_pad(), surface, motion=motion))
+
+
+def test_friction_that_rises_within_a_nodes_motion_is_a_jump_to_it():
+    """From 0.04 to 1.34 over 1.5 micrometres, against the way: from the smooth side a node is thrown beyond
+    the ramp, from the rough side back before it. It stays at the ramp's rough end.
+    """
+    surface = Flat(friction=[[-9.0, 1.34], [-0.3, 1.34], [-0.2985, 0.04], [9.0, 0.04]])
+    motion = [Press(force=0.02, steps=1), Slide(-1.2, steps=6)]
+    result = simulate(Scene(coarse_pad(), surface, motion=motion))
+    assert result.substeps.tolist() == [1] * 7
+    assert (np.diff(result.friction_dissipation) >= 0.0).all()

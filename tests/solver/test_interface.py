@@ -13,7 +13,7 @@ from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model
-from evfem.solver.interface import Pins
+from evfem.solver.interface import Pins, steps_of_friction
 
 ROUND = finger(block(8, 3, sag=0.4))
 SURFACES = [Flat(y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1)]
@@ -124,3 +124,11 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
         force[node] = [5.0, shear]
         assert interface.obeyed(old, replace(old, u=u, status=status, contact_force=force)) == obeyed
     assert not interface.pins.held.any()
+
+
+def test_short_ramps_of_friction_are_jumps_at_their_rougher_end():
+    table = [[0.0, 0.2], [1.0, 0.2], [1.01, 0.6], [2.0, 0.6], [2.0, 0.3], [3.0, 0.3], [3.01, 0.1], [5.0, 0.4]]
+    surface = Flat(friction=table)
+    found = steps_of_friction(surface, 0.05)
+    np.testing.assert_allclose(found, [[1.01, 0.2, 0.6], [2.0, 0.6, 0.3], [3.0, 0.3, 0.1]])
+    np.testing.assert_array_equal(steps_of_friction(surface, 0.005), surface.friction_jumps)
