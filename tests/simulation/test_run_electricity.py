@@ -62,6 +62,10 @@ def test_staggered_once_uses_the_attraction_of_the_state_before():
     rest = run(Display(), Hover(0.0), law=Kaczmarek(), voltage=2500.0, coupling="staggered_once")
     # the first step carries the attraction of the undeformed outline at first touch
     assert once.electrostatic_force[0] == pytest.approx(rest.electrostatic_force[0], rel=1e-12)
+    mesh = once.mesh
+    pressure = Kaczmarek().traction(mesh.points[:, 1], 2500.0, Layers.of(Layer(0.38, 1650.0), INSULATOR))
+    expected = np.sum(pressure * tributary(mesh, 0.0))
+    assert once.electrostatic_force[0] == pytest.approx(expected, rel=1e-9)
 
 
 def direct_force(mesh, displacement, gap_to, voltage):

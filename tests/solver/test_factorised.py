@@ -87,6 +87,24 @@ def test_an_update_of_which_next_to_nothing_can_be_taken_fails_the_step(pressed)
     body = pressed[0]
     points = body.body.space.mesh.points
     with pytest.raises(StepFailed, match="collapse"):
-        body._largest_fraction(
-            np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]])
-        )
+        body._largest_fraction(np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]]))
+
+
+@pytest.mark.parametrize(("depth", "fraction"), [(0.3, 0.5), (0.4, 1.0), (0.55, 1.5), (0.19, 0.0)])
+def test_iterations_begin_ahead_on_the_last_steps_way(pressed, depth, fraction):
+    """The last step went 0.2 mm down: as far along its displacements as the bone goes now, at most 1.5 times
+    (`Strategy.reach`), and not at all back.
+    """
+    body, state, _ = pressed
+    begun = body.begin(state, Target.held(np.array([0.0, -depth]), 1000.0), False, state)
+    np.testing.assert_allclose(begun.u, state.u + fraction * state.last_increment, atol=1e-14)
+    np.testing.assert_allclose(begun.bone, [0.0, -0.2 * (1.0 + fraction)], atol=1e-14)
+    assert begun.contact_force is state.contact_force
+
+
+def test_a_pad_that_touches_nothing_begins_moved_along_with_the_bone(pressed):
+    body, state, _ = pressed
+    free = replace(state, status=np.zeros_like(state.status))
+    begun = body.begin(free, Target.held(np.array([0.1, -0.15]), 500.0), False, free)
+    np.testing.assert_allclose(begun.u - free.u, np.broadcast_to([0.1, 0.05], free.u.shape), atol=1e-14)
+    assert begun.voltage == 500.0

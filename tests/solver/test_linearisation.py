@@ -261,6 +261,33 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
     assert np.abs(closing[~free]).max() < 1e-9 * closing.max()
 
 
+@pytest.mark.parametrize("direction", ["vertical", "normal"])
+def test_the_coupling_knows_lengths_but_not_the_nodes_own_gaps(direction):
+    """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a whole; its
+    weakening with a node's own gap belongs to the contact problem.
+    """
+    linear, model, state = made(voltage=2e5, body=FINE, direction=direction)
+    x = model.mesh.points[model.pad.nodes, 0]
+    linear.candidates = c = np.flatnonzero(np.abs(x) < 1.0)
+    linear.factorise(state)
+    tangent = linear.tangent
+    coupling = tangent.schur[:-2, :-2] - np.linalg.inv(tangent.compliance)
+    size = np.abs(coupling).max()
+    assert size > 1e-3 * tangent.schur.max()
+    np.testing.assert_allclose(coupling[:, 0::2].sum(axis=1), 0.0, atol=1e-7 * size)
+    np.testing.assert_allclose(np.diagonal(coupling)[1::2], 0.0, atol=1e-7 * size)
+    # between neighbours, a middle of an edge and its end, it is the derivative of the attraction
+    j, k = (int(np.argmin(np.abs(x - place))) for place in (0.05, 0.1))
+    place, nobody = linear.interface.positions(state.u), np.zeros(state.status.size, dtype=bool)
+    step = np.zeros_like(place)
+    step[k, 0] = 1e-6
+    ahead, behind = (model.attraction.forces(place + s * step, 2e5, nobody) for s in (1, -1))
+    row, column = (int(np.flatnonzero(c == node)[0]) for node in (j, k))
+    found = coupling[2 * row : 2 * row + 2, 2 * column]
+    np.testing.assert_allclose(found, (ahead - behind)[j] / 2e-6, atol=1e-5 * size)
+    assert np.abs(found).max() > 0.1 * size
+
+
 @pytest.mark.parametrize("how", ["no law", "no voltage", "frozen"])
 def test_an_attraction_that_does_not_change_has_no_part(how):
     linear, _, state = made() if how == "no law" else made(voltage=500.0)
