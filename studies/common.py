@@ -35,6 +35,7 @@ COLOURS = {
 #: hover cases of the measurements: voltage in V, air gap in mm
 CASES = {"HVHD": (2000.0, 0.50), "HVLD": (2000.0, 0.25), "LVLD": (1414.0, 0.25)}
 WIDTH = 7.0  # of a figure, in inches
+QUICK = "--quick: coarser and shorter than the study"
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,10 @@ class Study:
     parameters: dict[str, Any] = field(default_factory=dict)
 
     def finish(self, out: Path | None, quick: bool = False) -> dict[str, Any]:
-        """The study's dictionary; with `out` also NAME.json, NAME.csv and NAME.png in that folder."""
+        """The study's dictionary; with `out` also NAME.json, NAME.csv and NAME.png in that folder.
+
+        The picture of a `quick` study says so.
+        """
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
@@ -72,8 +76,11 @@ class Study:
             folder = make_folder(out)
             write_text(folder / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
             write_text(folder / f"{self.name}.csv", series_text(self.series))
+            figure = self.draw()
+            if quick:
+                say_quick(figure)
             with replacing(folder / f"{self.name}.png") as temporary:
-                self.draw().savefig(temporary, format="png", dpi=160)
+                figure.savefig(temporary, format="png", dpi=160)
         return result
 
 
@@ -179,6 +186,15 @@ def not_shown(figure: Figure, what: str) -> None:
     """A line at the foot of the figure on measured points that the paper plots but does not print."""
     figure.supxlabel(
         f"{what}: only plotted in the paper, not shown", fontsize="x-small", color=COLOURS["neutral"]
+    )
+
+
+def say_quick(figure: Figure) -> None:
+    """A line of its own at the head of a figure from `new_figure`: what it shows is coarser and shorter."""
+    line = 0.18 / figure.get_figheight()
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - line))
+    figure.text(
+        0.99, 1.0 - 0.2 * line, QUICK, ha="right", va="top", fontsize="x-small", color=COLOURS["neutral"]
     )
 
 

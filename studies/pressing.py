@@ -15,7 +15,8 @@ from evfem.common.arrays import Floats
 from evfem.contact.edge import contact_spans, outline_nodes
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Layer, Layers
-from evfem.finger.fingerpad import TABLE_2, FingerPad
+from evfem.finger.fingerpad import FingerPad
+from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import layer_thickness
 from evfem.scene.motion import Press, VoltageRamp
 from evfem.scene.scene import Scene

@@ -14,7 +14,8 @@ from evfem.common.arrays import Floats
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-from evfem.finger.fingerpad import TABLE_2, Electrical, FingerPad
+from evfem.finger.fingerpad import Electrical, FingerPad
+from evfem.finger.layers import TABLE_2
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.rendering import (

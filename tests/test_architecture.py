@@ -27,7 +27,7 @@ ROOMS = {
         "fields forms moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous space "
         "assembly weakform userforms dynamics body",
     ),
-    "finger": ({"numpy"}, "outline lattice section fingerpad"),
+    "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),
     "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
     "solver": (

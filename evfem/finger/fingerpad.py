@@ -19,6 +19,7 @@ import numpy as np
 from evfem.common.checks import choice, real, set_frozen
 from evfem.common.views import called, changed, short, table
 from evfem.errors import InputError
+from evfem.finger.layers import LAYERS, NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.mesh import file as meshfile
@@ -26,15 +27,6 @@ from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
 from evfem.protocols import Material
 from evfem.tissue.laws import NeoHookean
-
-#: Young's modulus (MPa) and Poisson's ratio of each region: Table 2 of the paper.
-TABLE_2: Mapping[str, tuple[float, float]] = {
-    "stratum_corneum": (1.000, 0.30),
-    "epidermis": (0.136, 0.30),
-    "dermis": (0.080, 0.48),
-    "hypodermis": (0.034, 0.48),
-    "nail": (17.000, 0.30),
-}
 
 #: parameter of `FingerPad` -> lowest and highest value, and its unit.
 RANGES: Mapping[str, tuple[float, float, str]] = {
@@ -46,10 +38,11 @@ RANGES: Mapping[str, tuple[float, float, str]] = {
     "ridge_phase": (-1.0, 1.0, " pitches"),
     "ridge_crest": (0.0, 0.9, " of the pitch"),
     "ridge_groove": (0.0, 0.5, " of the pitch"),
-    "stratum_corneum_thickness": (0.1, 0.8, " mm"),
-    "epidermis_thickness": (0.15, 1.0, " mm"),
-    "dermis_thickness": (0.5, 2.0, " mm"),
-    "nail_thickness": (0.2, 1.0, " mm"),
+    **{
+        layer.parameter: (layer.thickness.lowest, layer.thickness.highest, " mm")
+        for layer in (*LAYERS, NAIL)
+        if layer.thickness
+    },
     "nail_width": (4.0, 18.0, " mm"),
     "bone_width": (2.0, 12.0, " mm"),
     "bone_height": (2.0, 10.0, " mm"),
@@ -61,12 +54,12 @@ RANGES: Mapping[str, tuple[float, float, str]] = {
 #: inverse.
 STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
 
-#: resolution -> divisions in quadratic cells.
+#: resolution -> divisions in quadratic cells; the rows of each layer stand in `LAYERS`.
 RESOLUTIONS: Mapping[str, Divisions] = {
-    "coarse": Divisions(6, (2, 2, 2, 3), ((1, 0), (2, -1)), (3, 3, 6)),
-    "medium": Divisions(12, (4, 4, 4, 5), ((1, 0), (2, -1)), (5, 5, 10)),
-    "paper": Divisions(12, (2, 11, 6, 6), ((2, -2), (2, -1)), (5, 5, 26)),
-    "fine": Divisions(24, (8, 10, 14, 14), ((1, 0), (2, -1)), (9, 9, 18)),
+    "coarse": Divisions(6, (("epidermis", 0), ("dermis", -1)), side=3, upper=3, nail=6),
+    "medium": Divisions(12, (("epidermis", 0), ("dermis", -1)), side=5, upper=5, nail=10),
+    "paper": Divisions(12, (("dermis", -2), ("dermis", -1)), side=5, upper=5, nail=26),
+    "fine": Divisions(24, (("epidermis", 0), ("dermis", -1)), side=9, upper=9, nail=18),
 }
 
 
@@ -81,11 +74,15 @@ class Electrical:
     stratum_corneum_eps_r: float = 1650.0
 
     def __post_init__(self) -> None:
-        d, eps = self.stratum_corneum_thickness, self.stratum_corneum_eps_r
-        if d is not None and not 0.0 < d < 10.0:
-            raise InputError("finger.electrical.stratum_corneum_thickness", d, "a thickness up to 10 mm")
-        if not 1.0 <= eps < 1e9:
-            raise InputError("finger.electrical.stratum_corneum_eps_r", eps, "a number of at least 1")
+        thickness, eps_r = (
+            "finger.electrical.stratum_corneum_thickness",
+            "finger.electrical.stratum_corneum_eps_r",
+        )
+        if self.stratum_corneum_thickness is not None:
+            real(
+                thickness, self.stratum_corneum_thickness, "a thickness up to 10 mm", lambda d: 0.0 < d < 10.0
+            )
+        real(eps_r, self.stratum_corneum_eps_r, "a number of at least 1", lambda eps: 1.0 <= eps < 1e9)
 
 
 @dataclass(frozen=True)
@@ -138,10 +135,11 @@ class FingerPad:
     ridge_phase: float = 0.0
     ridge_crest: float = 0.0
     ridge_groove: float = 0.0
-    stratum_corneum_thickness: float = 0.38
-    epidermis_thickness: float = 0.47
-    dermis_thickness: float = 1.0
-    nail_thickness: float = 0.45
+    # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
+    stratum_corneum_thickness: float = thickness_of("stratum_corneum")
+    epidermis_thickness: float = thickness_of("epidermis")
+    dermis_thickness: float = thickness_of("dermis")
+    nail_thickness: float = thickness_of("nail")
     nail_width: float = 11.0
     bone_width: float = 6.0
     bone_height: float = 5.0
@@ -200,9 +198,16 @@ class FingerPad:
         if self.ridges:
             profile = (self.ridge_height, self.ridge_width, self.ridge_exponent, self.ridge_phase)
             ridges = Ridges(*profile, self.ridge_crest, self.ridge_groove, FULL * outer.a, ZONE * outer.a)
-        layers = (self.stratum_corneum_thickness, self.epidermis_thickness, self.dermis_thickness)
         return Section(
-            outer, bone, layers, self.nail_thickness, self.nail_width, ridges, RESOLUTIONS[self.resolution]
+            outer,
+            bone,
+            layers=LAYERS,
+            thickness=tuple(getattr(self, layer.parameter) for layer in LAYERS if layer.thickness),
+            rows=tuple(layer.rows[self.resolution] for layer in LAYERS),
+            nail=self.nail_thickness,
+            nail_width=self.nail_width,
+            ridges=ridges,
+            divisions=RESOLUTIONS[self.resolution],
         )
 
 
@@ -213,7 +218,9 @@ def _between(low: float, high: float) -> Callable[[float], bool]:
 def _all_materials(own: object) -> dict[str, Any]:
     if not isinstance(own, Mapping):
         raise InputError("finger.materials", own, "a law for each region that is not to have that of Table 2")
-    laws: dict[str, Any] = {name: NeoHookean(E=E, nu=nu) for name, (E, nu) in TABLE_2.items()}
+    laws: dict[str, Any] = {
+        layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in (*LAYERS, NAIL)
+    }
     for name, law in own.items():
         if name not in laws:
             raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
@@ -223,28 +230,35 @@ def _all_materials(own: object) -> dict[str, Any]:
 
 def _check_section(pad: FingerPad, section: Section) -> None:
     """Refuse geometry whose parts do not fit into each other."""
-    corneum, epidermis, dermis = section.layers
+    (outermost, second, *_), (thickness, below, *_) = section.layers, section.thickness
     ridges, outer = section.ridges, section.outer
     low, high = SLIMMEST
     if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
         _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
-        _at_most("ridge_height", ridges.height, 0.7 * corneum, "0.7 times the stratum corneum's thickness")
+        _at_most(
+            "ridge_height", ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness"
+        )
         _at_most(
             "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
         )
         _check_walls(ridges, outer)
     _at_most(
-        "nail_thickness", pad.nail_thickness, corneum + 0.7 * epidermis, "stratum corneum + 0.7 epidermis"
+        "nail_thickness",
+        pad.nail_thickness,
+        thickness + 0.7 * below,
+        f"{outermost.spoken} + 0.7 {second.spoken}",
     )
     _at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
-    skin = corneum + epidermis + dermis
+    skin = sum(section.thickness)
+    *others, deepest = [layer for layer in section.layers if layer.thickness]
     _at_most(
-        "dermis_thickness",
+        deepest.parameter,
         skin,
         0.6 * outer.smallest_radius,
-        "0.6 times the outline's smallest radius, together with stratum corneum and epidermis",
+        "0.6 times the outline's smallest radius, together with "
+        + " and ".join(layer.spoken for layer in others),
     )
     theta = np.linspace(-np.pi, np.pi, 361)
     inside = outer.point(theta) - skin * outer.normal(theta)

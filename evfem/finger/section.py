@@ -15,10 +15,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.finger.lattice import Lattice, ring
+from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.mesh.mesh import Mesh
 
-REGIONS: Mapping[str, int] = {"stratum_corneum": 0, "epidermis": 1, "dermis": 2, "hypodermis": 3, "nail": 4}
 #: Over the semi-axis: where ridges begin to fade, where they end, and half the width of the finest zone with
 #: and without ridges (6.00, 6.59, about 3.5 and 5.4 mm for the default width).
 FULL, ZONE, FINE, FINE_SMOOTH = 0.72, 0.79, 0.42, 0.60
@@ -32,26 +32,32 @@ TRANSITION = 2.4
 class Divisions:
     """How finely to divide, in quadratic cells (twice as many linear ones).
 
-    `per_ridge`: columns per ridge in the finest zone (a third of it beyond, a ninth in the depth); `rows`
-    of the stratum corneum, epidermis, dermis, hypodermis; `transitions`: the rows in which columns merge,
-    counted in the layers as (layer, row), negative from the end; `around`: base columns from the zone's end
-    to the widest point, from there to the nail's edge, and along the nail.
+    `per_ridge`: columns per ridge in the finest zone (a third of it beyond, a ninth in the depth);
+    `transitions`: the rows in which columns merge, as (name of the layer, row in it), negative from its end;
+    base columns: `side` from the zone's end to the widest point, `upper` from there to the nail's edge,
+    `nail` along the nail. The rows of the layers stand in `LAYERS`.
     """
 
     per_ridge: int
-    rows: tuple[int, int, int, int]
-    transitions: tuple[tuple[int, int], tuple[int, int]]
-    around: tuple[int, int, int]
+    transitions: tuple[tuple[str, int], tuple[str, int]]
+    side: int
+    upper: int
+    nail: int
 
 
 @dataclass(frozen=True)
 class Section:
-    """Geometry of a cross-section (mm): thicknesses of stratum corneum, epidermis and dermis, and of the
-    nail."""
+    """Geometry of a cross-section (mm).
+
+    `layers` from the outline to the bone, `thickness` of all of them but the innermost, `rows` of quadratic
+    cells in each; `nail` is the thickness of the nail.
+    """
 
     outer: Ellipse
     bone: Ellipse
-    layers: tuple[float, float, float]
+    layers: tuple[TissueLayer, ...]
+    thickness: tuple[float, ...]
+    rows: tuple[int, ...]
     nail: float
     nail_width: float
     ridges: Ridges | None
@@ -60,12 +66,11 @@ class Section:
     def mesh(self, order: int) -> Mesh:
         """Quadrilaterals of `order` 1 or 2, the latter with half the divisions and mid-nodes on the true
         curves."""
-        rows = [n * (3 - order) for n in self.divisions.rows]
+        rows = [n * (3 - order) for n in self.rows]
         columns = Columns(self, order)
-        start = np.concatenate([[0], np.cumsum(rows)])
+        names, start = [layer.name for layer in self.layers], np.concatenate([[0], np.cumsum(rows)])
         merging = tuple(
-            int(start[layer] + row + (rows[layer] if row < 0 else 0))
-            for layer, row in self.divisions.transitions
+            int(start[names.index(name) + (row < 0)]) + row for name, row in self.divisions.transitions
         )
         lattice = ring(columns.splits, sum(rows), merging, order)
         depth = self._row_depths(rows, merging, columns.width)
@@ -73,10 +78,10 @@ class Section:
         return self._named(points, lattice, columns, rows, order)
 
     def _row_depths(self, rows: list[int], merging: tuple[int, ...], width: float) -> Floats:
-        """Depth of each line of the lattice, in layers: 0 the outline, 1 below the stratum corneum ... 4
-        the bone."""
-        below = self.outer.b - self.bone.b + self.bone.centre - sum(self.layers)
-        thickness = [*self.layers, below]
+        """Depth of each line of the lattice, in layers: 0 the outline, 1 below the outermost ..., their
+        number at the bone."""
+        below = self.outer.b - self.bone.b + self.bone.centre - sum(self.thickness)
+        thickness = [*self.thickness, below]
         wish = {row: TRANSITION * width * 3.0**i for i, row in enumerate(merging)}
         depths, first, size = [np.zeros(1)], 0, 1.5 * width
         for layer, (n, total) in enumerate(zip(rows, thickness, strict=True)):
@@ -90,27 +95,30 @@ class Section:
     def _points(self, lattice: Lattice, columns: Columns, depth: Floats) -> Floats:
         foot, normal, interfaces = columns.at(lattice.u)
         level = np.interp(lattice.r, np.arange(len(depth)), depth)
-        layer = np.minimum(level.astype(int), 3)
+        innermost = len(self.layers) - 1
+        layer = np.minimum(level.astype(int), innermost)
         part = level - layer
         index = np.arange(len(part))
-        upper, lower = interfaces[layer, index], interfaces[np.minimum(layer + 1, 3), index]
+        upper, lower = interfaces[layer, index], interfaces[np.minimum(layer + 1, innermost), index]
         skin = foot - ((1.0 - part) * upper + part * lower)[:, None] * normal
-        inside = foot - interfaces[3][:, None] * normal
+        inside = foot - interfaces[innermost][:, None] * normal
         deep = inside + part[:, None] * (self.bone.towards(inside) - inside)
-        return np.where((layer == 3)[:, None], deep, skin)
+        return np.where((layer == innermost)[:, None], deep, skin)
 
     def _named(self, points: Floats, lattice: Lattice, columns: Columns, rows: list[int], order: int) -> Mesh:
-        layer = np.repeat(np.arange(4), rows)[lattice.row]
-        below_nail = np.where(layer == 0, REGIONS["nail"], REGIONS["dermis"])
-        region = np.where(columns.is_nail[lattice.column], below_nail, layer)
+        numbers = {layer.name: layer.number for layer in (*self.layers, NAIL)}
+        layer = np.repeat(np.arange(len(rows)), rows)[lattice.row]
+        below_nail = np.where(layer == 0, NAIL.number, numbers[NAIL_BED])
+        elsewhere = np.array([layer.number for layer in self.layers])[layer]
+        region = np.where(columns.is_nail[lattice.column], below_nail, elsewhere)
         outline = np.flatnonzero(lattice.r == 0.0)
         sets = {
             "pad": outline[points[outline, 1] <= 1e-9 * self.outer.b],
             "bone": np.flatnonzero(lattice.r == lattice.r.max()),
-            "nail": np.intersect1d(outline, lattice.cells[region == REGIONS["nail"]]),
+            "nail": np.intersect1d(outline, lattice.cells[region == NAIL.number]),
         }
         kind = "quad9" if order == 2 else "quad"
-        return Mesh(points, lattice.cells, kind, region, dict(REGIONS), sets)
+        return Mesh(points, lattice.cells, kind, region, numbers, sets)
 
 
 def _heights(n: int, total: float, first: float, fixed: Mapping[int, float]) -> Floats:
@@ -154,7 +162,8 @@ class Columns:
         self.step = coarsest / per_cell
         self.width = self.step / 9.0
         self.first_x = offset - half * self.step
-        self.theta, counts = self._angles(2 * half, [n * per_cell for n in section.divisions.around])
+        around = section.divisions.side, section.divisions.upper, section.divisions.nail
+        self.theta, counts = self._angles(2 * half, [n * per_cell for n in around])
         starts = np.cumsum(counts)
         number = np.arange(starts[-1])
         self.is_nail = (number < starts[0]) | (number >= starts[-2])
@@ -187,8 +196,8 @@ class Columns:
         return float(np.arccos(0.5 * self.section.nail_width / self.section.outer.a))
 
     def at(self, u: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points (N, 2) and normals (N, 2) of the smooth ellipse, depths (4, N) of outline and interfaces
-        there."""
+        """Points (N, 2) and normals (N, 2) of the smooth ellipse, depths there of the outline and of the
+        interfaces between the layers (number of layers, N)."""
         section = self.section
         first, last = self.zone
         theta = np.interp(u, np.arange(len(self.theta)), self.theta)
@@ -198,12 +207,11 @@ class Columns:
         foot, normal = section.outer.point(theta), section.outer.normal(theta)
         foot[inside, 0] = x
         foot[np.isin(theta, (0.0, -np.pi)), 1] = 0.0
-        corneum, epidermis, dermis = section.layers
         depth = section.ridges.depth(foot[:, 0]) if section.ridges else np.zeros(len(u))
         depth[foot[:, 1] >= 0.0] = 0.0
-        below = corneum + (section.nail - corneum) * self._towards_nail(theta)
-        whole = corneum + epidermis
-        return foot, normal, np.array([depth, below, np.full(len(u), whole), np.full(len(u), whole + dermis)])
+        outermost, *deeper = np.cumsum(section.thickness)
+        below = outermost + (section.nail - outermost) * self._towards_nail(theta)
+        return foot, normal, np.array([depth, below, *(np.full(len(u), whole) for whole in deeper)])
 
     def _towards_nail(self, theta: Floats) -> Floats:
         """0 on the lower side, 1 on the nail, smooth in between."""

@@ -2,19 +2,24 @@
 quality.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+from evfem import data
 from evfem.errors import InputError
-from evfem.finger.fingerpad import RANGES, RESOLUTIONS, TABLE_2, FingerPad, MeshedFinger
+from evfem.finger import fingerpad
+from evfem.finger.fingerpad import RANGES, RESOLUTIONS, Electrical, FingerPad, MeshedFinger
+from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
 from evfem.mesh.mesh import layer_thickness
 from evfem.mesh.quality import check, scaled_jacobian
 from evfem.tissue.laws import NeoHookean
 
 A, B = 8.34, 6.395
+#: of the regions in mesh files
+NUMBERS = {"stratum_corneum": 0, "epidermis": 1, "dermis": 2, "hypodermis": 3, "nail": 4}
 
 
 def green_area(mesh):
@@ -86,7 +91,7 @@ def test_regions_fill_the_section():
     mesh = FingerPad().mesh(2)
     total = sum(region_area(mesh, name) for name in mesh.region_names)
     assert total == pytest.approx(green_area(mesh), rel=1e-12)
-    assert sorted(mesh.region_names) == sorted(TABLE_2)
+    assert mesh.region_names == NUMBERS
 
 
 @pytest.mark.parametrize(
@@ -187,6 +192,53 @@ def test_layers_below_are_offsets_of_the_smooth_ellipse_despite_the_ridges(order
         _, distance = from_ellipse(pad, points[points[:, 1] < -0.5])
         assert len(distance) > 40
         np.testing.assert_allclose(distance, depth, rtol=1e-9)
+
+
+def test_rows_of_layers_fit_each_other_and_the_parameters_of_the_finger():
+    rows = (*LAYERS, NAIL)
+    assert sorted(layer.number for layer in rows) == list(range(len(rows)))
+    assert [layer.thickness is None for layer in rows] == [layer is LAYERS[-1] for layer in rows]
+    assert all(layer.rows.keys() == RESOLUTIONS.keys() for layer in LAYERS)
+    thick = {layer.parameter: layer.thickness for layer in rows if layer.thickness}
+    given = {spec.name: spec.default for spec in fields(FingerPad) if spec.name.endswith("_thickness")}
+    assert given == {name: thickness.default for name, thickness in thick.items()}
+    assert all(RANGES[name] == (*thickness[1:], " mm") for name, thickness in thick.items())
+
+
+def test_table_2_is_that_of_the_paper():
+    table, signs = data.load("table2"), ("sc", "ed", "d", "hd", "n")
+    names = [table["name"][table["symbol"].index(f"E_{s}")].split(" of ")[1].replace(" ", "_") for s in signs]
+    printed = [(table.value(f"E_{s}"), table.value(f"nu_{s}")) for s in signs]
+    assert dict(zip(names, printed, strict=True)) == TABLE_2
+    used = {layer.name: layer.moduli for layer in (*LAYERS, NAIL)}
+    assert {name: used[name] for name in names} == TABLE_2
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("place", [1, 2, 3])
+@pytest.mark.parametrize("resolution", RESOLUTIONS)
+def test_a_layer_more_is_a_row_and_its_thickness(resolution, place, order, monkeypatch):
+    rows = dict.fromkeys(RESOLUTIONS, 2)
+    fascia = TissueLayer("fascia", 5, Moduli(0.5, 0.4), Thickness(0.3, 0.1, 0.6), rows)
+    layers = (*LAYERS[:place], fascia, *LAYERS[place:])
+    monkeypatch.setattr(fingerpad, "LAYERS", layers)
+
+    @dataclass(frozen=True)
+    class Layered(FingerPad):
+        fascia_thickness: float = 0.3
+
+    pad = Layered(resolution=resolution)
+    mesh = check(pad.mesh(order))
+    assert mesh.region_names == NUMBERS | {"fascia": 5}
+    assert pad.materials["fascia"] == NeoHookean(E=0.5, nu=0.4)
+    assert scaled_jacobian(mesh).min() > 0.2
+    depth = np.cumsum([layer.thickness.default for layer in layers[:-1]])
+    for upper, lower, expected in zip(layers[:-1], layers[1:], depth, strict=True):
+        shared = np.intersect1d(*(mesh.cells[mesh.cells_of(layer.name)] for layer in (upper, lower)))
+        points = mesh.points[shared]
+        _, distance = from_ellipse(pad, points[points[:, 1] < -0.5])
+        assert len(distance) > 30
+        np.testing.assert_allclose(distance, expected, rtol=1e-9)
 
 
 def test_mid_nodes_lie_on_the_true_bone_and_interface():
@@ -317,6 +369,34 @@ def test_geometry_that_cannot_exist_gets_a_sentence(values, key):
         FingerPad(**values)
     assert caught.value.key == key
     assert "allowed" in str(caught.value)
+
+
+def test_every_number_of_the_finger_has_a_range():
+    assert set(RANGES) == {spec.name for spec in fields(FingerPad) if spec.type == "float"}
+    assert {spec.type for spec in fields(FingerPad)} - {"float"} == {
+        "bool",
+        "str",
+        "Mapping[str, Material]",
+        "Electrical",
+    }
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_a_wrong_number_gets_the_sentence_of_its_parameter(name):
+    low, high, unit = RANGES[name]
+    for value in ("abc", None, True, low - 0.3, high + 0.3, float("nan"), float("-inf")):
+        with pytest.raises(InputError) as caught:
+            FingerPad(**{name: value})
+        expected = f"finger.{name}: given {value}; allowed: {low:g} to {high:g}{unit}"
+        assert str(caught.value) == expected
+
+
+@pytest.mark.parametrize("name", ["stratum_corneum_thickness", "stratum_corneum_eps_r"])
+@pytest.mark.parametrize("value", ["abc", -0.3, 1e10, float("nan"), [1.0]])
+def test_a_wrong_number_of_the_electrical_layer_gets_its_sentence(name, value):
+    with pytest.raises(InputError) as caught:
+        Electrical(**{name: value})
+    assert caught.value.key == f"finger.electrical.{name}"
 
 
 def test_materials_are_those_of_table_2_unless_replaced():

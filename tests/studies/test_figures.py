@@ -133,6 +133,22 @@ def test_curves_of_a_study_as_csv():
     assert common.series_text([common.Series("a,b", [1], [1.0], "N")]).endswith('"a,b",1.0,1.0,N\n')
 
 
+@pytest.mark.parametrize("quick", [True, False])
+def test_the_picture_of_a_quick_study_says_so_beside_everything_else(quick, tmp_path):
+    figure = common.new_figure(3.0, 4.0)
+    figure.add_subplot().set(xlabel="x", ylabel="y")
+    common.panel_letter(figure.axes[0], "a")
+    common.not_shown(figure, "measured points")
+    common.Study("one", {}, {}, {}, [], lambda: figure).finish(tmp_path, quick)
+    notes = [text for text in figure.texts if text.get_text() == common.QUICK]
+    assert len(notes) == int(quick)
+    others = [*figure.axes, *(text for text in figure.texts if text not in notes)]
+    for note in notes:
+        box = note.get_window_extent()
+        assert max(part.get_tightbbox().y1 for part in others) < box.y0 < box.y1 <= figure.bbox.y1
+        assert 0 <= box.x0 < box.x1 <= figure.bbox.x1
+
+
 def test_unknown_study_and_unusable_folder(tmp_path):
     with pytest.raises(InputError, match="section321"):
         studies.run("fig99")

@@ -1,0 +1,112 @@
+"""The layers of the finger pad: one row each, from the outline to the bone, and the nail.
+
+A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`, and its
+thickness a parameter of `FingerPad`: the field `NAME_thickness`, with the default `thickness_of("NAME")`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+
+class Moduli(NamedTuple):
+    """Young's modulus (MPa) and Poisson's ratio."""
+
+    E: float
+    nu: float
+
+
+class Thickness(NamedTuple):
+    """What a layer's thickness (mm) is by default, and what it may be."""
+
+    default: float
+    lowest: float
+    highest: float
+
+
+@dataclass(frozen=True)
+class TissueLayer:
+    """One layer of the cross-section, a region of its mesh.
+
+    `number` is the region's in files and stays what it is when layers are added. `moduli` are those of the
+    default neo-Hookean material. A layer without `thickness` fills what the others leave. `rows`: its rows
+    of quadratic cells for each resolution (the nail has those of the layer that it replaces).
+    """
+
+    name: str
+    number: int
+    moduli: Moduli
+    thickness: Thickness | None
+    rows: Mapping[str, int] = field(default_factory=dict)
+
+    @property
+    def parameter(self) -> str:
+        """The parameter of `FingerPad` that is its thickness."""
+        return f"{self.name}_thickness"
+
+    @property
+    def spoken(self) -> str:
+        """Its name in a sentence."""
+        return self.name.replace("_", " ")
+
+
+#: Table 2 of the paper.
+TABLE_2: Mapping[str, Moduli] = {
+    "stratum_corneum": Moduli(1.000, 0.30),
+    "epidermis": Moduli(0.136, 0.30),
+    "dermis": Moduli(0.080, 0.48),
+    "hypodermis": Moduli(0.034, 0.48),
+    "nail": Moduli(17.000, 0.30),
+}
+
+#: The layers of the pad, from the outline to the bone.
+LAYERS: tuple[TissueLayer, ...] = (
+    TissueLayer(
+        name="stratum_corneum",
+        number=0,
+        moduli=TABLE_2["stratum_corneum"],
+        thickness=Thickness(0.38, lowest=0.1, highest=0.8),
+        rows={"coarse": 2, "medium": 4, "paper": 2, "fine": 8},
+    ),
+    TissueLayer(
+        name="epidermis",
+        number=1,
+        moduli=TABLE_2["epidermis"],
+        thickness=Thickness(0.47, lowest=0.15, highest=1.0),
+        rows={"coarse": 2, "medium": 4, "paper": 11, "fine": 10},
+    ),
+    TissueLayer(
+        name="dermis",
+        number=2,
+        moduli=TABLE_2["dermis"],
+        thickness=Thickness(1.0, lowest=0.5, highest=2.0),
+        rows={"coarse": 2, "medium": 4, "paper": 6, "fine": 14},
+    ),
+    TissueLayer(
+        name="hypodermis",
+        number=3,
+        moduli=TABLE_2["hypodermis"],
+        thickness=None,
+        rows={"coarse": 3, "medium": 5, "paper": 6, "fine": 14},
+    ),
+)
+#: Takes the place of the outermost layer on top; everything below it, down to the bone, is `NAIL_BED`.
+NAIL = TissueLayer(
+    name="nail",
+    number=4,
+    moduli=TABLE_2["nail"],
+    thickness=Thickness(0.45, lowest=0.2, highest=1.0),
+)
+NAIL_BED = "dermis"
+
+
+def thickness_of(name: str) -> float:
+    """The default thickness (mm) of a layer that has one.
+
+    >>> thickness_of("epidermis")
+    0.47
+    """
+    (found,) = (layer.thickness for layer in (*LAYERS, NAIL) if layer.name == name and layer.thickness)
+    return found.default
