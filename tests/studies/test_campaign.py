@@ -166,6 +166,8 @@ CORRUPTED = {
     "signs": _column("electrostatic_force", lambda v: -v),
     "friction_dissipation falls": _column("friction_dissipation", lambda v: 0.0),
     "viscous_dissipation falls": _column("viscous_dissipation", lambda v: 1e-3),
+    "snap_dissipation falls": _column("snap_dissipation", lambda v: v + 1e-3),
+    "books": _column("external_work", lambda v: 1.0001 * v),
     "pull": _field("contact_pressure", lambda p, f: p - 1e-4 * p.max()),
     "nodal cone": _field("shear_traction", lambda s, f: 1.001 * s),
     "open nodes": _field("contact_pressure", _one_open_node_pushed),
@@ -222,6 +224,7 @@ def test_the_mirror_image_of_a_scene_gives_the_mirrored_rows(correct):
     _, result = correct
     other = simulate(tables.scene_of(tables.mirrored(SCENE)))
     assert twins.smooth(result)
+    assert not twins.smooth(replace(result, snap_dissipation=result.stored_energy))
     assert twins.mirror_broken(result, other) is None
     assert twins.mirror_broken(result, result).name == "mirror"  # not its own mirror image
     pushed = other.normal_force.copy()
