@@ -23,9 +23,8 @@ FORCE, ENERGY = 1e-6, 1e-9  # N/mm, N
 TOLERANCE, FALL = 1e-6, 1e-6
 #: mm: how deep a node may sink in, and how far a node pinned to a jump of friction may be from it
 DEEPEST, NEAR = 1e-6, 1e-6
-#: works that leave the body or stay in it for good
-DISSIPATIONS = tuple(name for name in COLUMNS if name.endswith("_dissipation"))
-OPEN, STICK, SLIP = 0, 1, 2
+#: statuses of a node in a frame
+OPEN, SLIP = 0, 2
 
 
 @dataclass(frozen=True)
@@ -83,10 +82,7 @@ def largest_energy(result: Result) -> float:
 
 
 def remainder(result: Result) -> Floats:
-    """External and electrostatic work less what is stored, moving and dissipated, over the largest (rows,).
-
-    It counts whatever columns of the history are works, energies and dissipations.
-    """
+    """Works less what is stored, moving and dissipated, over the largest of all of them (rows,)."""
     given = result.external_work + result.electrostatic_work
     kept = [getattr(result, name) for name in COLUMNS if name.endswith(("_energy", "_dissipation"))]
     return (given - np.sum(kept, axis=0)) / largest_energy(result)
@@ -203,6 +199,19 @@ def friction_work(scene: Scene, result: Result) -> Broken | None:
 def viscous_work(scene: Scene, result: Result) -> Broken | None:
     """What viscosity dissipates never falls."""
     return _falls(result, "viscous_dissipation")
+
+
+@check
+def snap_work(scene: Scene, result: Result) -> Broken | None:
+    """What snaps set free never falls."""
+    return _falls(result, "snap_dissipation")
+
+
+@check
+def books(scene: Scene, result: Result) -> Broken | None:
+    """Works, energies and dissipations add up, as far as the forces balance that they are made of."""
+    allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
+    return _worst("books", np.abs(remainder(result)), allowed, result.step)
 
 
 def _falls(result: Result, name: str) -> Broken | None:

@@ -7,15 +7,15 @@ import numpy as np
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 
-from .invariants import FORCE, Broken, remainder
+from .invariants import FORCE, Broken, largest_energy
 
 #: columns that are compared, and which of them change sign in a mirror
 ODD = ("position", "tangential_force", "applied_tangential_force", "electrostatic_force_x")
 COMPARED = (*ODD, "indentation", "normal_force", "applied_force", "electrostatic_force")
 #: relative differences that two correct results may have
 MIRRORED, HALVED = 1e-4, 1e-5
-#: a change of the remainder of the books in one row above this is taken for a snap
-SNAP = 0.01
+#: share of the largest energy that snaps may set free and be none
+SNAP = 1e-4
 
 
 def smooth(result: Result) -> bool:
@@ -23,8 +23,8 @@ def smooth(result: Result) -> bool:
 
     Beyond a cut or a snap the way of the iterations decides which of several equilibria is found.
     """
-    jumps = np.abs(np.diff(remainder(result), prepend=0.0))
-    return int(result.provenance["solver"]["cuts"]) == 0 and bool((jumps < SNAP).all())
+    free = float(result.snap_dissipation[-1]) / largest_energy(result)
+    return int(result.provenance["solver"]["cuts"]) == 0 and free < SNAP
 
 
 def free_of_path(scene: Scene) -> bool:

@@ -166,6 +166,8 @@ CORRUPTED = {
     "signs": _column("electrostatic_force", lambda v: -v),
     "friction_dissipation falls": _column("friction_dissipation", lambda v: 0.0),
     "viscous_dissipation falls": _column("viscous_dissipation", lambda v: 1e-3),
+    "snap_dissipation falls": _column("snap_dissipation", lambda v: v + 1e-3),
+    "books": _column("external_work", lambda v: 1.0001 * v),
     "pull": _field("contact_pressure", lambda p, f: p - 1e-4 * p.max()),
     "nodal cone": _field("shear_traction", lambda s, f: 1.001 * s),
     "open nodes": _field("contact_pressure", _one_open_node_pushed),
@@ -222,6 +224,7 @@ def test_the_mirror_image_of_a_scene_gives_the_mirrored_rows(correct):
     _, result = correct
     other = simulate(tables.scene_of(tables.mirrored(SCENE)))
     assert twins.smooth(result)
+    assert not twins.smooth(replace(result, snap_dissipation=result.stored_energy))
     assert twins.mirror_broken(result, other) is None
     assert twins.mirror_broken(result, result).name == "mirror"  # not its own mirror image
     pushed = other.normal_force.copy()
@@ -417,13 +420,17 @@ def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
 # -- the property
 
 #: scenes that do not end well yet, and why
-KNOWN = {2: "friction_dissipation falls", 4: "1 of 45 nodes keep changing"}
+TURNED = "friction_dissipation falls where nodes turn round"
+KEPT_CHANGING = "one contact node keeps changing"
+KNOWN = {2: TURNED, 23: TURNED, 33: TURNED, 4: KEPT_CHANGING, 24: KEPT_CHANGING, 31: KEPT_CHANGING}
+#: the normal suite's scenes, none of which takes more than a few seconds
+FEW = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10)
 
 
-def scenes(start, stop):
+def scenes(numbers):
     """Numbers of scenes; the known ones must still fail, so that a mended one is struck off."""
     marks = {n: pytest.mark.xfail(reason=reason, strict=True) for n, reason in KNOWN.items()}
-    return [pytest.param(n, marks=marks.get(n, ())) for n in range(start, stop)]
+    return [pytest.param(n, marks=marks.get(n, ())) for n in numbers]
 
 
 def ends_well(number):
@@ -432,13 +439,13 @@ def ends_well(number):
 
 
 @pytest.mark.solver
-@pytest.mark.parametrize("number", scenes(0, 10))
+@pytest.mark.parametrize("number", scenes(FEW))
 def test_a_scene_nobody_chose_ends_in_equilibria(number):
     ends_well(number)
 
 
 @pytest.mark.slow
 @pytest.mark.solver
-@pytest.mark.parametrize("number", scenes(10, 40))
+@pytest.mark.parametrize("number", scenes(sorted({*range(40)} - {*FEW})))
 def test_more_scenes_nobody_chose_end_in_equilibria(number):
     ends_well(number)
