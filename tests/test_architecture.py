@@ -35,7 +35,7 @@ ROOMS = {
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
-    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution plan"),
+    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
     "simulation": ({"numpy", "threadpoolctl"}, "result model ledger checkpoint run rendering"),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (

@@ -6,18 +6,19 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Hover, VoltageRamp
 from evfem.scene.resolution import unresolved
 from evfem.scene.scene import Scene
+from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
 from evfem.tissue.forms import Form
 from evfem.tissue.laws import split
@@ -51,7 +52,12 @@ class Plan:
     steps: int
     terms: tuple[Term, ...]
     solver: tuple[str, ...]
-    warning: str | None = None
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def warning(self) -> str | None:
+        """All warnings as one text; None without any."""
+        return "; ".join(self.warnings) or None
 
     def has(self, name: str) -> bool:
         """Whether the term called `name` is in."""
@@ -73,8 +79,8 @@ class Plan:
         lines += ["", "Solver"]
         for line in self.solver:
             lines += _wrapped("  ", line)
-        if self.warning is not None:
-            lines += ["", *_wrapped("Warning: ", self.warning)]
+        for warning in self.warnings:
+            lines += ["", *_wrapped("Warning: ", warning)]
         return "\n".join(lines)
 
 
@@ -105,15 +111,18 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
 
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
-    """The plan of a scene whose mesh is already there."""
+    """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
+    check_parts(scene)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             raise InputError(
                 "finger.mesh", f"no nodes on `{name}`", "point data or physical groups `pad` and `bone`"
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
+    moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
+    rough = unresolved(scene, mesh)
     terms = (
-        _tissue(scene, mesh),
+        _tissue(scene, mesh, moduli),
         _contact(scene),
         _friction(scene),
         _electricity(scene),
@@ -130,18 +139,18 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
-        warning=unresolved(scene, mesh),
+        warnings=(*doubts(scene, mesh, moduli), *([] if rough is None else [rough])),
     )
 
 
-def _tissue(scene: Scene, mesh: Mesh) -> Term:
+def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     materials = scene.finger.materials
     laws = ", ".join(sorted({_law_name(law, name, mesh) for name, law in materials.items()}))
-    moduli = [split(law).shear_modulus for law in materials.values()]
-    # a modulus in kPa or Pa is seen here
-    soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli), max(moduli)))
+    softest, hardest = min(moduli.values()), max(moduli.values())
+    # a modulus in kPa is seen here
+    soft, hard = f"{softest:.3g}", f"{hardest:.3g}"
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
-    share = rigid_share(scene, mesh)
+    share = rigid_share(scene, mesh, softest)
     if share is not None and share < RIGID_BELOW:
         return Term(
             "tissue", False, f"hovering: deforming would change the attraction by less than {share:.1e}"
@@ -154,12 +163,9 @@ def _tissue(scene: Scene, mesh: Mesh) -> Term:
     )
 
 
-def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
-    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None where it
-    must deform.
-
-    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln p)/dg, of
-    the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the smallest gap.
+def rigid_share(scene: Scene, mesh: Mesh, softest: float) -> float | None:
+    """Upper estimate of the relative change of the attraction if a hovering pad may deform, whose softest
+    shear modulus (MPa) is given; None where it must deform.
     """
     hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
     if (
@@ -176,24 +182,7 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
         or scene.finger.electrical is None
     ):
         return None
-    from evfem.electrostatics.laws import Layers
-
-    layers = Layers.of(scene.ground.insulator)
-    traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
-    softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
-    depth = float(np.ptp(mesh.points[:, 1]))
-    return traction * depth / softest * 2.0 / gap
-
-
-def largest_voltage(scene: Scene) -> float:
-    """Largest magnitude of the voltage anywhere in the scene (V)."""
-    own: Any = scene.voltage
-    if isinstance(own, VoltageProfile):
-        own = own.voltage
-    elif isinstance(own, FollowForce):
-        own = own.largest_voltage
-    ramps = [abs(motion.voltage) for motion in scene.motion if isinstance(motion, VoltageRamp)]
-    return float(max([np.abs(own).max(), *ramps]))
+    return hover_share(scene, mesh, softest, gap)
 
 
 def _contact(scene: Scene) -> Term:

@@ -30,7 +30,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
         return None
     ends = mesh.points[mesh.edges_of("pad")[:, :2]]
     spacing = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T))) / mesh.order
-    x = _way(scene, mesh, spacing / PER_SPACING)
+    x = way(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
     if missed > MISSED * whole:
@@ -49,7 +49,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     return None
 
 
-def _way(scene: Scene, mesh: Mesh, step: float) -> Any:
+def way(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
     position = np.cumsum([0.0, *(motion.distance for motion in scene.motion if isinstance(motion, Slide))])
     pad = mesh.points[mesh.node_sets["pad"], 0]

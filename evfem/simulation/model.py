@@ -60,8 +60,8 @@ def make_model(scene: Scene) -> Model:
     mesh, element = scene_mesh(scene)
     check_laws(mesh, scene.finger.materials)
     needed = plan_on(scene, mesh, element)
-    if needed.warning is not None:
-        warnings.warn(needed.warning, stacklevel=2)
+    for warning in needed.warnings:
+        warnings.warn(warning, stacklevel=2)
     space = make_space(mesh, element)
     pad = make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])

@@ -1,0 +1,371 @@
+"""Mistakes are found before the run, each with one sentence, and what is shipped stays silent."""
+
+import math
+import re
+import time
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evfem.studies.stability.case import Log
+from evfem.studies.stability.study import CASES
+from tools.meshes import block
+
+import evfem as ev
+from evfem.errors import InputError
+from evfem.scene import file as scenefile
+from evfem.scene.plan import plan, scene_mesh
+from evfem.scene.scene import default_scene
+from evfem.scene.sense import check_parts, doubts
+from evfem.tissue.splitlaw import split
+
+ROOT = Path(__file__).parents[2]
+SKIN = ev.Electrical(stratum_corneum_thickness=0.38)
+PRESS = ev.Press(indentation=0.2, steps=2)
+HOVER, SLIDE = ev.Hover(gap=0.3), ev.Slide(distance=1.0, steps=2)
+
+
+def scene(material=None, *motion, **more):
+    """A block of one material on a display."""
+    law = material or ev.NeoHookean(E=0.1, nu=0.4)
+    finger = ev.MeshedFinger(block(sag=0.3), {"tissue": law}, SKIN)
+    return ev.Scene(finger, ev.Display(), motion=motion or PRESS, **more)
+
+
+def whole(*motion, **more):
+    """A finger on a display."""
+    return ev.Scene(ev.FingerPad(resolution="coarse", ridges=False), ev.Display(), motion=motion, **more)
+
+
+# -- materials -------------------------------------------------------------------------------------------
+
+
+class Mine:
+    """A neo-Hookean law with a mistake in each method of a class below."""
+
+    mu, lmbda = 0.04, 0.1
+
+    def psi(self, F):
+        J = ev.det(F)
+        return 0.5 * self.mu * (ev.ddot(F, F) - 3.0 - 2.0 * np.log(J)) + 0.5 * self.lmbda * np.log(J) ** 2
+
+
+class ByStress:
+    def P(self, F):
+        G = ev.transpose(ev.inv(F))
+        return 0.04 * (F - G) + 0.1 * np.log(ev.det(F)) * G
+
+
+class Stressed(Mine):
+    def psi(self, F):
+        return 0.5 * self.mu * (ev.ddot(F, F) - 3.0) + 0.5 * self.lmbda * np.log(ev.det(F)) ** 2
+
+
+class StressedByStress:
+    def P(self, F):
+        return 0.04 * F + 0.1 * np.log(ev.det(F)) * ev.transpose(ev.inv(F))
+
+
+class Absolute(Mine):
+    def psi(self, F):
+        return super().psi(F) + 0.1 * np.abs(np.log(ev.det(F))) ** 2
+
+
+class AbsoluteStress(ByStress):
+    def P(self, F):
+        return super().P(F) * np.abs(ev.det(F))
+
+
+class Real(Mine):
+    def psi(self, F):
+        return super().psi(np.array(F, dtype=float))
+
+
+class RefusesComplex(Mine):
+    def psi(self, F):
+        if np.iscomplexobj(F):
+            raise TypeError("real numbers alone")
+        return super().psi(F)
+
+
+class OnePoint(Mine):
+    def psi(self, F):
+        return math.log(np.linalg.det(F))
+
+
+class Float(Mine):
+    def psi(self, F):
+        return float(np.sum(super().psi(F)))
+
+
+class FloatStress:
+    def P(self, F):
+        return 0.04
+
+
+class FloatBesideStress(ByStress):
+    def psi(self, F):
+        return 1.0
+
+
+class Infinite:
+    def P(self, F):
+        return F / 0.0 * np.log(ev.det(F))
+
+
+@ev.form
+def prestressed(u, v, w):
+    return 0.04 * ev.ddot(ev.grad(u), ev.grad(v)) + (u.theta + 0.01) * v.theta
+
+
+MATERIALS = {
+    Stressed: "a stress of 0.04 MPa at rest; allowed: no stress at F = 1",
+    StressedByStress: "a stress of 0.04 MPa at rest; allowed: no stress at F = 1",
+    Absolute: "psi(F) whose derivative is lost in a complex step; allowed: functions of numpy",
+    AbsoluteStress: "P(F) whose derivative is lost in a complex step",
+    Real: "psi(F) whose derivative is lost in a complex step",
+    RefusesComplex: "psi(F) that raises TypeError on complex numbers: real numbers alone",
+    OnePoint: "psi(F) that raises LinAlgError",
+    Float: "psi(F) of shape () for F of shape (3, 3, 2, 1); allowed: an array of shape (2, 1)",
+    FloatStress: "P(F) of shape () for F of shape (3, 3, 2, 1)",
+    FloatBesideStress: "psi(F) of shape ()",
+    Infinite: "P(F) that is infinite or no number",
+}
+
+
+@pytest.mark.parametrize("kind", MATERIALS)
+def test_a_material_that_no_run_could_use_is_refused_with_one_sentence(kind):
+    for find in (plan, ev.simulate):
+        with pytest.raises(InputError) as caught:
+            find(scene(kind()))
+        assert str(caught.value).startswith("finger.materials.tissue: given ")
+        assert MATERIALS[kind] in str(caught.value)
+
+
+def test_a_form_with_stress_at_rest_is_refused():
+    with pytest.raises(InputError, match=r"a stress of 0\.01 MPa at rest"):
+        plan(scene(prestressed))
+
+
+@pytest.mark.parametrize("kind", [Mine, ByStress])
+def test_a_material_without_mistakes_is_taken(kind):
+    assert plan(scene(kind())).warnings == ()
+
+
+def test_a_material_of_two_slopes_is_taken():
+    """Fibres that only pull: their stress has a kink at rest, where no derivative is compared."""
+
+    class Fibres(Mine):
+        def psi(self, F):
+            stretch = ev.tensor.positive_part(ev.ddot(F[:, :1], F[:, :1]) - 1.0)
+            return super().psi(F) + 0.01 * stretch**2
+
+    assert plan(scene(Fibres())).warnings == ()
+
+
+def test_moduli_in_pascal_are_doubted():
+    (said,) = plan(scene(ev.NeoHookean(E=8e4, nu=0.4))).warnings
+    assert said.startswith("the shear modulus of tissue, 2.86e+04 MPa, is beyond that of any tissue")
+    assert said.endswith(": moduli are in MPa, not in Pa")
+    assert plan(scene(ev.NeoHookean(E=2e3, nu=0.3))).warnings == ()
+    finger = ev.FingerPad(resolution="coarse", materials={"hypodermis": ev.NeoHookean(E=34e3, nu=0.48)})
+    (said,) = plan(ev.Scene(finger, ev.Flat(), motion=PRESS)).warnings
+    assert said.startswith("the shear modulus of hypodermis, 1.15e+04 MPa")
+    finger = replace(finger, materials={"hypodermis": ev.NeoHookean(E=34.0, nu=0.48)})
+    assert plan(ev.Scene(finger, ev.Flat(), motion=PRESS)).warnings == ()
+
+
+def test_bone_in_a_mesh_of_softer_parts_is_taken():
+    moduli = {"tissue": 0.04, "bone": 6.5e3}
+    asked = scene()
+    mesh, _ = scene_mesh(asked)
+    assert doubts(asked, mesh, moduli) == ()
+    assert "of bone, 6.5e+04 MPa" in doubts(asked, mesh, moduli | {"bone": 6.5e4})[0]
+
+
+# -- force laws ------------------------------------------------------------------------------------------
+
+
+class InPascal:
+    def traction(self, gap, voltage, layers):
+        return 1e6 * ev.Kaczmarek().traction(gap, voltage, layers)
+
+
+class WithoutLayers:
+    def traction(self, gap, voltage):
+        return 1e-9 * voltage**2 + 0.0 * gap
+
+
+class BareGap:
+    def traction(self, gap, voltage, layers):
+        return 0.5 * ev.eps_0 * (voltage / gap) ** 2
+
+
+class Growing:
+    def traction(self, gap, voltage, layers):
+        return 1e-12 * voltage**2 * (gap + layers.reduced)
+
+
+class Pushing:
+    def traction(self, gap, voltage, layers):
+        return -ev.Kaczmarek().traction(gap, voltage, layers)
+
+
+class TwoValues:
+    def traction(self, gap, voltage, layers):
+        return np.zeros(2)
+
+
+LAWS = {
+    InPascal: "times the attraction of parallel plates; allowed: a traction in MPa, not in Pa",
+    WithoutLayers: "traction(gap, voltage, layers) that raises TypeError",
+    BareGap: "traction(gap, voltage, layers) that is infinite or no number",
+    Growing: "a traction that grows from",
+    Pushing: "allowed: positive values, which attract",
+    TwoValues: "a traction of shape (2,) at gaps of shape (3,)",
+}
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_a_force_law_that_no_run_could_use_is_refused_with_one_sentence(kind):
+    for find in (plan, ev.simulate):
+        with pytest.raises(InputError) as caught:
+            find(scene(law=kind(), voltage=300.0))
+        assert str(caught.value).startswith("electrostatics.law: given ")
+        assert LAWS[kind] in str(caught.value)
+
+
+def test_a_force_law_that_is_the_same_at_every_gap_is_taken():
+    class Constant:
+        def traction(self, gap, voltage, layers):
+            return 1e-9 * voltage**2
+
+    for voltage in (0.0, 300.0):
+        assert plan(scene(law=Constant(), voltage=voltage)).warnings == ()
+
+
+# -- voltages and lengths --------------------------------------------------------------------------------
+
+
+def test_a_million_volts_are_refused():
+    for more in ({"voltage": 1e6}, {"voltage": ev.VoltageProfile([0.0, 1.0], [0.0, -1e6])}):
+        with pytest.raises(
+            InputError, match=r"electrostatics\.voltage: given 1000000\.0; allowed: a voltage"
+        ):
+            plan(scene(law=ev.Kaczmarek(), **more))
+    with pytest.raises(InputError, match="allowed: a voltage"):
+        plan(scene(None, PRESS, ev.VoltageRamp(1e6), law=ev.Kaczmarek()))
+
+
+def test_a_field_that_breaks_solids_down_is_doubted():
+    """U / (eps_r s): 1000 V across 0.09 mm are 11 V/um, across the same in m 1160 V/um."""
+    charged = scene(law=ev.Kaczmarek(), voltage=1000.0)
+    assert plan(charged).warnings == ()
+    thin = replace(charged, surface=ev.Display(insulator=ev.Layer(0.09e-3, 3.35)))
+    (said,) = plan(thin).warnings
+    field = 1e-3 * 1000.0 / (0.09e-3 + 3.35 * 0.38 / 1650.0)
+    assert f"1000 V make a field of {field:.3g} V/um in the insulator" in said
+    edge = 300.0 / 1e-3 * 3.35 * (0.09 / 3.35 + 0.38 / 1650.0)
+    assert plan(replace(charged, voltage=0.999 * edge)).warnings == ()
+    assert "a field of 300 V/um in the insulator" in plan(replace(charged, voltage=1.001 * edge)).warnings[0]
+
+
+def test_lengths_in_metres_are_doubted():
+    skin = ev.Electrical(stratum_corneum_thickness=0.38e-3)
+    finger = ev.MeshedFinger(block(sag=0.3), {"tissue": ev.NeoHookean(E=0.1, nu=0.4)}, skin)
+    (said,) = plan(ev.Scene(finger, ev.Flat(), motion=PRESS)).warnings
+    assert said == "a stratum corneum of 0.00038 mm is thinner than any: lengths are in mm, not in m"
+    (said,) = plan(whole(ev.Press(indentation=1.5e-3), ev.Slide(distance=-5e-3))).warnings
+    assert said == "a finger of 16.68 mm is moved by 0.005 mm at most: lengths are in mm, not in m"
+    assert plan(whole(ev.Press(force=0.05), ev.Slide(distance=0.05))).warnings == ()
+    assert plan(whole(ev.Press(force=0.05))).warnings == ()
+
+
+# -- slides that never touch -----------------------------------------------------------------------------
+
+
+WEAK = {"law": ev.Kaczmarek(), "voltage": 100.0}
+STRONG = {"law": ev.StrongTroxel(), "voltage": 3000.0}
+SLIDES = [
+    ((SLIDE,), {}, "motion 0, a slide at first touch, never touches: press before it"),
+    ((HOVER, SLIDE), {}, "motion 1, a slide 0.3 mm above first touch, never touches: press before it"),
+    ((HOVER, SLIDE), WEAK, "motion 1, a slide 0.3 mm above first touch, never touches: press before it"),
+    ((PRESS, HOVER, SLIDE), {}, "motion 2, a slide 0.3 mm above first touch"),
+    ((PRESS, ev.Press(indentation=-0.1), SLIDE), {}, "motion 2, a slide 0.1 mm above first touch"),
+    ((SLIDE,), WEAK, None),  # pulled down where it touches
+    ((ev.Hover(gap=0.01), SLIDE), STRONG, None),
+    ((PRESS, SLIDE), {}, None),
+    ((ev.Press(force=0.01), SLIDE, SLIDE), {}, None),
+    ((HOVER, SLIDE, PRESS), {}, None),  # on its way to where it presses
+    ((PRESS, HOVER), {}, None),
+]
+
+
+@pytest.mark.parametrize(("motion", "more", "said"), SLIDES)
+def test_a_slide_that_never_touches_is_doubted(motion, more, said):
+    found = plan(scene(None, *motion, **more)).warnings
+    assert [sentence[: len(said)] for sentence in found] == [said] if said else found == ()
+
+
+def test_a_slide_over_hills_touches_if_they_are_higher_than_the_gap():
+    wave = ev.Sinusoid(terms=[[0.2, 3.0, 0.0]])
+    for gap, warned in ((0.3, 0), (0.5, 1)):
+        found = plan(replace(scene(None, ev.Hover(gap=gap), SLIDE), surface=wave)).warnings
+        assert len([said for said in found if "never touches" in said]) == warned
+
+
+# -- what is shipped -------------------------------------------------------------------------------------
+
+
+def sentences(shipped):
+    mesh, _ = scene_mesh(shipped)
+    check_parts(shipped)
+    moduli = {name: split(law).shear_modulus for name, law in shipped.finger.materials.items()}
+    return doubts(shipped, mesh, moduli)
+
+
+def test_the_built_in_scene_and_those_of_the_pages_stay_silent():
+    """What the pages compute in Python is computed by the tests of the pages, where a warning is an error."""
+    scenes = [default_scene()]
+    for page in [ROOT / "README.md", *(ROOT / "docs").rglob("*.md")]:
+        for text in re.findall(r"^```toml\n(.*?)^```$", page.read_text(encoding="utf-8"), re.M | re.S):
+            if "\n[[motion]]" in text and "\nmesh = " not in text:
+                scenes.append(scenefile.loads(text))
+    assert len(scenes) >= 3
+    for shipped in scenes:
+        assert sentences(shipped) == ()
+
+
+@pytest.mark.slow
+def test_the_cases_of_the_stability_study_are_as_silent_as_they_are_hard():
+    """Their scenes, as far as they do not depend on results."""
+    result = ev.simulate(scene(None, ev.Press(indentation=0.1, steps=30), ev.Slide(distance=0.2, steps=40)))
+    seen = []
+
+    class Looking(Log):
+        def simulate(self, asked):
+            seen.append((case.key, sentences(asked)))
+            return result
+
+    for case in CASES.values():
+        if case.group != "nothing lost":
+            with suppress(Exception), np.errstate(all="ignore"):  # the result is that of another scene
+                case.function(Looking())
+    assert len(seen) > 100
+    loud = {key for key, said in seen if said}
+    assert loud == {"same_answer.units_lengths_x_1_stresses_x_1000"}  # which silences it itself
+
+
+def test_looking_takes_next_to_no_time():
+    asked = scene(Mine(), law=ev.Kaczmarek(), voltage=300.0)
+    mesh, _ = scene_mesh(asked)
+    moduli = {"tissue": 0.04}
+    best = math.inf
+    for _ in range(5):
+        begin = time.perf_counter()
+        check_parts(asked)
+        doubts(asked, mesh, moduli)
+        best = min(best, time.perf_counter() - begin)
+    assert best < 5e-3
