@@ -37,6 +37,8 @@ RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 #: what is shown of the last step, with units
 SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
 SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
+#: columns that files of earlier versions do not have
+ADDED = ("integrator_dissipation", "snap_dissipation")
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
 
 
@@ -203,10 +205,13 @@ COLUMNS = tuple(spec.name for spec in fields(Result))[:-3]
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    No object is unpickled, and no more memory is taken than the file is long (at most 4 GB).
+    No object is unpickled, and no more memory is taken than the file is long (at most 4 GB). Columns that
+    versions before 0.3 did not have are nan.
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     try:
+        for name in ADDED:
+            arrays.setdefault(f"history/{name}", np.full(len(arrays["history/time"]), np.nan))
         columns: dict[str, Any] = {name: _checked_column(name, arrays[f"history/{name}"]) for name in COLUMNS}
         mesh = _mesh_from(arrays)
         frames = _frames_from(arrays, mesh)

@@ -221,7 +221,7 @@ def test_rows_are_those_of_the_contract():
         "applied_tangential_force, normal_force, tangential_force, electrostatic_force, "
         "electrostatic_force_x, contact_width, real_contact_width, min_gap, external_work, "
         "electrostatic_work, stored_energy, friction_dissipation, viscous_dissipation, kinetic_energy, "
-        "substeps, newton_iterations, seconds"
+        "integrator_dissipation, snap_dissipation, substeps, newton_iterations, seconds"
     )
     assert ", ".join(COLUMNS) == promised
     assert result.step.tolist() == [1, 2, 3, 4, 5, 6, 7]
