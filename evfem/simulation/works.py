@@ -30,10 +30,10 @@ telescopes; then the work of nodes that land, leave or begin to slip; then what 
 attraction's work. Over a motion the sum falls with the square of the step, in time with the step, and is
 ``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
-where time stops), and the end is far away however small the part. Then L does not fall with the step. It is the energy set free, and ``snap_dissipation``. A
-part snaps if L > 0 and either the body, the loads at their final values, moves along forces that grow faster
-than the tissue's,
+A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses
+are, where time stops), and the end is far away however small the part. Then L does not fall with the step.
+It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at
+their final values, moves along forces that grow faster than the tissue's,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,

@@ -100,9 +100,7 @@ def test_full_slip_dissipates_friction_times_way():
 
 
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
-    """Held by the bone in the air, after the voltage is gone nothing gives or takes but backward Euler; a half
-    of the step, a half of what it takes in the first instants.
-    """
+    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half the step."""
     lost = []
     for times in (1, 2):
         motion = (
