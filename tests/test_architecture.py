@@ -36,7 +36,7 @@ ROOMS = {
         "factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result model ledger checkpoint run rendering"),
+    "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint run rendering"),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},

@@ -30,10 +30,10 @@ telescopes; then the work of nodes that land, leave or begin to slip; then what 
 attraction's work. Over a motion the sum falls with the square of the step, in time with the step, and is
 ``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way, and the end is far away however
-small the part. Then L does not fall with the step. It is the energy set free, and ``snap_dissipation``. A
-part snaps if L > 0 and either the body, the loads at their final values, moves along forces that grow faster
-than the tissue's,
+A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses
+are, where time stops), and the end is far away however small the part. Then L does not fall with the step.
+It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at
+their final values, moves along forces that grow faster than the tissue's,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
@@ -67,7 +67,7 @@ SUMS = (
 )
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
-#: share of the same work, of every force on its whole way, that is rounding
+#: share of the work of the internal forces, all counted positive, that is the solver's tolerance
 NOISE = 1e-7
 
 
@@ -138,7 +138,7 @@ class Part:
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
         lost -= self._contact() + friction
         lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
-        snap = self._snaps(end.forces - begin.forces, lost)
+        snap = self._snaps(begin.forces, end.forces, lost)
         added = (given, pulled, friction, viscous, 0.0 if snap else lost, lost if snap else 0.0)
         return dict(zip(SUMS, added, strict=True))
 
@@ -211,17 +211,16 @@ class Part:
         before, after = (equilibrium.contact_forces(state) for state in (self.old, self.new))
         return _mean_work(before, after, (self.new.u - self.old.u)[self.model.pad.nodes])
 
-    def _snaps(self, change: Floats, lost: float) -> bool:
-        """Whether stability was lost on the way; `change` (N, dim) of the internal forces, `lost` is L."""
+    def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
+        """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
         dynamics, new, old = self.model.body.dynamics, self.new, self.old
         if dynamics is not None and dynamics.step > 0.0:
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)
-        work = float(np.sum(change * along))
-        noise = NOISE * float(np.abs(change * moved).sum())
-        if not lost > noise:
+        if not lost > NOISE * float(np.abs(after * moved).sum()):
             return False
+        work = float(np.sum((after - before) * along))
         return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
 
     def _pulled_along(self, along: Floats) -> float:

@@ -77,7 +77,7 @@ class Log:
         if len(result.step):
             if scene.solver.dynamics != "inertial":  # there mass carries the difference
                 self.force_error = max(self.force_error, float(out_of_balance(result).max()))
-            self.energy_error = max(self.energy_error, abs(lost_energy(result)))
+            self.energy_error = max(self.energy_error, lost_energy(result))
 
 
 def out_of_balance(result: Result) -> Any:
@@ -89,19 +89,20 @@ def out_of_balance(result: Result) -> Any:
 
 
 def lost_energy(result: Result) -> float:
-    """Energy at the end that no column of the history has, relative to the largest of them at any time.
-
-    Second order in the step where the path is smooth; a snap loses what it sets free.
-    """
-    given = result.external_work + result.electrostatic_work
-    kept = [
-        result.stored_energy,
-        result.friction_dissipation,
-        result.viscous_dissipation,
-        result.kinetic_energy,
-    ]
-    scale = max(float(np.abs(column).max()) for column in (given, *kept))
-    return float((given - np.sum(kept, axis=0))[-1]) / max(scale, ENERGY)
+    """Largest energy of any row that no column of the history has, relative to the largest of them."""
+    given = np.array([result.external_work, result.electrostatic_work])
+    kept = np.array(
+        [
+            result.stored_energy,
+            result.kinetic_energy,
+            result.friction_dissipation,
+            result.viscous_dissipation,
+            result.integrator_dissipation,
+            result.snap_dissipation,
+        ]
+    )
+    largest = np.maximum(np.abs(given).max(axis=0), np.abs(kept).max(axis=0))
+    return float(np.max(np.abs(given.sum(axis=0) - kept.sum(axis=0)) / np.maximum(largest, ENERGY)))
 
 
 @dataclass(frozen=True)

@@ -38,8 +38,7 @@ ASSUMPTIONS = {
     "outcomes": "passed; refused, stopped: with a sentence, as expected; wrong; not converged; error",
     "steps": "requested steps; parts: as many as were accepted; cuts: attempts that failed and were halved",
     "force": "largest sum of all forces in any step over the largest force; left out with inertia",
-    "energy": "energy at the end that no column has, over the largest; trapezoidal works, second order in "
-    "the step; what a snap sets free is lost, not balanced",
+    "energy": "largest energy of any step that no column has, over the largest column of that step",
     "cpu_s": "process time, without imports and compilation; two processes at a time",
     "meshes": "coarse ones; the physics judged here does not need finer ones",
 }

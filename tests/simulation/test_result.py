@@ -18,7 +18,8 @@ CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
     "applied_tangential_force, normal_force, tangential_force, electrostatic_force, electrostatic_force_x, "
     "contact_width, real_contact_width, min_gap, external_work, electrostatic_work, stored_energy, "
-    "friction_dissipation, viscous_dissipation, kinetic_energy, substeps, newton_iterations, seconds"
+    "friction_dissipation, viscous_dissipation, kinetic_energy, integrator_dissipation, snap_dissipation, "
+    "substeps, newton_iterations, seconds"
 )
 
 
@@ -119,6 +120,11 @@ def test_missing_files_and_missing_arrays_get_a_sentence(tmp_path):
     np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "mesh/points"})
     with pytest.raises(InputError, match=r"damaged.*mesh/points"):
         load(tmp_path / "less.npz")
+    added = ("history/integrator_dissipation", "history/snap_dissipation")
+    np.savez(tmp_path / "older.npz", **{k: v for k, v in arrays.items() if k not in added})
+    older = load(tmp_path / "older.npz")
+    assert np.isnan([older.integrator_dissipation, older.snap_dissipation]).all()
+    assert older.time.tolist() == load(tmp_path / "run.npz").time.tolist()
     arrays["frames/gap"] = arrays["frames/gap"][:, :-1]
     np.savez(tmp_path / "short.npz", **arrays)
     with pytest.raises(InputError, match="gap of shape"):

@@ -87,7 +87,9 @@ def test_an_update_of_which_next_to_nothing_can_be_taken_fails_the_step(pressed)
     body = pressed[0]
     points = body.body.space.mesh.points
     with pytest.raises(StepFailed, match="collapse"):
-        body._largest_fraction(np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]]))
+        body._largest_fraction(
+            np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]])
+        )
 
 
 @pytest.mark.parametrize(("depth", "fraction"), [(0.3, 0.5), (0.4, 1.0), (0.55, 1.5), (0.19, 0.0)])

@@ -113,12 +113,11 @@ def test_balances_see_a_force_and_an_energy_that_are_missing():
     motion = Press(indentation=0.4, steps=4), Slide(0.5, steps=4)
     result = case.Log().simulate(scenes.scene(body, Flat(friction=0.3), *motion))
     assert case.out_of_balance(result).max() < 1e-7
-    whole = case.lost_energy(result)
-    assert abs(whole) < 0.05
+    assert case.lost_energy(result) < 1e-7
     result.normal_force[2] *= 1.001
     assert case.out_of_balance(result).max() == pytest.approx(1e-3, rel=0.01)
-    result.friction_dissipation[:] = 0.0
-    assert case.lost_energy(result) > abs(whole) + 0.01
+    result.friction_dissipation[-1] = 0.0
+    assert case.lost_energy(result) > 0.01
 
 
 def test_other_images_of_a_mesh_are_the_same_body():

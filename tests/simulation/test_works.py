@@ -1,0 +1,144 @@
+"""Closed books: works, energies and dissipations of every row add up, each from its own definition."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import INSULATOR, SKIN, finger
+from tools.meshes import block
+
+import evfem as ev
+from evfem.contact.surfaces import Display, Flat, Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layers, StrongTroxel
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.reference import pull_in_strong_troxel
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.run import simulate
+from evfem.tissue.laws import LinearElastic
+
+ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)
+MOTION = (Press(indentation=0.3, steps=3), Slide(0.6, steps=4))
+TIMED = (Press(indentation=0.2, steps=3, speed=20.0), Slide(0.6, steps=6, speed=20.0))
+WAVES = Sinusoid(friction=0.4, terms=[[0.03, 6.0, 0.0]], insulator=INSULATOR)
+STEPS = [[0.0, 0.3], [0.3, 0.3], [0.3, 0.5], [0.5, 0.2]]
+PENALTY = Solver(contact="penalty", penalty_normal=50.0, penalty_tangential=20.0)
+SNAP = (Hover(0.05), VoltageRamp(4000.0, steps=4), VoltageRamp(0.0, steps=4))
+ROUNDING = 1e-12
+
+
+@ev.form
+def pushed(u, v, w):
+    return 2e-4 * v[1] + 1e-3 * ev.dot(u, v)
+
+
+def scene(surface, law=None, voltage=0.0, motion=MOTION, body=ROUND, **options):
+    return Scene(body, surface, law, voltage, motion, output=Output(every=1000), **options)
+
+
+SCENES = {
+    "friction": scene(Flat(friction=0.5)),
+    "table": scene(Flat(friction=STEPS)),
+    "waves": scene(WAVES),
+    "force": scene(WAVES, motion=(Press(force=0.03, steps=3), Slide(0.6, steps=4, hold="force"))),
+    "penalty": scene(Flat(), solver=PENALTY),
+    "form": scene(Flat()).with_term(pushed, on=ev.Region("tissue")),
+    "vertical": scene(Display(), Kaczmarek(), 3000.0),
+    "normal": scene(WAVES, Kaczmarek(), 3000.0, direction="normal"),
+    "no air": scene(Display(), StrongTroxel(), 500.0, air_layer=False),
+    "staggered once": scene(Display(), Kaczmarek(), 2000.0, coupling="staggered_once"),
+    "profile": scene(Display(), Kaczmarek(), VoltageProfile([0.0, 0.3, 0.3], [0.0, 900.0, 2500.0])),
+    "hover": scene(Display(), StrongTroxel(), 2000.0, (Hover(0.2, steps=2),)),
+    "snap": scene(Display(), StrongTroxel(), 0.0, SNAP),
+    "viscous": scene(WAVES, None, 0.0, TIMED, SOFT, solver=Solver(dynamics="viscous")),
+    "inertial": scene(WAVES, Kaczmarek(), 2000.0, TIMED, SOFT, solver=Solver(dynamics="inertial")),
+    "stops": scene(Flat(), None, 0.0, (*TIMED, Press(force=0.03)), solver=Solver(dynamics="inertial")),
+}
+
+
+def in_parts(of, times):
+    """The scene with so many times the steps."""
+    return replace(of, motion=[replace(motion, steps=times * motion.steps) for motion in of.motion])
+
+
+def left_over(result):
+    """What no column has in every row, relative to the largest of them."""
+    given = np.array([result.external_work, result.electrostatic_work])
+    kept = [result.stored_energy, result.kinetic_energy, result.friction_dissipation]
+    kept += [result.viscous_dissipation, result.integrator_dissipation, result.snap_dissipation]
+    largest = np.abs([*given, *kept]).max(axis=0)
+    return np.abs(given.sum(axis=0) - np.sum(kept, axis=0)) / np.maximum(largest, ROUNDING)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_books_are_closed_in_every_row(name):
+    result = simulate(SCENES[name])
+    assert left_over(result).max() < 1e-6
+    for column in ("friction_dissipation", "viscous_dissipation", "snap_dissipation"):
+        assert (np.diff(getattr(result, column), prepend=0.0) >= 0.0).all()
+    if name not in ("table", "staggered once", "hover", "stops"):  # where forces may let go
+        assert (result.snap_dissipation[-1] > 0.0) == (name == "snap")
+
+
+@pytest.mark.parametrize("name", ["friction", "waves", "penalty", "form", "normal", "no air"])
+def test_what_the_way_loses_falls_with_the_square_of_the_step(name):
+    """An energy or dissipation that is wrong by a share would stay in it."""
+    coarse, fine = (simulate(in_parts(SCENES[name], times)) for times in (2, 8))
+    ratio = abs(coarse.integrator_dissipation[-1] / fine.integrator_dissipation[-1])
+    assert 8.0 < ratio < 40.0  # a quarter of the step: a sixteenth
+    assert abs(fine.integrator_dissipation[-1]) < 1e-3 * fine.stored_energy[-1]
+    assert fine.snap_dissipation[-1] < 1e-9 * fine.stored_energy[-1]
+
+
+def test_full_slip_dissipates_friction_times_way():
+    result = simulate(
+        scene(Flat(friction=0.1), motion=(Press(indentation=0.2, steps=2), Slide(1.0, steps=10)))
+    )
+    grown = np.diff(result.friction_dissipation)[-3:]
+    np.testing.assert_allclose(grown, 0.1 * 0.1 * result.normal_force[-3:], rtol=1e-7)
+
+
+def test_a_body_that_swings_loses_its_energy_to_the_integrator():
+    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half the step."""
+    lost = []
+    for times in (1, 2):
+        motion = (
+            Hover(0.3),
+            Slide(0.02, steps=2 * times, speed=50.0),
+            Slide(1e-6, steps=40 * times, speed=0.05),
+        )
+        result = simulate(scene(Flat(), None, 0.0, motion, solver=Solver(dynamics="inertial")))
+        inside = result.stored_energy + result.kinetic_energy
+        start = 1 + 2 * times
+        given = np.diff(result.external_work[start:]).sum()
+        assert abs(given) < 0.02 * inside[start]
+        gone = inside[start] - inside[-1] + given
+        assert gone == pytest.approx(np.diff(result.integrator_dissipation[start:]).sum(), rel=1e-6)
+        assert gone > 0.0
+        lost.append(gone)
+    assert lost[1] < lost[0]
+
+
+def test_a_plate_that_snaps_sets_free_what_the_closed_form_says():
+    """A column that cannot move sideways is a spring, and its lower face a plate."""
+    width, height, gap, E = 4.0, 2.0, 0.05, 0.1
+    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=E, nu=0.0)}, SKIN)
+    layers = Layers.of(ev.Layer(0.38, 1650.0), INSULATOR)
+    stiffness = E * width / height
+    critical = pull_in_strong_troxel(stiffness, gap, width, layers)
+    below = critical.voltage * (1.0 - 1e-5)
+    motion = (Hover(gap), VoltageRamp(below, steps=60), VoltageRamp(critical.voltage * 1.0001, steps=1))
+    result = simulate(scene(Display(friction=0.0), StrongTroxel(), 0.0, motion, column))
+    assert not result.contact_width[-2]
+    assert result.contact_width[-1] == pytest.approx(width)
+    assert result.snap_dissipation[-2] == 0.0
+    pulled = [StrongTroxel().potential(g, critical.voltage, layers) for g in (gap - critical.travel, 0.0)]
+    freed = width * (pulled[0] - pulled[1]) - 0.5 * stiffness * (gap**2 - critical.travel**2)
+    assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.02)
+
+
+def test_the_energy_of_a_snap_does_not_depend_on_the_steps():
+    few, many = (simulate(in_parts(SCENES["snap"], times)) for times in (32, 64))
+    assert few.snap_dissipation[-1] == pytest.approx(many.snap_dissipation[-1], rel=0.05)
+    assert abs(many.integrator_dissipation[-1]) < 0.2 * many.snap_dissipation[-1]
