@@ -17,7 +17,8 @@ import numpy as np
 from evfem.electrostatics.laws import Layer, Layers, StrongTroxel
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.finger.fingerpad import TABLE_2, FingerPad
+from evfem.finger.fingerpad import FingerPad
+from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.resolution import way
