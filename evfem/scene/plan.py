@@ -20,6 +20,7 @@ from evfem.scene.resolution import unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
+from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.laws import split
 from evfem.tissue.userforms import Trial, tried
@@ -105,7 +106,7 @@ def plan(scene: Scene) -> Plan:
 
 def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
     """The finger's mesh and the element to use on it."""
-    linear = scene.solver.element in ("q1", "q1_fbar")
+    linear = scene.solver.element in elements_of_order(1)
     mesh = scene.finger.mesh(1 if linear else 2)
     return mesh, scene.solver.element_on(mesh.corners)
 

@@ -21,9 +21,9 @@ from evfem.protocols import CompleteSurface, ForceLaw, Surface
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
+from evfem.tissue.elements import ELEMENTS, elements_on
 from evfem.tissue.forms import Form
 
-ELEMENTS = ("q1", "q1_fbar", "q2", "q2p1", "p2")
 DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
@@ -90,7 +90,7 @@ class Solver:
         Traceback (most recent call last):
         evfem.errors.InputError: solver.element: given q1 on a mesh of triangles; allowed: p2
         """
-        names = ("p2",) if corners == 3 else ("q1", "q1_fbar", "q2", "q2p1")
+        names = elements_on(corners)
         if self.element is None:
             return "p2" if corners == 3 else "q2p1"
         if self.element not in names:

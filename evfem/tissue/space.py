@@ -19,7 +19,6 @@ Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J;
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -30,15 +29,7 @@ from scipy.spatial import cKDTree
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-
-#: element -> (mesh kind, order of quadrature, how ln J is sampled)
-ELEMENTS: Mapping[str, tuple[str, int, str]] = {
-    "q1": ("quad", 3, "point"),
-    "q1_fbar": ("quad", 3, "centroid"),
-    "q2": ("quad9", 5, "point"),
-    "q2p1": ("quad9", 5, "linear"),
-    "p2": ("triangle6", 4, "point"),
-}
+from evfem.tissue.elements import ELEMENTS
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -147,6 +138,8 @@ def make_space(mesh: Mesh, element: str) -> Space:
         projection = np.ones((len(nodes), gradient.shape[1], 1))
     elif sampling == "linear":
         projection = _linear_projection(np.asarray(basis.global_coordinates()), basis.dx)
+    elif sampling != "point":
+        raise ValueError(f"no such sampling of the volume: {sampling}")
     points, weight = np.asarray(basis.global_coordinates()), np.ascontiguousarray(basis.dx)
     return Space(
         mesh,

@@ -23,7 +23,7 @@ from evfem import cli, studies
 from evfem.scene import file as scenefile
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps import file as sweepfile
-from evfem.tissue import space
+from evfem.tissue import elements, space
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -85,7 +85,8 @@ def understood(text):
 @pytest.mark.parametrize("page", PAGES)
 def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(space, "ELEMENTS", dict(space.ELEMENTS))  # a page adds one
+    monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
+    monkeypatch.setattr(elements, "ELEMENTS", table)
     run(page, {None}, capsys)
 
 

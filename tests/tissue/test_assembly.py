@@ -14,9 +14,10 @@ from evfem.tensor import det
 from evfem.tissue import forms
 from evfem.tissue.assembly import Integral, Points, VolumeMeasure, points_of, volume_change
 from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.fields import Parts, fluxes, fluxes_at_once
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.space import ELEMENTS, nodes_at, shape_gradients, shape_values
+from evfem.tissue.space import nodes_at, shape_gradients, shape_values
 from evfem.tissue.userforms import make_term, tried
 from evfem.tissue.weakform import Tissue
 

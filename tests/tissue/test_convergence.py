@@ -10,8 +10,8 @@ from tools.grids import fine_points, l2_error, order, quarter_ring, rectangle, s
 from tools.laws import StressOnly, neo_hookean_stress
 
 from evfem.reference import tube_pressure
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
-from evfem.tissue.space import ELEMENTS
 from evfem.tissue.weakform import Tissue
 
 #: element -> least order in L2 (the theory's 2 and 3, less what coarse meshes cost)

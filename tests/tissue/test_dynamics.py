@@ -6,9 +6,9 @@ from tools.grids import assembled, fine_points, rectangle, solve
 
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean
-from evfem.tissue.space import ELEMENTS
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 

@@ -13,8 +13,9 @@ from tools.laws import StressOnly, neo_hookean_stress
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, inv, transpose
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.space import ELEMENTS, make_space
+from evfem.tissue.space import make_space
 from evfem.tissue.splitlaw import embed
 from evfem.tissue.weakform import Tissue, check_laws
 

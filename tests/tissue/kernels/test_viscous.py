@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from tools.grids import assembled, rectangle
 
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.kernels import viscous
 from evfem.tissue.kernels.lanes import LANES, blocked
-from evfem.tissue.space import ELEMENTS
 
 every_element = pytest.mark.parametrize("element", list(ELEMENTS))
 RANDOM = np.random.default_rng(2)
