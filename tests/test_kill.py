@@ -16,7 +16,7 @@ from evfem import export, runfolder
 from evfem.common import storage
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
-from evfem.simulation.result import COLUMNS, Saved, csv_header
+from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS, Saved, csv_header
 from evfem.simulation.run import simulate
 
 pytestmark = pytest.mark.solver
@@ -93,12 +93,12 @@ def run(place, *more):
 
 def replaced(path, **changes):
     """The same archive with some arrays changed, its checksums right."""
-    arrays = load_arrays(path, "checkpoint", "evfem-checkpoint-3")
+    arrays = load_arrays(path, "checkpoint", CHECKPOINT_FORMAT)
     save_arrays(path, arrays | {name.replace("__", "/"): a for name, a in changes.items()})
 
 
 def row_changed(path, change):
-    rows = json.loads(str(load_arrays(path, "checkpoint", "evfem-checkpoint-3")["rows"]))
+    rows = json.loads(str(load_arrays(path, "checkpoint", CHECKPOINT_FORMAT)["rows"]))
     change(rows)
     replaced(path, rows=np.array(json.dumps(rows)))
 
@@ -299,6 +299,6 @@ def test_output_that_cannot_be_printed_is_exit_status_4(tmp_path):
 
 
 def test_the_version_is_in_the_checkpoint(interrupted):
-    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", "evfem-checkpoint-3")
+    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", CHECKPOINT_FORMAT)
     assert str(arrays["version"]) == evfem.__version__
     assert export.__name__  # fields are written by the module whose writer the tests above replace

@@ -25,7 +25,7 @@ from evfem.common.storage import load_arrays
 from evfem.mesh import file as meshfile
 from evfem.mesh.vtu import read
 from evfem.scene.file import load
-from evfem.simulation.result import COLUMNS
+from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS
 
 from .scenes import block
 
@@ -123,7 +123,7 @@ def broken(out: Path) -> list[str]:
     """Files in the folder of a run, under the names that a user knows, that are not whole."""
     checks = {
         "history.csv": lambda p: [float(x) for name in FORCES for x in history(p)[name]],
-        "checkpoint.npz": lambda p: load_arrays(p, "checkpoint", "evfem-checkpoint-3"),
+        "checkpoint.npz": lambda p: load_arrays(p, "checkpoint", CHECKPOINT_FORMAT),
         "summary.json": lambda p: json.loads(p.read_text()),
         "fields.pvd": lambda p: [
             read((p.parent / e.attrib["file"]).read_bytes()) for e in ElementTree.parse(p).iter("DataSet")
