@@ -49,7 +49,7 @@ def _counts(ax: Axes, ends: list[Ending]) -> None:
     names = [OUTCOMES[i] for i in seen]
     bars = ax.barh(names, [counts[i] for i in seen], color=[MARKS[name][1] for name in names])
     ax.bar_label(bars, padding=3, fontsize=8)
-    ax.set(xscale="symlog", xlim=(0.0, 1.6 * max(len(ends), 1)))
+    ax.set(xscale="log", xlim=(0.7, 2.0 * max(len(ends), 1)))
     ax.set_xlabel(f"scenes of {len(ends)}")
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)

@@ -419,18 +419,8 @@ def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
 
 # -- the property
 
-#: scenes that do not end well yet, and why
-TURNED = "friction_dissipation falls where nodes turn round"
-KEPT_CHANGING = "one contact node keeps changing"
-KNOWN = {2: TURNED, 23: TURNED, 33: TURNED, 4: KEPT_CHANGING, 24: KEPT_CHANGING, 31: KEPT_CHANGING}
 #: the normal suite's scenes, none of which takes more than a few seconds
 FEW = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10)
-
-
-def scenes(numbers):
-    """Numbers of scenes; the known ones must still fail, so that a mended one is struck off."""
-    marks = {n: pytest.mark.xfail(reason=reason, strict=True) for n, reason in KNOWN.items()}
-    return [pytest.param(n, marks=marks.get(n, ())) for n in numbers]
 
 
 def ends_well(number):
@@ -439,13 +429,13 @@ def ends_well(number):
 
 
 @pytest.mark.solver
-@pytest.mark.parametrize("number", scenes(FEW))
+@pytest.mark.parametrize("number", FEW)
 def test_a_scene_nobody_chose_ends_in_equilibria(number):
     ends_well(number)
 
 
 @pytest.mark.slow
 @pytest.mark.solver
-@pytest.mark.parametrize("number", scenes(sorted({*range(40)} - {*FEW})))
+@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW}))
 def test_more_scenes_nobody_chose_end_in_equilibria(number):
     ends_well(number)
