@@ -251,10 +251,8 @@ def test_the_stated_error_is_what_the_full_model_finds_and_grows_beyond_the_trai
 def test_the_stated_error_is_the_largest_of_all_checks(trained, monkeypatch):
     """Each relative to the largest force of the run."""
     differences = iter([1e-6, 3e-6, 2e-6])
-    told = {name: 0.0 for name in COMPARED}
-    monkeypatch.setattr(
-        FastModel, "_checked", lambda *_: told | {"normal_force": next(differences)}
-    )
+    told = dict.fromkeys(COMPARED, 0.0)
+    monkeypatch.setattr(FastModel, "_checked", lambda *_: told | {"normal_force": next(differences)})
     result = trained[2].simulate(pad_scene(0.4, 1500.0), checks=3)
     stated = result.provenance["fast"]["error"]
     assert stated["normal_force"] == pytest.approx(3e-6 / result.normal_force.max(), rel=1e-12)
