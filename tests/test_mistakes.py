@@ -1,4 +1,6 @@
-"""The table of mistakes fits the package: what each one changes is there, and so are the tests that see it."""
+"""The table of mistakes fits the package: what each one changes is there, and the tests that see
+it.
+"""
 
 import ast
 from pathlib import Path

@@ -333,3 +333,17 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
     # under the present attraction it would drift by -0.03; the fall is reduced to a feedback of 0.9
     assert found.reduced
     assert found.state[0] == pytest.approx(0.5 - 0.03 / (1.0 - 0.9))
+
+
+def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
+    """Closed, node 0 holds its neighbour: feedback 30 (0.1 - 0.09^2 / 0.1) = 0.57. But it lets go, and two
+    open nodes have 30 (0.1 + 0.09) = 5.7: scaled to 0.9 they move ten times their free way of 0.02.
+    """
+    compliance = np.zeros((4, 4))
+    compliance[:2, :2] = [[0.1, 0.09], [0.09, 0.1]]
+    problem = ContactProblem(np.array([1.02, 1.02, 0.0, 0.0]), compliance, np.zeros(2))
+    pull = AttractionStiffness(np.full(2, 30.0), np.ones(2), np.zeros(2))
+    found = solve_with_attraction(problem, pull, np.array([FORWARD, OPEN]))
+    assert found.reduced
+    assert found.status.tolist() == [OPEN, OPEN]
+    np.testing.assert_allclose(found.state[:2], 1.0 + 0.02 / (1.0 - 0.9), rtol=1e-12)

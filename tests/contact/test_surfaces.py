@@ -74,10 +74,9 @@ def test_friction_table_of_one_row_is_a_constant():
 
 
 def test_jumps_and_slopes_of_a_friction_table_are_those_of_the_coefficient():
-    """Just before and at a jump; central differences between the rows; a second row without a jump is none."""
-    table = Flat(
-        friction=[[-1.0, 0.3], [0.0, 0.5], [0.0, 0.2], [1.0, 0.2], [1.0, 0.2], [3.0, 0.8], [3.0, 0.9]]
-    )
+    """Just before and at a jump; central differences between the rows; equal rows are no jump."""
+    rows = [[-1.0, 0.3], [0.0, 0.5], [0.0, 0.2], [1.0, 0.2], [1.0, 0.2], [3.0, 0.8], [3.0, 0.9]]
+    table = Flat(friction=rows)
     places = np.array([0.0, 3.0])
     before, after = (table.friction_coefficient(places + shift) for shift in (-1e-9, 0.0))
     np.testing.assert_allclose(table.friction_jumps, np.stack([places, before, after], axis=1), atol=1e-8)

@@ -23,7 +23,7 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
 )
 from evfem.fast.memory import CondensedPad, sums
-from evfem.fast.model import FastModel
+from evfem.fast.model import COMPARED, FastModel
 from evfem.fast.step import RememberedPad
 from evfem.fast.woodbury import Factors, KeptProblem
 from evfem.simulation.run import Run
@@ -89,6 +89,18 @@ def fast_solver(model, pad, attraction, strategy=None):
     points = model.mesh.points[model.pad.nodes]
     interface = Interface(alone_pad(model), points, model.surface, limits.tolerance)
     return Equilibrium(RememberedPad(pad, interface, attraction, limits), interface, attraction, limits)
+
+
+def test_remembered_displacements_are_those_relative_to_the_bone(trained):
+    run, states, fast = trained
+    nodes = run.model.pad.nodes
+    forces = [run.model.equilibrium.contact_forces(state) + state.attraction for state in states]
+    forces[0] = np.zeros_like(forces[0])
+    memory = fast.memory
+    for moved, whole, force in zip(memory.pad.moved, memory.whole, memory.pad.force, strict=True):
+        state = states[int(np.argmin([np.abs(other - force).max() for other in forces]))]
+        np.testing.assert_allclose(whole, state.u - state.bone, atol=1e-6)
+        np.testing.assert_array_equal(moved, whole[nodes])
 
 
 def test_a_step_between_remembered_equilibria_is_that_of_the_full_model(trained):
@@ -234,6 +246,17 @@ def test_the_stated_error_is_what_the_full_model_finds_and_grows_beyond_the_trai
     assert stated["outside"] > 0.1
     assert 0.5 * errors < stated["error"]["tangential_force"] < 2.0 * errors
     assert errors > 0.002
+
+
+def test_the_stated_error_is_the_largest_of_all_checks(trained, monkeypatch):
+    """Each relative to the largest force of the run."""
+    differences = iter([1e-6, 3e-6, 2e-6])
+    told = dict.fromkeys(COMPARED, 0.0)
+    monkeypatch.setattr(FastModel, "_checked", lambda *_: told | {"normal_force": next(differences)})
+    result = trained[2].simulate(pad_scene(0.4, 1500.0), checks=3)
+    stated = result.provenance["fast"]["error"]
+    assert stated["normal_force"] == pytest.approx(3e-6 / result.normal_force.max(), rel=1e-12)
+    assert stated["tangential_force"] == 0.0
 
 
 # -- when it will not do

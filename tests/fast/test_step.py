@@ -1,4 +1,6 @@
-"""One step of the remembered pad: where it begins, what is out of balance, when it is carried along."""
+"""One step of the remembered pad: where it begins, what is out of balance, when it is carried
+along.
+"""
 
 from dataclasses import replace
 
@@ -38,9 +40,7 @@ def _parts():
 
 def outlook(state, **changes):
     """What the state itself would be the answer to, with changes."""
-    return replace(
-        Target(float(state.bone[0]), Indentation(float(state.bone[1])), GivenVoltage(1000.0)), **changes
-    )
+    return replace(Target.held(state.bone, 1000.0), **changes)
 
 
 def test_iterations_begin_with_a_pad_that_has_moved_with_the_bone(slid):
@@ -55,7 +55,9 @@ def test_iterations_begin_with_a_pad_that_has_moved_with_the_bone(slid):
 
 
 def test_the_first_touch_under_a_force_begins_at_the_remembered_equilibria_with_that_force(slid):
-    """Their forces on the pad add up to it, and the nodes that then touch lie on the surface in the mean."""
+    """Their forces on the pad add up to it, and the nodes that then touch lie on the surface in
+    the mean.
+    """
     body, states, level = slid
     for force in (0.003, 0.012):
         begun = body.begin(states[0], outlook(states[0], height=Force(force)), False, states[0])

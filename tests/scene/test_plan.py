@@ -1,4 +1,6 @@
-"""What a scene needs: terms that are left out must not matter, and the numbers are those of the mesh."""
+"""What a scene needs: terms that are left out must not matter, and the numbers are those of the
+mesh.
+"""
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import evfem as ev
 from evfem.scene.plan import largest_voltage, plan, plan_on, rigid_share, scene_mesh
 from evfem.simulation.model import make_model
 
+pytestmark = pytest.mark.solver
 BLOCK = block(40, 2, sag=1.0)
 
 
@@ -66,7 +69,9 @@ def test_the_largest_voltage_of_any_source_counts():
 
 
 def test_numbers_are_those_of_the_mesh():
-    """40 by 2 quads of nine nodes: 81 by 5 nodes, the uppermost 81 move as one; all 81 of the pad are free."""
+    """40 by 2 quads of nine nodes: 81 by 5 nodes, the upper 81 move as one, the lower 81 may
+    touch.
+    """
     scene = hovering()
     mesh, element = scene_mesh(scene)
     found = plan_on(scene, mesh, element)

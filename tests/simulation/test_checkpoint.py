@@ -1,4 +1,6 @@
-"""Checkpoints: every part of what a run takes with it comes back, and what does not fit is refused."""
+"""Checkpoints: every part of what a run takes with it comes back, and what does not fit is
+refused.
+"""
 
 from dataclasses import fields, replace
 

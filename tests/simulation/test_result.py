@@ -192,7 +192,8 @@ def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
     assert summary["last"]["min_gap"] is None
     assert (summary["steps"], summary["requested_steps"], summary["complete"]) == (4, 4, True)
     assert summary["last"]["normal_force"] == result.normal_force[-1]
-    assert summary["largest"]["tangential_force"] == result.tangential_force.max()
+    result.tangential_force[1] = -7.0  # of a slide towards -x
+    assert result.summary()["largest"]["tangential_force"] == 7.0
     assert summary["newton_iterations"] == 12
     assert (summary["nodes"], summary["cells"], summary["kind"]) == (9, 4, "quad")
 

@@ -1,4 +1,6 @@
-"""What an accepted step promises: each condition is broken once, all others kept, and the state refused."""
+"""What an accepted step promises: each condition is broken once, all others kept, and the state
+refused.
+"""
 
 from dataclasses import replace
 
@@ -30,9 +32,7 @@ SLIP, GAP = 1e-3, 1e-2
 
 
 class Script:
-    """A body whose iterates and residuals are known beforehand: first the state in question, then a good
-    one.
-    """
+    """A body whose iterates and residuals are known beforehand: first the state in question."""
 
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
@@ -65,8 +65,8 @@ class Script:
 
 
 def legal(surface, kind=Interface):
-    """An interface, a state before a step and one after it that obeys everything: every fourth node is open,
-    sticks, has slipped forwards, backwards.
+    """An interface, a state before a step and one after it that obeys everything: every fourth
+    node is open, sticks, has slipped forwards, backwards.
     """
     interface = kind(PAD, MESH.points, surface, TOLERANCE)
     script = Script([], [])
@@ -139,8 +139,8 @@ BREAKERS = {
 
 @pytest.mark.parametrize("name", BREAKERS)
 def test_each_condition_of_contact_is_asked_for(name):
-    """Allowed is the tolerance times the distance of the corners, 1 mm, or times the largest contact force,
-    1 N/mm.
+    """Allowed is the tolerance times the distance of the corners, 1 mm, or times the largest
+    contact force, 1 N/mm.
     """
     interface, old, good = legal(SURFACES[0])
     half, twice = (BREAKERS[name](good, part * TOLERANCE) for part in (0.5, 2.0))
@@ -169,7 +169,9 @@ def test_tension_is_refused():
 
 
 def test_gaps_and_slips_on_a_slope_are_those_along_the_profile():
-    """A slope of 1 at the middle node: it may be 1.4 times higher than on the flat, and move 0.7 times less."""
+    """A slope of 1 at the middle node: it may be 1.4 times higher than on the flat, and move 0.7
+    as far.
+    """
     surface = Sinusoid(friction=MU, terms=[[1.0, 1.0, 0.0]], y=0.0)
     middle = int(np.argmin(np.abs(MESH.points[PAD.nodes, 0])))
     interface, old, good = legal(surface)
@@ -217,8 +219,8 @@ def wishing(force, x=0.1):
 
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_wish_that_the_voltage_could_meet_is_not_passed_over(way):
-    """At 0 V more friction than wished for is all right, less is not; nothing in `good` sticks, so that the
-    wish has to be met. The reaction along x is the friction that the bone feels.
+    """At 0 V more friction than wished for cannot be helped, less can. The reaction along x is the
+    friction that the bone feels.
     """
     interface, old, good = legal(SURFACES[0])
     good = replace(good, bone=np.array([0.1 * way, 0.0]), reaction=np.array([way * 0.1, -2.0]))
@@ -259,7 +261,9 @@ def test_a_voltage_that_is_kept_needs_a_pad_that_sticks():
 
 
 def test_a_yielding_interface_is_held_to_its_own_law():
-    """g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t A) = 0 with the tributary length A of before."""
+    """g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t A) = 0, tributary lengths A of
+    before.
+    """
     surface, penalties = SURFACES[0], (50.0, 20.0)
     interface, old, good = legal(surface, PenaltyInterface)
     interface.penalties = penalties
@@ -268,7 +272,6 @@ def test_a_yielding_interface_is_held_to_its_own_law():
     old = replace(old, contact_force=before)
     A = PAD.length(MESH.points[PAD.nodes, 0])
     normal, shear = good.contact_force.T
-    x, y = MESH.points[PAD.nodes].T
     touching, sticks = good.status != OPEN, good.status == STICK
     u = good.u.copy()
     u[PAD.nodes, 1] -= np.where(touching, normal / (penalties[0] * A), 0.0)

@@ -1,4 +1,4 @@
-"""What is prescribed in a step: known parts, missing forces, extra unknowns, and the bounds of the voltage."""
+"""What is prescribed in a step: known parts, missing forces, unknowns, bounds of the voltage."""
 
 from types import SimpleNamespace
 
@@ -20,7 +20,9 @@ def test_a_height_is_known_and_misses_no_force():
 
 
 def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
-    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing, downwards."""
+    """The bone is pressed with 5 N/mm downwards and pushed up with 3: 2 N/mm more are missing,
+    downwards.
+    """
     force = Force(5.0)
     assert (force.free, force.known(0.7)) == (True, 0.7)
     assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
@@ -29,8 +31,8 @@ def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
 
 
 def test_the_travel_of_a_pressed_bone_is_an_unknown_that_pushes_with_the_bones_column():
-    """Raising the bone by d changes the condensed forces by S d e_y, which stands on the other side; the
-    equation is that of the bone's y component.
+    """Raising the bone by d changes the condensed forces by S d e_y, which stands on the other
+    side; the equation is that of the bone's y component.
     """
     schur = np.arange(16.0).reshape(4, 4)
     (unknown,) = Force(5.0).unknowns(SimpleNamespace(schur=schur), 0.7)
@@ -51,7 +53,9 @@ def test_a_target_knows_where_the_bone_must_be():
 
 
 class Friction:
-    """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one number."""
+    """A pad whose friction force is 2 N/mm plus 3 N/mm for each kV^2: contact problems of one
+    number.
+    """
 
     def __init__(self, squared):
         self.squared, self.residuals = squared, []
@@ -69,8 +73,8 @@ class Friction:
 
 
 def follow(wish, squared, largest=2000.0, before=1000.0):
-    """The control after one iteration at `squared` kV^2, what it changed, and the contact problems it
-    posed.
+    """The control after one iteration at `squared` kV^2, what it changed, and the contact problems
+    it posed.
     """
     control, friction = FollowFriction(wish, largest), Friction(squared)
     control.begin(SimpleNamespace(voltage=before))
@@ -79,7 +83,9 @@ def follow(wish, squared, largest=2000.0, before=1000.0):
 
 
 def test_between_its_bounds_the_squared_voltage_is_what_the_wish_needs():
-    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward solve."""
+    """2 + 3 x = 6.5: x = 1.5, half a kV^2 more than there is; one kV^2 does (7,) to the backward
+    solve.
+    """
     control, found, posed = follow(6.5, 1.0)
     assert control.free
     assert found.change == pytest.approx(0.5)
@@ -106,7 +112,9 @@ def test_at_a_bound_the_voltage_stays_there_and_contact_is_solved_again(wish, sq
     ("wish", "tolerated", "corrected"), [(1.0, 3.0, 0.5), (20.0, 19.0, 21.0)], ids=["at zero", "at limit"]
 )
 def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated, corrected):
-    """At 0 V more friction than wished for cannot be helped, less can; at the limit the other way round."""
+    """At 0 V more friction than wished for cannot be helped, less can; at the limit the other way
+    round.
+    """
     for force, accepted in ((tolerated, True), (corrected, False)):
         control, _, _ = follow(wish, 1.0)
         control.force = way * control.force

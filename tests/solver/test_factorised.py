@@ -1,4 +1,6 @@
-"""Finite elements behind the outer iteration: what counts as out of balance, and how far an update may go."""
+"""Finite elements behind the outer iteration: what counts as out of balance, and how far an update
+may go.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +22,9 @@ ROUND = finger(block(8, 3, sag=0.4))
 
 @pytest.fixture(scope="module")
 def pressed():
-    """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was for."""
+    """A model, its body, its state at 0.2 mm of indentation under 1000 V, and the target it was
+    for.
+    """
     scene = Scene(ROUND, Display(), Kaczmarek(), 1000.0, [Press(indentation=0.2)])
     model = make_model(scene)
     target = Target.held(model.bone(0.0, 0.2), 1000.0)
@@ -60,7 +64,9 @@ def test_a_wished_friction_force_counts_while_the_voltage_is_free(pressed, missi
 
 
 def test_forces_that_add_up_count_by_their_sum(pressed):
-    """Every touching node pushed with as little as can pass alone: together they are so many times more."""
+    """Every touching node pushed with as little as can pass alone: together they are so many times
+    more.
+    """
     body, state, _ = pressed
     touching = state.touching
     extra = 1e-5 * touching[:, None] * [1.0, 0.0]
@@ -73,8 +79,8 @@ def test_forces_that_add_up_count_by_their_sum(pressed):
 
 @pytest.mark.parametrize(("squeeze", "fraction"), [(0.9, 1.0), (1.2, 0.5), (3.0, 0.25), (30.0, 1.0 / 32.0)])
 def test_an_update_is_halved_until_no_volume_is_lost(pressed, squeeze, fraction):
-    """A block pressed flat along y has J = 1 - squeeze everywhere: the largest of 1, 1/2, 1/4 ... that
-    leaves more than 0.05.
+    """A block pressed flat along y has J = 1 - squeeze everywhere: the largest of 1, 1/2, 1/4 ...
+    that leaves more than 0.05.
     """
     body = pressed[0]
     points = body.body.space.mesh.points
@@ -87,15 +93,13 @@ def test_an_update_of_which_next_to_nothing_can_be_taken_fails_the_step(pressed)
     body = pressed[0]
     points = body.body.space.mesh.points
     with pytest.raises(StepFailed, match="collapse"):
-        body._largest_fraction(
-            np.zeros_like(points), np.column_stack([0.0 * points[:, 0], -1e3 * points[:, 1]])
-        )
+        body._largest_fraction(np.zeros_like(points), points * [0.0, -1e3])
 
 
 @pytest.mark.parametrize(("depth", "fraction"), [(0.3, 0.5), (0.4, 1.0), (0.55, 1.5), (0.19, 0.0)])
 def test_iterations_begin_ahead_on_the_last_steps_way(pressed, depth, fraction):
-    """The last step went 0.2 mm down: as far along its displacements as the bone goes now, at most 1.5 times
-    (`Strategy.reach`), and not at all back.
+    """The last step went 0.2 mm down: as far along its displacements as the bone goes now, at most
+    1.5 times (`Strategy.reach`), and not at all back.
     """
     body, state, _ = pressed
     begun = body.begin(state, Target.held(np.array([0.0, -depth]), 1000.0), False, state)

@@ -2,10 +2,10 @@
 
     python tests/tools/mistakes.py [--only WORD]
 
-The table is `mistakes.toml` beside this file. A mistake is one edit of one file: `old` text, which the file
-has exactly once, becomes `new`. `breaks` says what is wrong then, `tests` which tests must see it. They run in
-a temporary folder with a copy of the package, first as it is, then with each mistake. Exit status 1 if a
-mistake survives. One process at a time.
+The table is `mistakes.toml` beside this file. A mistake is one edit of one file: `old` text, which
+the file has exactly once, becomes `new`. `breaks` says what is wrong then, `tests` which tests
+must see it. They run in a temporary folder with a copy of the package, first as it is, then with
+each mistake, one process at a time. Exit status 1 if a mistake survives.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ LONGEST = 300.0
 
 @dataclass(frozen=True)
 class Mistake:
-    """One edit of the `file` (below `evfem/`), what it breaks, and the tests (of `tests/`) that must see it."""
+    """One edit of a `file` below `evfem/`, what it breaks, and the tests in `tests/` that must see
+    it.
+    """
 
     file: str
     old: str
@@ -112,13 +114,17 @@ class Copy:
             self._write(file, text)
 
     def _write(self, file: Path, text: str) -> None:
-        """New text, and nothing left of what was compiled from the old one, inlined loops included."""
+        """New text, and nothing left of what was compiled from the old one, inlined loops
+        included.
+        """
         file.write_text(text, encoding="utf-8")
         shutil.rmtree(file.parent / "__pycache__", ignore_errors=True)
 
 
 def survivors(chosen: list[Mistake]) -> int:
-    """Make the mistakes one after the other, print a line for each, and count those that no test sees."""
+    """Make the mistakes one after the other, print a line for each, and count those that no test
+    sees.
+    """
     survived = 0
     with TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
