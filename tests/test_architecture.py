@@ -24,7 +24,8 @@ ROOMS = {
     "mesh": ({"numpy", "scipy", "meshio"}, "mesh quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem", "numba"},
-        "fields forms elements moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous space "
+        "fields forms elements moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous "
+        "space "
         "assembly weakform userforms dynamics body",
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from evfem.mesh.mesh import KINDS
+from evfem.mesh.mesh import CELLS
 
 #: element -> (mesh kind, order of quadrature, how ln J is sampled)
 ELEMENTS: Mapping[str, tuple[str, int, str]] = {
@@ -35,4 +35,4 @@ def elements_of_order(order: int) -> tuple[str, ...]:
     >>> elements_of_order(1)
     ('q1', 'q1_fbar')
     """
-    return tuple(name for name, (kind, *_) in ELEMENTS.items() if KINDS[kind][1] == order)
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].order == order)

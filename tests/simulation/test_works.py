@@ -105,8 +105,8 @@ def test_a_body_that_swings_loses_its_energy_to_the_integrator():
     for times in (1, 2):
         motion = (
             Hover(0.3),
-            Slide(0.02, steps=2 * times, speed=50.0),
-            Slide(1e-6, steps=40 * times, speed=0.05),
+            Press(indentation=-0.28, steps=2 * times, speed=50.0),
+            Press(indentation=-0.28 + 1e-6, steps=40 * times, speed=0.05),
         )
         result = simulate(scene(Flat(), None, 0.0, motion, solver=Solver(dynamics="inertial")))
         inside = result.stored_energy + result.kinetic_energy
