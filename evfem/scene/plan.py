@@ -147,11 +147,10 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
 def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     materials = scene.finger.materials
     laws = ", ".join(sorted({_law_name(law, name, mesh) for name, law in materials.items()}))
-    softest, hardest = min(moduli.values()), max(moduli.values())
     # a modulus in kPa is seen here
-    soft, hard = f"{softest:.3g}", f"{hardest:.3g}"
+    soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
-    share = rigid_share(scene, mesh, softest)
+    share = rigid_share(scene, mesh)
     if share is not None and share < RIGID_BELOW:
         return Term(
             "tissue", False, f"hovering: deforming would change the attraction by less than {share:.1e}"
@@ -164,9 +163,9 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     )
 
 
-def rigid_share(scene: Scene, mesh: Mesh, softest: float) -> float | None:
-    """Upper estimate of the relative change of the attraction if a hovering pad may deform, whose softest
-    shear modulus (MPa) is given; None where it must deform.
+def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
+    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None where it
+    must deform.
     """
     hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
     if (
@@ -183,7 +182,7 @@ def rigid_share(scene: Scene, mesh: Mesh, softest: float) -> float | None:
         or scene.finger.electrical is None
     ):
         return None
-    return hover_share(scene, mesh, softest, gap)
+    return hover_share(scene, mesh, gap)
 
 
 def _contact(scene: Scene) -> Term:

@@ -188,8 +188,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the shear moduli
     (MPa) of the materials.
     """
-    softest = min(moduli.values())
-    return (*_hard(scene, moduli), *_small(scene), *_breakdown(scene), *_hovering(scene, mesh, softest))
+    return (*_hard(scene, moduli), *_small(scene), *_breakdown(scene), *_hovering(scene, mesh))
 
 
 def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:
@@ -230,7 +229,7 @@ def _breakdown(scene: Scene) -> Iterator[str]:
             )
 
 
-def _hovering(scene: Scene, mesh: Mesh, softest: float) -> Iterator[str]:
+def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Slides after the last press that do not touch: before it, the bone may be on its way."""
     presses = [i for i, m in enumerate(scene.motion) if isinstance(m, Press) and _target(m) > 0.0]
     first, indentation = (presses[-1] + 1, math.inf) if presses else (0, 0.0)
@@ -239,7 +238,7 @@ def _hovering(scene: Scene, mesh: Mesh, softest: float) -> Iterator[str]:
             indentation = -motion.gap
         elif isinstance(motion, Press):
             indentation = _target(motion)
-        elif isinstance(motion, Slide) and _stays_up(scene, mesh, softest, -indentation):
+        elif isinstance(motion, Slide) and _stays_up(scene, mesh, -indentation):
             above = f"{-indentation:g} mm above first touch" if indentation else "at first touch"
             yield f"motion {i}, a slide {above}, never touches: press before it"
 
@@ -249,7 +248,7 @@ def _target(press: Press) -> float:
     return math.inf if press.indentation is None else press.indentation
 
 
-def _stays_up(scene: Scene, mesh: Mesh, softest: float, gap: float) -> bool:
+def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
     """Whether a pad whose undeformed outline is `gap` (mm) off the first touch does not come down."""
     if gap < 0.0:
         return False
@@ -260,17 +259,17 @@ def _stays_up(scene: Scene, mesh: Mesh, softest: float, gap: float) -> bool:
             return False
     if scene.law is None or largest_voltage(scene) == 0.0:
         return True
-    return gap > 0.0 and hover_share(scene, mesh, softest, gap) < STAYS_UP
+    return gap > 0.0 and hover_share(scene, mesh, gap) < STAYS_UP
 
 
-def hover_share(scene: Scene, mesh: Mesh, softest: float, gap: float) -> float:
+def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
     """Upper estimate of the relative change of the attraction by the deformation of a hovering pad.
 
-    The softest tissue (shear modulus in MPa) under the largest traction, from pad to bone: deflection
-    p h / E, times d(ln p)/dg, of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the
-    traction of the smallest gap.
+    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln p)/dg,
+    of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the smallest gap.
     """
     assert scene.law is not None
     layers = Layers.of(scene.ground.insulator)
     traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
-    return traction * float(np.ptp(mesh.points[:, 1])) / (2.0 * softest) * 2.0 / gap
+    softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
+    return traction * float(np.ptp(mesh.points[:, 1])) / softest * 2.0 / gap

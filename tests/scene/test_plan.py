@@ -21,6 +21,7 @@ def hovering(E=0.05, gap=0.25, voltage=1000.0, law=None, motion=()):
     )
 
 
+@pytest.mark.filterwarnings("ignore:the shear modulus")  # next to rigid, for comparison
 @pytest.mark.parametrize("law", [ev.Kaczmarek(), ev.StrongTroxel()], ids=["kaczmarek", "strong_troxel"])
 @pytest.mark.parametrize("voltage", [300.0, 1000.0])
 def test_deforming_changes_the_attraction_by_less_than_the_plan_says(law, voltage):
