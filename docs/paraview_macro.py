@@ -1,7 +1,9 @@
-"""ParaView macro: the deformed pad coloured by von Mises stress, and its outline by contact pressure.
+"""ParaView macro: the deformed pad coloured by von Mises stress, and its outline by contact
+pressure.
 
-In ParaView 5.9 or newer: open `fields.pvd`, press Apply, then Macros > Import new macro... and choose this
-file; from then on it is a button. From a terminal: `pvpython paraview_macro.py fields.pvd pad.png`.
+In ParaView 5.9 or newer: open `fields.pvd`, press Apply, then Macros > Import new macro... and
+choose this file; from then on it is a button. From a terminal:
+`pvpython paraview_macro.py fields.pvd pad.png`.
 """
 
 import sys

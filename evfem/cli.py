@@ -1,6 +1,8 @@
-"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command that needs it.
+"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command
+that needs it.
 
-Exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk or folder failed, 130 interrupted.
+Exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk or folder failed, 130
+interrupted.
 """
 
 from __future__ import annotations
@@ -45,7 +47,9 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _meant(message: str) -> str:
-    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run', ...)"."""
+    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run',
+    ...)".
+    """
     found = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
     close = get_close_matches(found[1], re.findall(r"\w+", found[2]), 1) if found else []
     return f"; did you mean {close[0]}?" if close else ""
@@ -224,7 +228,9 @@ def _warn(
 
 
 def _silence() -> None:
-    """Throw away what is left to print, so that the interpreter does not try once more when it ends."""
+    """Throw away what is left to print, so that the interpreter does not try once more when it
+    ends.
+    """
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 

@@ -24,9 +24,11 @@ INSTANT = 1e-9
 
 
 def paraview(result: Result, path: str | Path) -> Path:
-    """Write the frames of `result` as a series: `path` (.pvd) and one .vtu for each frame beside it.
+    """Write the frames of `result` as a series: `path` (.pvd) and one .vtu for each frame beside
+    it.
 
-    Returns the path of the index. Raises InputError for another ending, StorageError when the disk refuses.
+    Returns the path of the index. Raises InputError for another ending, StorageError when the disk
+    refuses.
     """
     series = ParaViewSeries(path)
     rows = {row["step"]: row for row in result.rows}
@@ -57,9 +59,9 @@ def write_frame(mesh: Mesh, frame: Frame, path: str | Path) -> None:
 class ParaViewSeries:
     """Writes a series while a run goes on: an observer of `evfem.simulation.run`, or fed by `add`.
 
-    Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the time
-    if time passes, else the position; see `instants`. `earlier` rows belong to a run that is continued:
-    their .vtu files, where present, stay in the index.
+    Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the
+    time if time passes, else the position; see `instants`. `earlier` rows belong to a run that is
+    continued: their .vtu files, where present, stay in the index.
     """
 
     def __init__(self, path: str | Path, earlier: Sequence[Row] = ()) -> None:
@@ -104,8 +106,8 @@ class ParaViewSeries:
 def instants(rows: Sequence[Mapping[str, Any]]) -> list[float]:
     """A strictly increasing value for each step, as ParaView needs: time, or distance travelled.
 
-    Time (s) if any passes, else the distance travelled (mm), which on a slide towards +x is the position.
-    Steps in which neither advances follow each other by 1e-9.
+    Time (s) if any passes, else the distance travelled (mm), which on a slide towards +x is the
+    position. Steps in which neither advances follow each other by 1e-9.
 
     >>> instants([{"time": 0.0, "position": x} for x in (0.0, 0.0, 0.5, 1.0)])
     [0.0, 1e-09, 0.5, 1.0]

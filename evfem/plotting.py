@@ -1,8 +1,8 @@
 """Pictures of results and meshes with matplotlib: functions that return the Axes they drew on.
 
 Figures are made without pyplot, so nothing stays open and no global state changes: save one with
-`forces(result).figure.savefig("forces.png")`. Colours are told apart with any colour vision (Okabe and
-Ito, 2008).
+`forces(result).figure.savefig("forces.png")`. Colours are told apart with any colour vision (Okabe
+and Ito, 2008).
 """
 
 from __future__ import annotations
@@ -43,8 +43,9 @@ FIELDS = ("von_mises", *STRESSES, "J", "displacement", *POINT_FIELDS)
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
-    `over` is step, position, time, indentation or voltage; None takes the position if it changes in every
-    step, else the step, with the motions marked. A force that is 0 throughout is left out.
+    `over` is step, position, time, indentation or voltage; None takes the position if it changes
+    in every step, else the step, with the motions marked. A force that is 0 throughout is left
+    out.
     """
     if over is None:
         over = "position" if _advances(result.position) else "step"
@@ -69,8 +70,8 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
 def deformed(result: Result, field: str = "von_mises", frame: int = -1, ax: Axes | None = None) -> Axes:
     """The deformed finger of a frame, coloured by a field (see `FIELDS`), in true proportions.
 
-    Cell fields fill their cells, nodal fields are interpolated; curved edges of quadratic cells are drawn
-    through their middle nodes. Region borders are thin lines.
+    Cell fields fill their cells, nodal fields are interpolated; curved edges of quadratic cells
+    are drawn through their middle nodes. Region borders are thin lines.
     """
     if field not in FIELDS:
         raise InputError("field", field, " | ".join(FIELDS))
@@ -95,7 +96,9 @@ def deformed(result: Result, field: str = "von_mises", frame: int = -1, ax: Axes
 
 
 def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
-    """The cells of an undeformed mesh, each region in a colour of its own: `regions(finger.mesh())`."""
+    """The cells of an undeformed mesh, each region in a colour of its own:
+    `regions(finger.mesh())`.
+    """
     from matplotlib.collections import PolyCollection
 
     ax = _axes(ax)

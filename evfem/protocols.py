@@ -1,8 +1,9 @@
-"""Parts of your own: any object with the right method is a law, a material, a surface, a form or an observer.
+"""Parts of your own: any object with the right method is a law, a material, a surface, a form or
+an observer.
 
-Nothing is inherited and nothing registered; the object goes where the package's own goes. What is called
-optional may be there or not. Arrays have any trailing shape; a method that takes complex numbers gets exact
-derivatives (`evfem.tensor.complex_step`), another one differences.
+Nothing is inherited and nothing registered; the object goes where the package's own goes. What is
+called optional may be there or not. Arrays have any trailing shape; a method that takes complex
+numbers gets exact derivatives (`evfem.tensor.complex_step`), another one differences.
 
 =====================  ========================================  =======================================
 part                   goes to                                   needs
@@ -25,15 +26,16 @@ from typing import Any, Protocol, runtime_checkable
 class ForceLaw(Protocol):
     """An electrostatic law.
 
-    Optional methods of the same arguments: `traction_derivative` (MPa/mm), and `potential` (N/mm), whose
-    derivative by the gap is the traction, needed for `direction="normal"`.
+    Optional methods of the same arguments: `traction_derivative` (MPa/mm), and `potential` (N/mm),
+    whose derivative by the gap is the traction, needed for `direction="normal"`.
     """
 
     def traction(self, gap: Any, voltage: Any, layers: Any) -> Any:
-        """Attraction in MPa, positive when it attracts, at gaps in mm (positive when open) and voltages in V.
+        """Attraction in MPa, positive when it attracts, at gaps in mm (positive when open) and
+        voltages in V.
 
-        `layers.reduced` is the sum of thickness / permittivity of the solid layers, `layers.thickness` that
-        of their thicknesses, in mm. Complex-safe, or it is differenced.
+        `layers.reduced` is the sum of thickness / permittivity of the solid layers,
+        `layers.thickness` that of their thicknesses, in mm. Complex-safe, or it is differenced.
         """
 
 
@@ -42,24 +44,31 @@ class StressLaw(Protocol):
     """A material by its stress. Optional: `psi` too, `viscosity` in s, `density` in t/mm3."""
 
     def P(self, F: Any) -> Any:
-        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3, ...)."""
+        """First Piola-Kirchhoff stress (3, 3, ...) in MPa at the deformation gradient F (3, 3,
+        ...).
+        """
 
 
 @runtime_checkable
 class EnergyLaw(Protocol):
-    """A material by its energy alone; stress and tangent are derived, so `psi` must be complex-safe."""
+    """A material by its energy alone; stress and tangent are derived, so `psi` must be
+    complex-safe.
+    """
 
     def psi(self, F: Any) -> Any:
         """Energy per reference volume (...) in MPa at the deformation gradient F (3, 3, ...)."""
 
 
 class WeakForm(Protocol):
-    """What `evfem.form` marks as a weak form: a function, or any object that can be called like one."""
+    """What `evfem.form` marks as a weak form: a function, or any object that can be called like
+    one.
+    """
 
     def __call__(self, u: Any, v: Any, w: Any) -> Any:
-        """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with gradients
-        (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on a boundary. Over a
-        region also `u.theta` and `v.theta`, the element's volume change, and `w.law`, its material.
+        """Integrand (...) of a residual, linear in `v`: displacement (mm) and test function with
+        gradients (`evfem.grad`), and the place: `w.x` (2, ...) in mm, `w.n` the outward normal on
+        a boundary. Over a region also `u.theta` and `v.theta`, the element's volume change, and
+        `w.law`, its material.
         """
 
 
@@ -70,10 +79,10 @@ Material = StressLaw | EnergyLaw | WeakForm
 class Surface(Protocol):
     """A rigid surface by its height.
 
-    Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0); `y`, the
-    height (mm) at which the profile lies (without it or None: first touch); `insulator`, a `Layer`. Optional
-    methods of x: `slope` and `curvature`, which are derived otherwise; `friction_coefficient`, instead of
-    `friction`.
+    Optional attributes: `friction`, a number or a table [[x, coefficient], ...] (without it 0);
+    `y`, the height (mm) at which the profile lies (without it or None: first touch); `insulator`,
+    a `Layer`. Optional methods of x: `slope` and `curvature`, which are derived otherwise;
+    `friction_coefficient`, instead of `friction`.
     """
 
     def height(self, x: Any) -> Any:
@@ -82,7 +91,9 @@ class Surface(Protocol):
 
 @runtime_checkable
 class CompleteSurface(Surface, Protocol):
-    """Everything that contact asks of a surface; `evfem.contact.own.completed` gives it to any `Surface`."""
+    """Everything that contact asks of a surface; `evfem.contact.own.completed` gives it to any
+    `Surface`.
+    """
 
     @property
     def y(self) -> float | None:
@@ -102,7 +113,9 @@ class CompleteSurface(Surface, Protocol):
 
     @property
     def friction_jumps(self) -> Any:
-        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on."""
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from
+        there on.
+        """
 
     def slope(self, x: Any) -> Any:
         """Derivative of the height."""
@@ -128,11 +141,13 @@ class Starting(Protocol):
 
 
 class Stepping(Protocol):
-    """An observer that is told of every converged step, and may end the run by raising `evfem.StopRun`."""
+    """An observer that is told of every converged step, and may end the run by raising
+    `evfem.StopRun`.
+    """
 
     def step(self, row: Mapping[str, Any], frame: Any, checkpoint: Callable[[], dict[str, Any]], /) -> None:
-        """`row` is the step's row of the history, `frame` its fields (None on steps without), `checkpoint()`
-        gives the arrays to resume from.
+        """`row` is the step's row of the history, `frame` its fields (None on steps without),
+        `checkpoint()` gives the arrays to resume from.
         """
 
 

@@ -1,9 +1,10 @@
-"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
+"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every
+step.
 
-Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint
-to go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only
-files that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names. `kept` and
-`saved` say what of an earlier run is there to go on from.
+Every file is replaced in one step, so that a run killed at any moment leaves whole files and a
+checkpoint to go on from; what it was writing stays behind under a temporary name and is removed by
+the next run. Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files`
+lists their names. `kept` and `saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -38,9 +39,11 @@ LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
 
 @dataclass
 class RunFolder:
-    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the first step on.
+    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the
+    first step on.
 
-    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved` returned.
+    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved`
+    returned.
     """
 
     path: Path
@@ -132,10 +135,11 @@ class RunFolder:
 
 
 def saved(path: Path, scene: Scene) -> Saved | None:
-    """The checkpoint of an interrupted run of `scene` in the folder `path`; None if a run began there, but
-    was killed before its first step was stored.
+    """The checkpoint of an interrupted run of `scene` in the folder `path`; None if a run began
+    there, but was killed before its first step was stored.
 
-    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or version.
+    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or
+    version.
     """
     if (path / STATE).is_file():
         return Checkpoint(path / STATE).read(scene.digest())
@@ -145,9 +149,11 @@ def saved(path: Path, scene: Scene) -> Saved | None:
 
 
 def kept(path: Path, scene: Scene) -> Saved | None:
-    """The finished run of `scene` in the folder `path`; None where nothing is there that could be lost.
+    """The finished run of `scene` in the folder `path`; None where nothing is there that could be
+    lost.
 
-    Raises InputError where results of another scene are, or of a run of this one that is not finished.
+    Raises InputError where results of another scene are, or of a run of this one that is not
+    finished.
     """
     refuse_others(path / MANIFEST, _present(path), "evfem")
     if not (path / STATE).is_file() and _without_a_row(path / HISTORY):
@@ -224,7 +230,8 @@ def table(rows: Sequence[Row], most: int = 12) -> str:
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[int]:
-    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its last.
+    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its
+    last.
 
     >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
     [0, 2, 3, 36, 70, 103]

@@ -1,8 +1,8 @@
 """Pointwise algebra on arrays whose first axes are tensor axes: (i, j, ..., trailing axes).
 
-The trailing axes (elements, quadrature points, nodes; none at all for a single point) are carried along by
-broadcasting. Every function here is analytic in its arguments, or branches on the real part only, so that
-`complex_step` gives exact derivatives of whatever is composed of them.
+The trailing axes (elements, quadrature points, nodes; none at all for a single point) are carried
+along by broadcasting. Every function here is analytic in its arguments, or branches on the real
+part only, so that `complex_step` gives exact derivatives of whatever is composed of them.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ def det(A: Array) -> Array:
 
 
 def cofactor(A: Array) -> Array:
-    """Cofactors of A (n, n, ...), n = 2 or 3: d det(A) / dA = det(A) A^-T, finite for singular A too."""
+    """Cofactors of A (n, n, ...), n = 2 or 3: d det(A) / dA = det(A) A^-T, finite for singular A
+    too.
+    """
     out = np.empty_like(A)
     if len(A) == 2:
         out[0, 0], out[1, 1] = A[1, 1], A[0, 0]
@@ -82,7 +84,9 @@ def ddot(A: Array, B: Array) -> Array:
 
 
 def mul(A: Array, B: Array) -> Array:
-    """A_ik B_kj of two matrices with equally many trailing axes, or A_ik b_k if B has one axis less."""
+    """A_ik B_kj of two matrices with equally many trailing axes, or A_ik b_k if B has one axis
+    less.
+    """
     subscripts = "ik...,kj...->ij..." if A.ndim == B.ndim else "ik...,k...->i..."
     return np.einsum(subscripts, A, B)
 
@@ -111,12 +115,13 @@ def positive_part(x: Array) -> Array:
 
 
 def symmetric_power(C: Array, exponent: float) -> Array:
-    """C^exponent of symmetric positive definite C (n, n, ...), by its eigenvalues and eigenvectors.
+    """C^exponent of symmetric positive definite C (n, n, ...), by its eigenvalues and
+    eigenvectors.
 
-    An imaginary part of C is taken as a perturbation of first order (C may be stepped by `complex_step`, not
-    be any complex matrix): in the eigenbasis its entries are multiplied by the divided differences
-    (a^e - b^e)/(a - b) of the eigenvalues a, b, which keeps the derivative exact for equal eigenvalues
-    (Daleckii and Krein 1965).
+    An imaginary part of C is taken as a perturbation of first order (C may be stepped by
+    `complex_step`, not be any complex matrix): in the eigenbasis its entries are multiplied by the
+    divided differences (a^e - b^e)/(a - b) of the eigenvalues a, b, which keeps the derivative
+    exact for equal eigenvalues (Daleckii and Krein 1965).
     """
     values, vectors = np.linalg.eigh(np.moveaxis(np.real(C), (0, 1), (-2, -1)))
     adjoint = np.swapaxes(vectors, -2, -1)
@@ -137,11 +142,13 @@ def _divided_difference(values: Array, e: float) -> Array:
 
 
 def complex_step(function: Callable[..., Array], x: Array, *others: Any, rank: int = 0) -> Array:
-    """Exact derivative of a pointwise `function(x, *others)` by x, whose first `rank` axes are tensor axes.
+    """Exact derivative of a pointwise `function(x, *others)` by x, whose first `rank` axes are
+    tensor axes.
 
-    The derivative Im f(x + i h) / h needs no subtraction, so h = 1e-30 costs no digits. x must be real; the
-    function must work pointwise along the trailing axes, accept complex x and be analytic in it. The result
-    has the tensor axes of the function's value, then those of x, then the trailing axes.
+    The derivative Im f(x + i h) / h needs no subtraction, so h = 1e-30 costs no digits. x must be
+    real; the function must work pointwise along the trailing axes, accept complex x and be
+    analytic in it. The result has the tensor axes of the function's value, then those of x, then
+    the trailing axes.
 
     >>> float(complex_step(np.sin, np.array(0.0)))
     1.0
@@ -158,8 +165,9 @@ def complex_step(function: Callable[..., Array], x: Array, *others: Any, rank: i
 
 
 def difference(function: Callable[..., Array], x: Array, step: float, rank: int = 0) -> Array:
-    """The derivative as in `complex_step`, by central differences of sixth order: for functions that are not
-    analytic in code, or take complex steps themselves. Errors are of the order step^6 and rounding / step.
+    """The derivative as in `complex_step`, by central differences of sixth order: for functions
+    that are not analytic in code, or take complex steps themselves. Errors are of the order step^6
+    and rounding / step.
 
     >>> abs(float(difference(np.sin, np.array(0.0), 4e-3)) - 1.0) < 1e-14
     True
@@ -175,8 +183,8 @@ def difference(function: Callable[..., Array], x: Array, step: float, rank: int 
 
 
 def derivative(function: Callable[[Array], Any], x: Array, step: float) -> Array:
-    """Derivative at real x (...) of a user's function that works point by point: by a complex step, or by
-    differences over `step` where the function drops the imaginary part or refuses it.
+    """Derivative at real x (...) of a user's function that works point by point: by a complex
+    step, or by differences over `step` where the function drops the imaginary part or refuses it.
 
     >>> float(derivative(np.sin, np.array(0.0), 1e-4))
     1.0
@@ -192,7 +200,9 @@ def derivative(function: Callable[[Array], Any], x: Array, step: float) -> Array
 
 
 def _columns(column: Callable[[tuple[int, ...]], Array], x: Array, rank: int) -> Array:
-    """Derivatives by each tensor component of x, their axes between those of the value and the trailing."""
+    """Derivatives by each tensor component of x, their axes between those of the value and the
+    trailing.
+    """
     shape, trailing = np.shape(x)[:rank], np.ndim(x) - rank
     columns = [column(index) for index in np.ndindex(shape)]
     axes = columns[0].ndim - trailing

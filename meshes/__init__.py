@@ -1,5 +1,5 @@
-"""Ready-made finger meshes (`.vtu`, `.msh`) in an open format; the table of names is in the README beside
-them.
+"""Ready-made finger meshes (`.vtu`, `.msh`) in an open format; the table of names is in the README
+beside them.
 
 >>> path("finger-coarse-ridged.vtu").name in names()
 True

@@ -1,4 +1,6 @@
-"""The recipe of the ready-made meshes: `python -m evfem.meshes.make [FOLDER]` writes them all again."""
+"""The recipe of the ready-made meshes: `python -m evfem.meshes.make [FOLDER]` writes them all
+again.
+"""
 
 from __future__ import annotations
 

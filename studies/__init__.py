@@ -1,4 +1,6 @@
-"""Studies: a module per figure of the paper or numerical question, each with `main(quick, out) -> dict`."""
+"""Studies: a module per figure of the paper or numerical question, each with
+`main(quick, out) -> dict`.
+"""
 
 from __future__ import annotations
 
@@ -42,8 +44,8 @@ MODULES = {
 
 @dataclass(frozen=True)
 class Sample:
-    """What a study that draws scenes draws: how many (None: its own number), of which seed, in how many
-    processes (None: one for each core).
+    """What a study that draws scenes draws: how many (None: its own number), of which seed, in how
+    many processes (None: one for each core).
     """
 
     scenes: int | None = None
@@ -62,8 +64,8 @@ def run(
 ) -> dict[str, Any]:
     """Run the study `name`; with `out`, write NAME.json, NAME.csv and NAME.png into that folder.
 
-    `sample` is for `campaign` alone. Returns the dictionary with study, numbers, paper, assumptions and
-    provenance.
+    `sample` is for `campaign` alone. Returns the dictionary with study, numbers, paper,
+    assumptions and provenance.
     """
     if name not in NAMES:
         raise InputError("study", name, ", ".join(NAMES))

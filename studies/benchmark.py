@@ -1,9 +1,9 @@
 """The press-and-slide problem that other finite element packages solve too: its meshes.
 
-Lower half between two concentric ellipses, x = A cos(theta), y = B sin(theta), theta from pi to 2 pi: bone
-contour (3.0, 2.5), interface between tissue and skin (7.96, 6.015), outer contour (8.34, 6.395), in mm. Nodes
-uniform in theta, linear along the straight lines from the bone to the interface and from there to the outer
-contour.
+Lower half between two concentric ellipses, x = A cos(theta), y = B sin(theta), theta from pi to 2
+pi: bone contour (3.0, 2.5), interface between tissue and skin (7.96, 6.015), outer contour (8.34,
+6.395), in mm. Nodes uniform in theta, linear along the straight lines from the bone to the
+interface and from there to the outer contour.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ LEVELS = {0: (60, 10, 2), 1: (120, 20, 4), 2: (336, 56, 12), 3: (480, 80, 16)}
 
 
 def benchmark_mesh(level: int, order: int = 1, *, same_nodes: bool = False) -> Mesh:
-    """Mesh L0 ... L3: regions `tissue`, `skin`; sets `pad` (outer contour), `bone` (with both cut edges).
+    """Mesh L0 ... L3: regions `tissue`, `skin`; sets `pad` (outer contour), `bone` (with both cut
+    edges).
 
-    `order` 2: quadratic cells with straight edges on the outline of the linear mesh (as many cells);
-    with `same_nodes` instead each block of 2 x 2 linear cells becomes one cell through the same nodes.
+    `order` 2: quadratic cells with straight edges on the outline of the linear mesh (as many
+    cells); with `same_nodes` instead each block of 2 x 2 linear cells becomes one cell through the
+    same nodes.
 
     >>> [len(benchmark_mesh(level).points) for level in LEVELS]
     [793, 3025, 23253, 46657]

@@ -1,4 +1,6 @@
-"""What the studies share: writing a study down, the two laws, the measurements, and how they are drawn."""
+"""What the studies share: writing a study down, the two laws, the measurements, and how they are
+drawn.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Study:
-    """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it."""
+    """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw
+    it.
+    """
 
     name: str
     numbers: dict[str, float]
@@ -131,17 +135,20 @@ def table2_layers(stratum_corneum: Any = None) -> Layers:
 
 
 def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure of `width` x `height` inches whose parts keep clear of each other; no pyplot."""
+    """An empty figure of `width` x `height` inches whose parts keep clear of each other; no
+    pyplot.
+    """
     from matplotlib.figure import Figure
 
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def median_interval(values: Floats) -> tuple[float, float, float]:
-    """Confidence interval of the median from order statistics: low, high, and the confidence it has.
+    """Confidence interval of the median from order statistics: low, high, and the confidence it
+    has.
 
-    The narrowest symmetric pair of order statistics with at least 90 %: for eleven values the third and
-    ninth, 93.5 %. It assumes nothing about the distribution.
+    The narrowest symmetric pair of order statistics with at least 90 %: for eleven values the
+    third and ninth, 93.5 %. It assumes nothing about the distribution.
     """
     from math import comb
 
@@ -155,7 +162,9 @@ def median_interval(values: Floats) -> tuple[float, float, float]:
 
 
 def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str) -> None:
-    """Box (quartiles), whiskers (extremes), median, its confidence interval as a bar, and the points."""
+    """Box (quartiles), whiskers (extremes), median, its confidence interval as a bar, and the
+    points.
+    """
     low, high, _ = median_interval(values)
     box = ax.boxplot(
         [values],
@@ -190,7 +199,9 @@ def not_shown(figure: Figure, what: str) -> None:
 
 
 def say_quick(figure: Figure) -> None:
-    """A line of its own at the head of a figure from `new_figure`: what it shows is coarser and shorter."""
+    """A line of its own at the head of a figure from `new_figure`: what it shows is coarser and
+    shorter.
+    """
     line = 0.18 / figure.get_figheight()
     figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - line))
     figure.text(

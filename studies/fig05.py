@@ -1,12 +1,13 @@
-"""Fig. 5: electrostatic force on a hovering finger, measured, by both closed forms, and by finite elements.
+"""Fig. 5: electrostatic force on a hovering finger, measured, by both closed forms, and by finite
+elements.
 
-Cases HVHD (2000 V, 0.50 mm), HVLD (2000 V, 0.25 mm), LVLD (1414 V, 0.25 mm). Measured: Table 1, with
-means 1.81, 2.95, 1.31 mN, medians 1.85, 2.73, 1.37 mN, standard deviations 0.547, 1.07, 0.558 mN. Closed
-forms: (8a), (8b) with (24) for each participant's own ellipsoid, full axes a_i, b_i, c_i cos 30 degrees,
-over the rectangle. Finite elements: Table 2's cross-section, deformable, in plane strain, times 8 and 10
-mm of width out of the plane. Expected: Kaczmarek's law within about 10 % of the medians, Strong-Troxel's
-1.4 to 1.9 times above; a smooth rigid outline gives 0.1976, 0.4036, 0.2017 mN/mm, and letting it deform
-adds 0.4 to 1.6 %.
+Cases HVHD (2000 V, 0.50 mm), HVLD (2000 V, 0.25 mm), LVLD (1414 V, 0.25 mm). Measured: Table 1,
+with means 1.81, 2.95, 1.31 mN, medians 1.85, 2.73, 1.37 mN, standard deviations 0.547, 1.07, 0.558
+mN. Closed forms: (8a), (8b) with (24) for each participant's own ellipsoid, full axes a_i, b_i,
+c_i cos 30 degrees, over the rectangle. Finite elements: Table 2's cross-section, deformable, in
+plane strain, times 8 and 10 mm of width out of the plane. Expected: Kaczmarek's law within about
+10 % of the medians, Strong-Troxel's 1.4 to 1.9 times above; a smooth rigid outline gives 0.1976,
+0.4036, 0.2017 mN/mm, and letting it deform adds 0.4 to 1.6 %.
 """
 
 from __future__ import annotations
@@ -59,7 +60,9 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Statistics of the measurements, forces of both laws per participant and by finite elements, verdict."""
+    """Statistics of the measurements, forces of both laws per participant and by finite elements,
+    verdict.
+    """
     forces = participant_forces()
     elements = {
         (model, case): hover_force(ridges, gap, voltage, "coarse" if quick else "medium")
@@ -81,7 +84,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 @cache
 def hover_force(ridges: bool, gap: float, voltage: float, resolution: str = "medium") -> float:
-    """Attraction in N/mm of Table 2's deformable finger held `gap` mm above the display, Kaczmarek's law."""
+    """Attraction in N/mm of Table 2's deformable finger held `gap` mm above the display,
+    Kaczmarek's law.
+    """
     from evfem.contact.surfaces import Display
     from evfem.finger.fingerpad import FingerPad
     from evfem.scene.motion import Hover

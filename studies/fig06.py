@@ -1,9 +1,10 @@
-"""Fig. 6: friction with and without voltage, and the contact area that each law needs to explain it.
+"""Fig. 6: friction with and without voltage, and the contact area that each law needs to explain
+it.
 
-Meyer et al.: 140 V, mu = 0.3, attraction 0.25 +- 0.01 N. The paper fits A = k F_n^m: k = 125.359 with
-Kaczmarek's law (16a), 0.446 with Strong-Troxel's (16b), m = 0.489, for d_sc = 0.1 mm and d_i = 0.001 mm.
-Expected: the two k differ by the ratio of contact pressures, about 281; 0.25 N is reached at F_n = 0.69
-N.
+Meyer et al.: 140 V, mu = 0.3, attraction 0.25 +- 0.01 N. The paper fits A = k F_n^m: k = 125.359
+with Kaczmarek's law (16a), 0.446 with Strong-Troxel's (16b), m = 0.489, for d_sc = 0.1 mm and d_i
+= 0.001 mm. Expected: the two k differ by the ratio of contact pressures, about 281; 0.25 N is
+reached at F_n = 0.69 N.
 """
 
 from __future__ import annotations

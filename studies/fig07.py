@@ -1,8 +1,8 @@
 """Fig. 7: attraction of touching skin over the permittivities of stratum corneum and insulator.
 
-Meyer et al.: 100 mm2, d_sc = 0.200 mm, d_i = 0.001 mm, 140 V effective; eps_sc 1e3 to 1e4, eps_i 1 to 10.
-The paper reads 0.05-0.35 N off (5) and 10-600 N off (3), against 0.05-0.35 N measured; recomputed (5) spans
-0.036-0.360 N and (3) 6.0-602 N.
+Meyer et al.: 100 mm2, d_sc = 0.200 mm, d_i = 0.001 mm, 140 V effective; eps_sc 1e3 to 1e4, eps_i 1
+to 10. The paper reads 0.05-0.35 N off (5) and 10-600 N off (3), against 0.05-0.35 N measured;
+recomputed (5) spans 0.036-0.360 N and (3) 6.0-602 N.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Fig. 8: attraction of touching skin over the voltage, for stratum corneum 0.1 to 0.5 mm thick.
 
-Meyer et al.: 100 mm2, d_i = 0.001 mm. The caption takes all other parameters from Table 2, but its d_i =
-0.09 mm would give about 1 mN; with the 0.001 mm of the display measured, (5) gives 0.24 to 0.029 N at
-140 V and so spans the measured 0.05-0.35 N, while (3) is far above. Expected: those two numbers.
+Meyer et al.: 100 mm2, d_i = 0.001 mm. The caption takes all other parameters from Table 2, but its
+d_i = 0.09 mm would give about 1 mN; with the 0.001 mm of the display measured, (5) gives 0.24 to
+0.029 N at 140 V and so spans the measured 0.05-0.35 N, while (3) is far above. Expected: those two
+numbers.
 """
 
 from __future__ import annotations

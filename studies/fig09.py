@@ -1,8 +1,9 @@
 """Fig. 9: a hovering finger taken for a flat plate, for areas from 10 to 50 mm2.
 
 Table 2, equations (6) and (7), against the boxes of Table 1. Expected: the right growth with the
-voltage, the wrong one with the distance (a plate's force falls too fast), and areas of only 10 to 20 mm2
-to meet the measured forces. (Recomputed for the medians: 12 to 29 mm2 by (6), 31 to 53 mm2 by (7).)
+voltage, the wrong one with the distance (a plate's force falls too fast), and areas of only 10 to
+20 mm2 to meet the measured forces. (Recomputed for the medians: 12 to 29 mm2 by (6), 31 to 53 mm2
+by (7).)
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Fig. 10: a hovering finger as an ellipsoid, for stratum corneum of 0.27, 0.38 and 0.49 mm.
 
 Equations (8a), (8b) with (24), full axes 16.70 x 12.80 x 22.5 mm, Table 2, integrated over the
-rectangle. Expected at 0.38 mm for HVLD / LVLD / HVHD (the paper, and recomputed): 5.24 / 2.62 / 2.54
-(5.217 / 2.608 / 2.542) mN by (8a), 2.95 / 1.47 / 1.76 (2.947 / 1.473 / 1.753) mN by (8b). (8a) hardly
-changes with the thickness.
+rectangle. Expected at 0.38 mm for HVLD / LVLD / HVHD (the paper, and recomputed): 5.24 / 2.62 /
+2.54 (5.217 / 2.608 / 2.542) mN by (8a), 2.95 / 1.47 / 1.76 (2.947 / 1.473 / 1.753) mN by (8b).
+(8a) hardly changes with the thickness.
 """
 
 from __future__ import annotations

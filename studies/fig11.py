@@ -1,9 +1,11 @@
-"""Fig. 11: what the air layer around the contact adds to the attraction, with and without fingerprint ridges.
+"""Fig. 11: what the air layer around the contact adds to the attraction, with and without
+fingerprint ridges.
 
-Press to ten loads of 0.01 to 0.1 N/mm, then 1000 V with the load held. (9b) counts every node at its gap,
-(10) only what touches; their relative difference is fitted by (11), alpha F_n^-beta, F_n in N/mm. The crest
-of the ridges is calibrated on Adams' ratio of ridge to gross contact area (Fig. 6b), not on this figure.
-Expected (the paper, its caption's order corrected): 0.17 and 0.49 with ridges, 0.03 and 0.65 without.
+Press to ten loads of 0.01 to 0.1 N/mm, then 1000 V with the load held. (9b) counts every node at
+its gap, (10) only what touches; their relative difference is fitted by (11), alpha F_n^-beta, F_n
+in N/mm. The crest of the ridges is calibrated on Adams' ratio of ridge to gross contact area (Fig.
+6b), not on this figure. Expected (the paper, its caption's order corrected): 0.17 and 0.49 with
+ridges, 0.03 and 0.65 without.
 """
 
 from __future__ import annotations
@@ -101,7 +103,9 @@ TABLE_2_PAD = Pad(exponent=7.0)
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to ask the question: the pad (its `ridges` are set per question), the run, the evaluation."""
+    """One way to ask the question: the pad (its `ridges` are set per question), the run, the
+    evaluation.
+    """
 
     label: str
     pad: Pad = TABLE_2_PAD
@@ -186,7 +190,9 @@ def answer(
 
 
 def area_ratio(pad: Pad, runs: Runs, loads: tuple[float, ...]) -> Floats:
-    """Width of touching ridges over the gross width of contact, without voltage, averaged over the phases."""
+    """Width of touching ridges over the gross width of contact, without voltage, averaged over the
+    phases.
+    """
     widths = [runs[Case(one, loads)].widths() for one in phases(pad)]
     return np.sum([real for real, _ in widths], axis=0) / np.sum([gross for _, gross in widths], axis=0)
 
@@ -200,7 +206,9 @@ def adams_ratio(loads: Sequence[float]) -> Floats:
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """The four forces over the load, alpha and beta; in full also calibration, mesh and sensitivities."""
+    """The four forces over the load, alpha and beta; in full also calibration, mesh and
+    sensitivities.
+    """
     loads = QUICK_LOADS if quick else LOADS
     base = replace(BASE, pad=Pad(resolution="coarse")) if quick else BASE
     variants = {} if quick else VARIANTS
@@ -279,7 +287,9 @@ def _at(loads: tuple[float, ...], values: Floats, load: float = 0.05) -> float:
 
 
 def _over_paper(pad: str, found: Answer, loads: tuple[float, ...]) -> dict[str, float]:
-    """The relative contribution over that of the paper's fit: geometric mean and extremes over the loads."""
+    """The relative contribution over that of the paper's fit: geometric mean and extremes over the
+    loads.
+    """
     alpha, beta = PAPER_FIT[pad]
     over = found.ratio / (alpha * np.asarray(loads) ** -beta)
     mean = float(np.exp(np.mean(np.log(over))))
@@ -304,7 +314,9 @@ def _numbers(answers: Mapping[str, Answer], loads: tuple[float, ...]) -> dict[st
 
 
 def _ratio_numbers(ratios: Mapping[str, Floats], loads: tuple[float, ...]) -> dict[str, float]:
-    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it would be least."""
+    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it would be
+    least.
+    """
     adams = adams_ratio(loads)
     misfit = {name: np.sqrt(np.mean(np.log(ratio / adams) ** 2)) for name, ratio in ratios.items()}
     numbers = {f"calibration.{name}.rms_log_misfit": value for name, value in misfit.items()}

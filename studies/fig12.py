@@ -1,9 +1,10 @@
 """Fig. 12: a friction step and a sinusoidal texture, rendered on a display by (20a) and exactly.
 
-[a] friction rises from 0.5 to 0.6 at x = 5 mm; [b] the texture (25) with friction 0.1, on a display with
-the smallest apparent friction that the texture has. Pads with ridges (as in the paper) and without. Expected
-(the paper): [a] 1776.73 V, r = 0.9995; [b] smallest apparent friction 0.072, r = 0.988, in one instant
-1911.12 V. Exact encoding: relative L2 error of the friction force below 1e-6.
+[a] friction rises from 0.5 to 0.6 at x = 5 mm; [b] the texture (25) with friction 0.1, on a
+display with the smallest apparent friction that the texture has. Pads with ridges (as in the
+paper) and without. Expected (the paper): [a] 1776.73 V, r = 0.9995; [b] smallest apparent friction
+0.072, r = 0.988, in one instant 1911.12 V. Exact encoding: relative L2 error of the friction force
+below 1e-6.
 """
 
 from __future__ import annotations
@@ -108,10 +109,11 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
 
 
 def _where_possible(outcome: Outcome) -> tuple[float, float]:
-    """Relative L2 error of the exact encoding over the steps it can serve, and the share of the others.
+    """Relative L2 error of the exact encoding over the steps it can serve, and the share of the
+    others.
 
-    Out of reach are steps in which the friction force on the display is not the wished one: while part of the
-    contact sticks, and where the display has more than that of its own.
+    Out of reach are steps in which the friction force on the display is not the wished one: while
+    part of the contact sticks, and where the display has more than that of its own.
     """
     found = outcome.rendered["exact"]
     error = found.force - outcome.force

@@ -1,8 +1,10 @@
-"""Fig. 13: the pad on the texture and on the display that renders it, at the instant of the largest voltage.
+"""Fig. 13: the pad on the texture and on the display that renders it, at the instant of the
+largest voltage.
 
-The slide of Fig. 12 [b]: von Mises stress of the deformed pad with ridges on the sinusoid (25) and, at the
-same position, on the display under (20a). Expected (the paper): 1911.12 V in the instant shown. Beside the
-figure the fields of both go to ParaView: fig13_reference.pvd and fig13_display.pvd.
+The slide of Fig. 12 [b]: von Mises stress of the deformed pad with ridges on the sinusoid (25)
+and, at the same position, on the display under (20a). Expected (the paper): 1911.12 V in the
+instant shown. Beside the figure the fields of both go to ParaView: fig13_reference.pvd and
+fig13_display.pvd.
 """
 
 from __future__ import annotations
@@ -70,7 +72,9 @@ class Instant:
         return self.position[self.frame.contact_status > 0]
 
     def near(self) -> Any:
-        """Which cells lie within 1 mm of the contact: by their middle and the nearest touching node."""
+        """Which cells lie within 1 mm of the contact: by their middle and the nearest touching
+        node.
+        """
         middle = self.position[self.result.mesh.cells].mean(axis=1)
         distance = np.hypot(*(middle[:, None] - self.touching[None]).transpose(2, 0, 1))
         return distance.min(axis=1) <= NEAR

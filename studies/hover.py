@@ -1,4 +1,6 @@
-"""Shared by Figs 9 and 10: attraction of a hovering finger over voltage and distance, with measured boxes."""
+"""Shared by Figs 9 and 10: attraction of a hovering finger over voltage and distance, with
+measured boxes.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +42,9 @@ def case_numbers(force: Force, parameters: Mapping[str, float]) -> dict[str, flo
 
 
 def verdict(numbers: Mapping[str, float], key: str) -> dict[str, float]:
-    """Computed over measured median per case, and the trends of laws and measurement, at parameter `key`."""
+    """Computed over measured median per case, and the trends of laws and measurement, at parameter
+    `key`.
+    """
     median = {case: float(np.median(participants()[case])) for case in CASES}
     found = {
         "verdict.measured.HVLD_over_LVLD": median["HVLD"] / median["LVLD"],
@@ -55,7 +59,9 @@ def verdict(numbers: Mapping[str, float], key: str) -> dict[str, float]:
 
 
 def curves(force: Force, parameters: Mapping[str, float], quick: bool) -> list[Series]:
-    """mN over the voltage at 0.25 mm and over the distance at 2000 V, one series per law and parameter."""
+    """mN over the voltage at 0.25 mm and over the distance at 2000 V, one series per law and
+    parameter.
+    """
     voltage, gap = (
         np.linspace(1000.0, 2500.0, 16 if quick else 61),
         np.linspace(0.0, 0.75, 16 if quick else 151),
@@ -77,7 +83,9 @@ def curves(force: Force, parameters: Mapping[str, float], quick: bool) -> list[S
 def draw(
     series: list[Series], parameters: Mapping[str, float], names: Mapping[str, str], top: float
 ) -> Figure:
-    """Panel a over voltage, b over distance; curves in the law's colour, thicker for later parameters."""
+    """Panel a over voltage, b over distance; curves in the law's colour, thicker for later
+    parameters.
+    """
     from matplotlib.lines import Line2D
 
     figure = new_figure(3.9)

@@ -1,15 +1,16 @@
-"""Which law, and why: electrostatics says Strong-Troxel, the measured forces of this paper say Kaczmarek.
+"""Which law, and why: electrostatics says Strong-Troxel, the measured forces of this paper say
+Kaczmarek.
 
-Fact 1, theory. The skin's permittivity is so high that its surface is as good as a conductor. For a
-conducting cylinder (radius 8.34 mm, half of Table 2's width) over an electrode under a dielectric slab
-(0.09 mm, 3.35) the field can be computed to 2e-6 or better (line charges with their images in the slab).
-Expected: Strong-Troxel's law, integrated over the curved pad, is its parallel-plate limit and within a
-few per cent; Kaczmarek's is about half as large. Without a slab the closed form gives 0.906597 mN/mm at
-0.25 mm and 2000 V.
+Fact 1, theory. The skin's permittivity is so high that its surface is as good as a conductor. For
+a conducting cylinder (radius 8.34 mm, half of Table 2's width) over an electrode under a
+dielectric slab (0.09 mm, 3.35) the field can be computed to 2e-6 or better (line charges with
+their images in the slab). Expected: Strong-Troxel's law, integrated over the curved pad, is its
+parallel-plate limit and within a few per cent; Kaczmarek's is about half as large. Without a slab
+the closed form gives 0.906597 mN/mm at 0.25 mm and 2000 V.
 
-Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is within about 10 % of the
-medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two differ most: 24.1 kPa
-against 1.39 kPa at 2000 V.
+Fact 2, measurement. Over the eleven participants of Table 1 Kaczmarek's law is within about 10 %
+of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, the two differ most:
+24.1 kPa against 1.39 kPa at 2000 V.
 """
 
 from __future__ import annotations
@@ -101,14 +102,15 @@ def _cylinder_numbers(pads: EllipsoidalPad) -> dict[str, float]:
 def cylinder_over_slab(
     gap: float, slab: Layer | None = None, radius: float = RADIUS, voltage: float = VOLTAGE
 ) -> float:
-    """Attraction in N/mm of a conducting cylinder `gap` mm above a dielectric `slab` on an electrode.
+    """Attraction in N/mm of a conducting cylinder `gap` mm above a dielectric `slab` on an
+    electrode.
 
     Line charges inside the cylinder, on a circle around the focus of the nearly equivalent bipolar
-    coordinates, with their images: a charge at height h over a slab of thickness d and permittivity e on
-    a grounded plane has the images b, and -(1 - b^2) b^(n-1) at depth h + 2 n d, n = 1, 2, ..., b = (1 -
-    e)/(1 + e) (W. R. Smythe, Static and Dynamic Electricity, 1968, chapter 4, by matching D and
-    potential at the slab). Their strengths follow from the potential on the cylinder; the force is that
-    of all images on all charges.
+    coordinates, with their images: a charge at height h over a slab of thickness d and
+    permittivity e on a grounded plane has the images b, and -(1 - b^2) b^(n-1) at depth h + 2 n d,
+    n = 1, 2, ..., b = (1 - e)/(1 + e) (W. R. Smythe, Static and Dynamic Electricity, 1968, chapter
+    4, by matching D and potential at the slab). Their strengths follow from the potential on the
+    cylinder; the force is that of all images on all charges.
     """
     if slab is None:
         table = data.load("table2")

@@ -1,4 +1,6 @@
-"""Independent computations side by side in processes, or one after the other where that is not possible."""
+"""Independent computations side by side in processes, or one after the other where that is not
+possible.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +19,12 @@ Answer = TypeVar("Answer")
 def side_by_side(
     function: Callable[[Argument], Answer], arguments: Sequence[Argument], workers: int = 2
 ) -> list[Answer]:
-    """`function` of each argument, in their order; `workers` processes take the next one as they get free.
+    """`function` of each argument, in their order; `workers` processes take the next one as they
+    get free.
 
-    The function must belong to a module. With one worker, and where new processes cannot start (a script
-    that runs a study outside ``if __name__ == "__main__"``), everything happens in this process.
+    The function must belong to a module. With one worker, and where new processes cannot start (a
+    script that runs a study outside ``if __name__ == "__main__"``), everything happens in this
+    process.
     """
     if workers == 1 or len(arguments) == 1:
         return [function(argument) for argument in arguments]

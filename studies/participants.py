@@ -1,13 +1,15 @@
-"""Eleven participants, two laws, three hover cases by finite elements, as one sweep; measurements beside it.
+"""Eleven participants, two laws, three hover cases by finite elements, as one sweep; measurements
+beside it.
 
-Each participant has a finger of his or her own: width and height a_i, b_i of Table 1, bone, nail and the
-layers below the stratum corneum scaled with the width from Table 2's finger; stratum corneum, ridges and
-moduli are Table 2's. The bone is held, the tissue deforms. A plane model gives N/mm: the force in mN is that
-times the width out of the plane over which a rigid, smooth ellipsoid of the participant's axes (8a), (8b),
-(24) has the same force as its cross-section alone. So what differs from the closed forms of Fig. 5 is what
-deformation and ridges do. Expected: together they take away 2 to 6 %, about the same for everybody (ridges
-more, deformation gives some back), so that the closed forms' differences from the measured forces, up to a
-factor of three for fingers of the same size, are not theirs to explain.
+Each participant has a finger of his or her own: width and height a_i, b_i of Table 1, bone, nail
+and the layers below the stratum corneum scaled with the width from Table 2's finger; stratum
+corneum, ridges and moduli are Table 2's. The bone is held, the tissue deforms. A plane model gives
+N/mm: the force in mN is that times the width out of the plane over which a rigid, smooth ellipsoid
+of the participant's axes (8a), (8b), (24) has the same force as its cross-section alone. So what
+differs from the closed forms of Fig. 5 is what deformation and ridges do. Expected: together they
+take away 2 to 6 %, about the same for everybody (ridges more, deformation gives some back), so
+that the closed forms' differences from the measured forces, up to a factor of three for fingers of
+the same size, are not theirs to explain.
 """
 
 from __future__ import annotations
@@ -59,7 +61,9 @@ SCALED = (
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Forces per participant, law and case by finite elements, beside the closed forms and those measured."""
+    """Forces per participant, law and case by finite elements, beside the closed forms and those
+    measured.
+    """
     names = participants()["participant"][: 3 if quick else None]
     # few points: starting processes costs more than they save
     table = sweep(plan(names), workers=1 if quick else None)
@@ -90,7 +94,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 
 def plan(names: list[str]) -> Sweep:
-    """The sweep: a coarse finger of Table 2 hovering over its display; laws, cases and participants."""
+    """The sweep: a coarse finger of Table 2 hovering over its display; laws, cases and
+    participants.
+    """
     values, measured = data.load("table2"), participants()
     scene = {
         "version": 1,
@@ -124,7 +130,9 @@ def _finger(width: float, height: float) -> dict[str, float]:
 
 
 def widths(count: int) -> dict[tuple[str, str], Floats]:
-    """(law, case) -> width out of the plane in mm of each participant, from the rigid closed forms."""
+    """(law, case) -> width out of the plane in mm of each participant, from the rigid closed
+    forms.
+    """
     pads, layers = participant_pads(), table2_layers()
     found = {}
     for name, law in LAWS.items():

@@ -1,4 +1,6 @@
-"""A pad pressed to a series of loads, with and without voltage: the runs, and what its outline tells."""
+"""A pad pressed to a series of loads, with and without voltage: the runs, and what its outline
+tells.
+"""
 
 from __future__ import annotations
 
@@ -64,8 +66,9 @@ class Pad:
 
 @dataclass(frozen=True)
 class Case:
-    """One run through the loads (N/mm). Without friction the order of load and voltage does not matter, and
-    the voltage is there from the start; with friction it comes on under each load, unless `voltage_first`.
+    """One run through the loads (N/mm). Without friction the order of load and voltage does not
+    matter, and the voltage is there from the start; with friction it comes on under each load,
+    unless `voltage_first`.
     """
 
     pad: Pad
@@ -87,8 +90,8 @@ class Case:
 class Pressed:
     """The outline at every load: L loads, P nodes in the order of `outline_nodes`.
 
-    `points` (P, 2) before deformation, `thickness` (P,) of the stratum corneum, `x`, `gap`, `touching` (L,
-    P), and the solver's attraction `force` (L,) in N/mm (zero without voltage).
+    `points` (P, 2) before deformation, `thickness` (P,) of the stratum corneum, `x`, `gap`,
+    `touching` (L, P), and the solver's attraction `force` (L,) in N/mm (zero without voltage).
     """
 
     case: Case
@@ -106,7 +109,9 @@ class Pressed:
         return contact_spans(self.x[load], self.gap[load], self.touching[load])
 
     def widths(self) -> tuple[Floats, Floats]:
-        """Width of real contact, and from its outermost left to its outermost right end, per load (mm)."""
+        """Width of real contact, and from its outermost left to its outermost right end, per load
+        (mm).
+        """
         real, gross = [], []
         for load, x in enumerate(self.x):
             ends = np.interp(self.spans(load), np.arange(x.size), x)
@@ -115,7 +120,9 @@ class Pressed:
         return np.array(real), np.array(gross)
 
     def line(self, load: int, area: str) -> Floats:
-        """Coordinate along the outline whose differences are the lengths of an area convention (P,), mm."""
+        """Coordinate along the outline whose differences are the lengths of an area convention
+        (P,), mm.
+        """
         if area == "projected":
             return self.x[load]
         if area == "reference":
@@ -132,7 +139,9 @@ class Pressed:
         return np.asarray(LAWS[law].traction(gap, voltage, layers))
 
     def shares(self, load: int, area: str) -> Floats:
-        """Length of outline per node as (9b) needs it: 1/6, 4/6, 1/6 of every quadratic edge (P,), mm."""
+        """Length of outline per node as (9b) needs it: 1/6, 4/6, 1/6 of every quadratic edge (P,),
+        mm.
+        """
         line = self.line(load, area)
         edge = np.maximum(line[2::2] - line[:-2:2], 0.0)
         share = np.zeros_like(line)
@@ -153,7 +162,8 @@ class Pressed:
     def contact_only(
         self, voltage: float, law: str, area: str = "projected", thickness: Any = None, nodal: bool = False
     ) -> Floats:
-        """(10): attraction of what touches, per load (N/mm), between the interpolated ends of contact.
+        """(10): attraction of what touches, per load (N/mm), between the interpolated ends of
+        contact.
 
         `nodal` takes the touching nodes with their shares instead, as the sum in (10) is written.
         """
@@ -235,7 +245,9 @@ def run_all(cases: Iterable[Case], processes: int = 1) -> dict[Case, Pressed]:
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """New processes use one thread in dense algebra: with more, they only wait for each other's cores."""
+    """New processes use one thread in dense algebra: with more, they only wait for each other's
+    cores.
+    """
     before = os.environ.get("OMP_NUM_THREADS")
     os.environ["OMP_NUM_THREADS"] = "1"
     try:

@@ -1,6 +1,8 @@
-"""Scenes and runs of the rendering studies: a friction step and a texture, felt and rendered on a display.
+"""Scenes and runs of the rendering studies: a friction step and a texture, felt and rendered on a
+display.
 
-What the paper leaves open is chosen here once: the load, the length of the slide, speed and viscosity.
+What the paper leaves open is chosen here once: the load, the length of the slide, speed and
+viscosity.
 """
 
 from __future__ import annotations
@@ -51,8 +53,9 @@ ASSUMPTIONS = {
 class Case:
     """One reference, and what is tried on the display; the defaults are those of the figures.
 
-    `friction` is that of the texture; without it the surface is level with a step in friction. `softness`
-    multiplies the moduli of all tissue, `crest` is the flat share of a ridge (and of a groove).
+    `friction` is that of the texture; without it the surface is level with a step in friction.
+    `softness` multiplies the moduli of all tissue, `crest` is the flat share of a ridge (and of a
+    groove).
     """
 
     friction: float | None = None
@@ -96,8 +99,9 @@ class Rendered:
 class Outcome:
     """A case: the reference over its slide, what the display needs and does, and the costs.
 
-    `position`, `load` and `force` (n,) of the slide's steps; `lowest_friction` is the smallest apparent
-    friction from `full_slip` (mm) on, `friction` that of the display, `signal` the closed form's voltage.
+    `position`, `load` and `force` (n,) of the slide's steps; `lowest_friction` is the smallest
+    apparent friction from `full_slip` (mm) on, `friction` that of the display, `signal` the closed
+    form's voltage.
     """
 
     case: Case
@@ -147,10 +151,12 @@ def reference_scene(case: Case, every: int = 1_000_000) -> Scene:
 
 
 def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tuple[float, float]:
-    """Smallest apparent friction of the reference after full slip, and the friction of the display.
+    """Smallest apparent friction of the reference after full slip, and the friction of the
+    display.
 
-    On the step the display has the coefficient before it; on texture the smallest apparent friction, or a
-    fifth of the texture's own coefficient if that is larger (a negative one cannot be had).
+    On the step the display has the coefficient before it; on texture the smallest apparent
+    friction, or a fifth of the texture's own coefficient if that is larger (a negative one cannot
+    be had).
     """
     lowest = felt.minimum(after=full_slip)
     if case.friction is None:
@@ -167,8 +173,8 @@ def display_encoding(friction: float) -> Encoding:
 def render(case: Case) -> Outcome:
     """Run the reference of a case, and the display with each of its encodings.
 
-    Encodings: "open" replays (20a), "exact" solves for the voltage, "thick" replays (20a) on a pad with
-    Table 2's 0.38 mm of stratum corneum.
+    Encodings: "open" replays (20a), "exact" solves for the voltage, "thick" replays (20a) on a pad
+    with Table 2's 0.38 mm of stratum corneum.
     """
     begin = time.process_time()
     reference = record(reference_scene(case))

@@ -1,10 +1,10 @@
 """Section 3.2.1: thickness of the stratum corneum from two perception thresholds.
 
-Strong and Troxel: one finger feels 73 V through 0.5 mil and 110 V through 1.0 mil of an insulator with
-eps_r = 4.5 alike. Equal tangential forces give the thickness of the stratum corneum (eps_r = 2000) by
-Strong-Troxel's law, equation (21), or by Kaczmarek's, (23). Expected (the paper, and recomputed): 2.74
-(2.746) um of d_sc / eps_sc, hence 5.48 (5.49) mm, and 76.2 (76.17) um; about 300 um is generally
-accepted.
+Strong and Troxel: one finger feels 73 V through 0.5 mil and 110 V through 1.0 mil of an insulator
+with eps_r = 4.5 alike. Equal tangential forces give the thickness of the stratum corneum (eps_r =
+2000) by Strong-Troxel's law, equation (21), or by Kaczmarek's, (23). Expected (the paper, and
+recomputed): 2.74 (2.746) um of d_sc / eps_sc, hence 5.48 (5.49) mm, and 76.2 (76.17) um; about 300
+um is generally accepted.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def _printed_factor(lower: float, higher: float) -> float:
 
 
 def _force_ratio(law: str, thickness: Any, voltages: Any, films: Any, eps_sc: float) -> Any:
-    """Force through the thinner insulator over that through the thicker one, each at its threshold."""
+    """Force through the thinner insulator over that through the thicker one, each at its
+    threshold.
+    """
     thin, thick = (
         LAWS[law].traction(0.0, u, Layers.of(Layer(thickness, eps_sc), film))
         for u, film in zip(voltages, films, strict=True)

@@ -1,15 +1,18 @@
-"""How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed, by the fast model.
+"""How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed, by the fast
+model.
 
-Fast model: (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by quadrature. It is adequate
-because the fingers hover: nothing touches. What it leaves out, the study measures on some of its own samples
-by deformable finite elements (a sweep of scenes): deformation adds a few per cent with Kaczmarek's law, more
-with Strong-Troxel's at the smallest gaps, where it moves that law farther from what was measured. A condensed
-finite element model would be slower here: it must be built anew for every thickness and every finger.
+Fast model: (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by quadrature. It
+is adequate because the fingers hover: nothing touches. What it leaves out, the study measures on
+some of its own samples by deformable finite elements (a sweep of scenes): deformation adds a few
+per cent with Kaczmarek's law, more with Strong-Troxel's at the smallest gaps, where it moves that
+law farther from what was measured. A condensed finite element model would be slower here: it must
+be built anew for every thickness and every finger.
 
-Each sample has one value of every input for all participants (an instrument that is off is off for all); the
-answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed. Expected: the air gap
-matters most, then the stratum corneum (Kaczmarek alone) and the inclination; the permittivity of skin does
-not matter; Kaczmarek's law lies within the measured medians' intervals, Strong-Troxel's above them.
+Each sample has one value of every input for all participants (an instrument that is off is off for
+all); the answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed.
+Expected: the air gap matters most, then the stratum corneum (Kaczmarek alone) and the inclination;
+the permittivity of skin does not matter; Kaczmarek's law lies within the measured medians'
+intervals, Strong-Troxel's above them.
 """
 
 from __future__ import annotations
@@ -77,7 +80,9 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Distribution of the median force by both laws in each case, what it depends on, and the check."""
+    """Distribution of the median force by both laws in each case, what it depends on, and the
+    check.
+    """
     samples = Samples(INPUTS, 60 if quick else COUNT, SEED)
     drawn = samples.draw()
     medians = {(law, case): np.median(forces(drawn, law, case), axis=1) for law in LAWS for case in CASES}
@@ -114,8 +119,8 @@ def _layers(one: dict[str, Any]) -> Layers:
 
 
 def check(samples: Samples, count: int) -> dict[str, float]:
-    """Deformable finite elements over the rigid cross-section, smallest and largest ratio less 1: the mean
-    finger, smooth and coarse, in `count` of the samples, both laws and all cases.
+    """Deformable finite elements over the rigid cross-section, smallest and largest ratio less 1:
+    the mean finger, smooth and coarse, in `count` of the samples, both laws and all cases.
     """
     drawn = samples.draw()
     picked = np.linspace(0, samples.count - 1, count).astype(int)

@@ -286,7 +286,9 @@ def test_a_disk_that_fills_up_is_exit_status_4_and_what_was_written_is_whole(pla
 
 
 def interrupted(place, number):
-    """Start the long scene, send a signal after some steps; returns exit status and standard error."""
+    """Start the long scene, send a signal after some steps; returns exit status and standard
+    error.
+    """
     (place / "square.toml").write_text(MANY_STEPS)
     words, environment = process_of("run", "square.toml")
     with subprocess.Popen(words, cwd=place, env=environment, stderr=subprocess.PIPE, text=True) as process:

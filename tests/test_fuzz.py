@@ -1,4 +1,6 @@
-"""Hostile input: damaged files of every format, and files made to take all memory or time, get a sentence."""
+"""Hostile input: damaged files of every format, and files made to take all memory or time, get a
+sentence.
+"""
 
 import base64
 import io

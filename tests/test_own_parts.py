@@ -1,4 +1,6 @@
-"""Parts of one's own, each from scratch in under fifteen lines; mypy checks them against the protocols."""
+"""Parts of one's own, each from scratch in under fifteen lines; mypy checks them against the
+protocols.
+"""
 
 import inspect
 from collections.abc import Callable, Mapping

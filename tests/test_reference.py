@@ -1,4 +1,6 @@
-"""Closed forms against printed numbers, limits and themselves (loads as integrals, forces as slopes)."""
+"""Closed forms against printed numbers, limits and themselves (loads as integrals, forces as
+slopes).
+"""
 
 import math
 import re

@@ -1,4 +1,6 @@
-"""Pointwise algebra against numpy.linalg on single points, and the complex step against known derivatives."""
+"""Pointwise algebra against numpy.linalg on single points, and the complex step against known
+derivatives.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it arrives."""
+"""The command in a terminal of 80 columns: a real pseudo-terminal, whose text is read as it
+arrives.
+"""
 
 import io
 import logging
@@ -194,7 +196,9 @@ def test_notices_are_shown_once_and_the_logger_is_left_as_it_was(capsys):
 
 
 def test_compiling_is_told_once():
-    """A loop of the package says that it is compiled, one of others does not, without numba nobody."""
+    """A loop of the package says that it is compiled, one of others does not, without numba
+    nobody.
+    """
     if find_spec("numba") is None:
         return
     from evfem.tissue.kernels import lanes

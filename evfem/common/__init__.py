@@ -1,1 +1,3 @@
-"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices, views."""
+"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices,
+views.
+"""

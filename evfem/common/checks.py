@@ -1,7 +1,8 @@
 """Checks of a user's input; each returns the clean value or raises InputError.
 
-First checks of single values (`real`, `count`, `choice`), then of numbers or arrays of numbers (`above`,
-`at_least`, `finite`), then rules that the fields of a dataclass carry and `check_fields` applies.
+First checks of single values (`real`, `count`, `choice`), then of numbers or arrays of numbers
+(`above`, `at_least`, `finite`), then rules that the fields of a dataclass carry and `check_fields`
+applies.
 """
 
 from __future__ import annotations
@@ -124,7 +125,8 @@ def one_of(*names: str) -> dict[str, Any]:
 
 
 def check_fields(target: Any) -> None:
-    """Check and store every field of a frozen dataclass that has a rule; a default None may stay None.
+    """Check and store every field of a frozen dataclass that has a rule; a default None may stay
+    None.
 
     >>> from dataclasses import dataclass, field
     >>> @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Every constant of the contact and equilibrium solvers in one table.
 
-None of them decides what is accepted: an accepted step satisfies the scene's tolerance whatever they are.
-They decide how an equilibrium is found, and how soon. "seen in" names the scenes in which another value was
-worse; the groups are those of `evfem study stability`, A and B the scenes of `evfem study peers`. What a user
-may change is in `evfem.solver.strategy`.
+None of them decides what is accepted: an accepted step satisfies the scene's tolerance whatever
+they are. They decide how an equilibrium is found, and how soon. "seen in" names the scenes in
+which another value was worse; the groups are those of `evfem study stability`, A and B the scenes
+of `evfem study peers`. What a user may change is in `evfem.solver.strategy`.
 
 ======================  ========================================================================  ==========
 constant                meaning                                                                   seen in

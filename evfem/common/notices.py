@@ -1,7 +1,9 @@
-"""What the package tells a person who waits: lines, progress bars, and a status that goes when it is done.
+"""What the package tells a person who waits: lines, progress bars, and a status that goes when it
+is done.
 
-Lines and details are records of the logger `evfem`, so that a caller may show them in another way: INFO is
-worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to standard error.
+Lines and details are records of the logger `evfem`, so that a caller may show them in another way:
+INFO is worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to
+standard error.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ PATIENCE, EVERY = 1.0, 0.5
 
 
 def wrapped(text: str, stream: TextIO) -> str:
-    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
+    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep
+    their lines.
 
     >>> import io
     >>> wrapped("one sentence " * 20, io.StringIO()).count(chr(10))
@@ -93,7 +96,9 @@ def drawable() -> bool:
 
 
 def _columns() -> int | None:
-    """None leaves the width to tqdm, which draws nothing in a terminal that says it is 0 columns wide."""
+    """None leaves the width to tqdm, which draws nothing in a terminal that says it is 0 columns
+    wide.
+    """
     try:
         known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
     except (OSError, ValueError, AttributeError):  # no terminal
@@ -112,7 +117,8 @@ class _Newest(logging.Handler):
 
 @contextmanager
 def status(label: str) -> Iterator[None]:
-    """Inside, a terminal shows `label`, the seconds so far and the newest detail, after a second of waiting.
+    """Inside, a terminal shows `label`, the seconds so far and the newest detail, after a second
+    of waiting.
 
     Elsewhere nothing is shown.
     """

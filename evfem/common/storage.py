@@ -1,8 +1,9 @@
-"""Files that are either complete or untouched: written beside their place, then moved there in one step.
+"""Files that are either complete or untouched: written beside their place, then moved there in one
+step.
 
-This holds when the process is killed at any moment and when the disk is full; nothing is forced through the
-disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other processes out of
-a folder.
+This holds when the process is killed at any moment and when the disk is full; nothing is forced
+through the disk's own cache, so a power failure may cost the last steps. `alone_in` keeps other
+processes out of a folder.
 """
 
 from __future__ import annotations
@@ -49,9 +50,11 @@ HEADER = re.compile(
 
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """A temporary path in the folder of `path`; what was written there takes the place of `path` at the end.
+    """A temporary path in the folder of `path`; what was written there takes the place of `path`
+    at the end.
 
-    On an error inside the block nothing changes. Raises StorageError when the disk or folder refuses.
+    On an error inside the block nothing changes. Raises StorageError when the disk or folder
+    refuses.
 
     >>> with replacing("numbers.txt") as temporary:
     ...     _ = temporary.write_text("1 2 3")
@@ -92,10 +95,11 @@ def disk(doing: str) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Inside, this is the only process at work in `folder`, which is made, and removed if it is left empty.
+    """Inside, this is the only process at work in `folder`, which is made, and removed if it is
+    left empty.
 
-    The lock belongs to the opened folder, so that nothing is written for it and it ends with the process,
-    however that ends. Raises StorageError where another one has it, or the disk refuses.
+    The lock belongs to the opened folder, so that nothing is written for it and it ends with the
+    process, however that ends. Raises StorageError where another one has it, or the disk refuses.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     with disk(f"use {folder}"):
@@ -112,7 +116,9 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no locks."""
+    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no
+    locks.
+    """
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
     except ModuleNotFoundError:  # Windows
@@ -150,7 +156,9 @@ def refuse_others(manifest: Path, present: Iterable[str], owner: str) -> None:
 
 
 def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
-    """Write named arrays of numbers or text to one .npz file, in one step and without pickled objects."""
+    """Write named arrays of numbers or text to one .npz file, in one step and without pickled
+    objects.
+    """
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise InputError(name, "an array of Python objects", "numbers or text")
@@ -163,9 +171,9 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
 def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
     """All arrays of such a file whose array `format` says `form`.
 
-    Takes no more memory than the file is long, and at most 4 GB: compressed members, objects and arrays that
-    are not as long as their headers say are refused. Raises InputError(key, ...) for a missing, cut off,
-    damaged or foreign file, StorageError when the disk refuses.
+    Takes no more memory than the file is long, and at most 4 GB: compressed members, objects and
+    arrays that are not as long as their headers say are refused. Raises InputError(key, ...) for a
+    missing, cut off, damaged or foreign file, StorageError when the disk refuses.
     """
     allowed = f"a file of the format {form}"
     try:

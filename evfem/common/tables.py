@@ -20,8 +20,8 @@ MOST_ROWS = 1_000_000
 
 
 def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
-    """Value at x of rows (place, value): linear between them, constant beyond the ends; place must not
-    decrease.
+    """Value at x of rows (place, value): linear between them, constant beyond the ends; place must
+    not decrease.
 
     At a repeated place the later row holds from that place on. Only the real part of x counts.
 
@@ -36,7 +36,8 @@ def piecewise_linear(place: Floats, value: Floats, x: Any) -> Floats:
 
 
 def piecewise_slope(place: Floats, value: Floats, x: Any) -> Floats:
-    """Slope at x of the same rows: 0 beyond the ends, jumps left out, on a row that of the piece behind it.
+    """Slope at x of the same rows: 0 beyond the ends, jumps left out, on a row that of the piece
+    behind it.
 
     >>> piecewise_slope(np.array([0.0, 1.0, 1.0]), np.array([0.0, 4.0, 9.0]), [-1.0, 0.5, 1.0, 2.0]).tolist()
     [0.0, 4.0, 0.0, 0.0]
@@ -78,10 +79,11 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 
 
 def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
-    """Columns of a csv file whose first line is `header` and whose other lines hold one number per column.
+    """Columns of a csv file whose first line is `header` and whose other lines hold one number per
+    column.
 
-    Raises `InputError` with `key` for a file that cannot be read or has anything else in it, or more than
-    `MOST_ROWS` rows.
+    Raises `InputError` with `key` for a file that cannot be read or has anything else in it, or
+    more than `MOST_ROWS` rows.
     """
     allowed = f"a readable csv file with the header {','.join(header)}"
     columns = [array("d") for _ in header]

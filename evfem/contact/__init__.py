@@ -1,1 +1,3 @@
-"""Where finger and surface meet: surfaces, pad, attraction, Signorini-Coulomb on the dense compliance."""
+"""Where finger and surface meet: surfaces, pad, attraction, Signorini-Coulomb on the dense
+compliance.
+"""

@@ -1,9 +1,9 @@
 r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
 
-The attraction is a boundary traction that depends on the current gap, the weak form `attraction` below. What
-runs is its nodal rule: each pad node j carries the pressure p(g_j) of its current gap on its current
-projected length A_j. On linear edges that is the form with its quadrature points at the nodes; on quadratic
-edges the rule shares out the chord's projection instead of the curve's.
+The attraction is a boundary traction that depends on the current gap, the weak form `attraction`
+below. What runs is its nodal rule: each pad node j carries the pressure p(g_j) of its current gap
+on its current projected length A_j. On linear edges that is the form with its quadrature points at
+the nodes; on quadratic edges the rule shares out the chord's projection instead of the curve's.
 
 Trial states that penetrate count as touching, g = 0.
 
@@ -35,7 +35,9 @@ TOUCHING = 1e-9
 
 @form
 def attraction(u: Any, v: Any, w: Any) -> Any:
-    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap below X + u."""
+    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap
+    below X + u.
+    """
     T = np.stack([-w.n[1], w.n[0]])
     width = positive_part(mul(deformation_gradient(u), T)[0])
     x, y = w.x[0] + u[0], w.x[1] + u[1]
@@ -45,8 +47,8 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Attraction:
-    """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface` the
-    electrode's outline.
+    """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface`
+    the electrode's outline.
     """
 
     law: Any
@@ -57,7 +59,9 @@ class Attraction:
     air_layer: bool = True
 
     def forces(self, position: Floats, voltage: float, touching: Any) -> Floats:
-        """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air layer."""
+        """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
+        layer.
+        """
         if voltage == 0.0:
             return np.zeros_like(position)
         frame = surface_state(self.surface, position)
@@ -72,8 +76,8 @@ class Attraction:
         return np.stack([sideways + weight * frame.slope, -weight], axis=1)
 
     def negative_stiffness(self, position: Floats, voltage: float, touching: Any) -> Floats:
-        """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm per mm;
-        0 where it touches: there contact holds the gap.
+        """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm
+        per mm; 0 where it touches: there contact holds the gap.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)

@@ -1,16 +1,16 @@
-r"""The linearised body as its contact candidates see it: a dense compliance, and the contact problem posed on
-it. For the plane: a node has one slip, and forces follow a profile over x.
+r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
+problem posed on it. For the plane: a node has one slip, and forces follow a profile over x.
 
-With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel under a
-prescribed force, the squared voltage under a prescribed friction force) that push with p,
+With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel
+under a prescribed force, the squared voltage under a prescribed friction force) that push with p,
 
 .. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
           S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
 
-:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns with
-the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
-:math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the nodes near
-contact, so it is put into their small block alone.
+:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns
+with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
+:math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
+nodes near contact, so it is put into their small block alone.
 
 Algorithm (`LinearContactStep.solve`)::
 
@@ -58,12 +58,12 @@ LOST_STABILITY = (
 class Candidates:
     """What is known of the c candidate nodes at the iterate.
 
-    The `surface` below them, slip since the last accepted state (c,) in mm, contact forces (c, 2) along
-    normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes over x (c,) in
-    1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0 for exact contact, 1 /
-    (penalty x tributary length) for the penalty variant, which thereby needs no other solver. The attraction
-    weakens with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
-    (c,) N/mm where the gap is closed.
+    The `surface` below them, slip since the last accepted state (c,) in mm, contact forces (c, 2)
+    along normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes
+    over x (c,) in 1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0
+    for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
+    needs no other solver. The attraction weakens with a node's gap by `negative_stiffness` (c,)
+    N/mm per mm and is stronger by `gain_on_closing` (c,) N/mm where the gap is closed.
     """
 
     surface: SurfaceState
@@ -83,12 +83,13 @@ class Candidates:
         return np.stack([np.stack([-sin, cos], axis=1), np.stack([cos, sin], axis=1)], axis=1)
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force in the laboratory frame per x displacement of its node, (c, 2): it
-        turns with the profile, and friction grows where its coefficient does.
+        """Change of the contact force in the laboratory frame per x displacement of its node, (c,
+        2): it turns with the profile, and friction grows where its coefficient does.
 
-        `own` (c,) is the compliance of each node along x. Where friction falls along the way faster than the
-        tissue stiffens, a node snaps forward and has no equilibrium at the slope: its friction is then left
-        at the present coefficient, and the iterations go the way of the snap.
+        `own` (c,) is the compliance of each node along x. Where friction falls along the way
+        faster than the tissue stiffens, a node snaps forward and has no equilibrium at the slope:
+        its friction is then left at the present coefficient, and the iterations go the way of the
+        snap.
         """
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
@@ -101,8 +102,9 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses (c,), the
-    extra unknowns, number of dense contact solves, and whether the negative stiffness had to be scaled down.
+    """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses
+    (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
+    had to be scaled down.
     """
 
     moved: Floats
@@ -115,8 +117,8 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """The condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates, coupled by
-    the attraction.
+    """The condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates,
+    coupled by the attraction.
     """
 
     schur: Floats
@@ -130,7 +132,9 @@ class CondensedTangent:
         return cls(schur, _inverse(inner, symmetric=coupling is None))
 
     def among(self, near: Ints) -> Floats:
-        """Compliance among these candidates (2 k, 2 k), y before x; they are often those of the last call."""
+        """Compliance among these candidates (2 k, 2 k), y before x; they are often those of the
+        last call.
+        """
         key = near.tobytes()
         if key not in self._last:
             rows = y_before_x(near)
@@ -146,10 +150,11 @@ class CondensedTangent:
 
 @dataclass(frozen=True, eq=False)
 class ExtraUnknown:
-    """A number that a step has to find beside the displacements, and the force on the bone that settles it.
+    """A number that a step has to find beside the displacements, and the force on the bone that
+    settles it.
 
-    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose force shall be
-    `force` (N/mm).
+    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose
+    force shall be `force` (N/mm).
     """
 
     push: Floats
@@ -159,11 +164,11 @@ class ExtraUnknown:
 
 @dataclass(frozen=True, eq=False)
 class LinearContactStep:
-    """One linear step of the condensed body: contact is solved on it, and the candidates' displacement comes
-    back.
+    """One linear step of the condensed body: contact is solved on it, and the candidates'
+    displacement comes back.
 
-    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known increment; `unknowns` what else moves
-    the body; `snap`: nodes that the attraction pulls over the gap close at once.
+    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known increment; `unknowns` what
+    else moves the body; `snap`: nodes that the attraction pulls over the gap close at once.
     """
 
     body: CondensedTangent
@@ -202,8 +207,8 @@ class LinearContactStep:
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
-        """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step has been
-        solved with that unknown, a `travel` of the bone, given instead.
+        """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step
+        has been solved with that unknown, a `travel` of the bone, given instead.
         """
         unknown = self.unknowns[0]
         bone = self.bone.copy()
@@ -217,7 +222,9 @@ class LinearContactStep:
         return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
 
     def _free_motion(self) -> Floats:
-        """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 + p)."""
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 +
+        p).
+        """
         right = self.residual[:-2] - self._present - self.body.schur[:-2, -2:] @ self.bone
         return self.body.compliance @ np.column_stack(
             [right, *(unknown.push[:-2] for unknown in self.unknowns)]
@@ -235,8 +242,8 @@ class LinearContactStep:
         return self.body.compliance @ force
 
     def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y before x, that
-        move the body, those of the follower stiffness included.
+        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y
+        before x, that move the body, those of the follower stiffness included.
         """
         known, rows = self.candidates, y_before_x(near)
         follower = FollowerStiffness.of(known, near, np.diagonal(self.body.compliance)[0::2])
@@ -288,8 +295,8 @@ class LinearContactStep:
 
 @dataclass(frozen=True, eq=False)
 class FollowerStiffness:
-    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y per x
-    displacement of the loaded nodes. Components of others come y before x.
+    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y
+    per x displacement of the loaded nodes. Components of others come y before x.
     """
 
     size: int
@@ -298,16 +305,16 @@ class FollowerStiffness:
 
     @classmethod
     def of(cls, candidates: Candidates, near: Ints, own: Floats) -> FollowerStiffness:
-        """Of the `near` nodes, all with their `own` compliance (c,) along x; on a flat surface without slopes
-        of friction no node is loaded.
+        """Of the `near` nodes, all with their `own` compliance (c,) along x; on a flat surface
+        without slopes of friction no node is loaded.
         """
         rate = candidates.follower_rate(own)[near]
         loaded = np.flatnonzero(rate.any(axis=1))
         return cls(near.size, loaded, rate[loaded])
 
     def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
-        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small system, T
-        has few columns.
+        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small
+        system, T has few columns.
         """
         if not self.loaded.size:
             return C, W
@@ -347,7 +354,9 @@ def y_before_x(nodes: Ints) -> Ints:
 
 
 def _local(axes: Floats, columns: Floats) -> Floats:
-    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat surface."""
+    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat
+    surface.
+    """
     if not axes[:, 0, 0].any():
         return columns
     y, x = columns.reshape(2, len(axes), -1)

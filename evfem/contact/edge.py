@@ -1,11 +1,12 @@
-r"""Where contact begins and ends between two nodes: the edge of a smooth contact, interpolated from the gap.
+r"""Where contact begins and ends between two nodes: the edge of a smooth contact, interpolated
+from the gap.
 
 The nodes that touch tell the width of contact only to about one element per contact, too much for
-fingerprint ridges that are a dozen elements wide. Beyond the edge a of a smooth contact the gap opens like
-:math:`(x - a)^{3/2}` (Hertz; Johnson, Contact Mechanics, doi:10.1017/CBO9781139171731, ch. 4), so
-:math:`y = g^{2/3}` starts linearly. Where the outline curves away, y grows faster: an exponential through
-the first three open nodes, :math:`y = y_1 + b (e^{k (x - x_1)} - 1)`, has its zero at the edge; its limit
-k = 0 is the straight line. Lengths in mm.
+fingerprint ridges that are a dozen elements wide. Beyond the edge a of a smooth contact the gap
+opens like :math:`(x - a)^{3/2}` (Hertz; Johnson, Contact Mechanics, doi:10.1017/CBO9781139171731,
+ch. 4), so :math:`y = g^{2/3}` starts linearly. Where the outline curves away, y grows faster: an
+exponential through the first three open nodes, :math:`y = y_1 + b (e^{k (x - x_1)} - 1)`, has its
+zero at the edge; its limit k = 0 is the straight line. Lengths in mm.
 """
 
 from __future__ import annotations
@@ -23,10 +24,11 @@ Flags = npt.NDArray[np.bool_]
 
 
 def outline_nodes(mesh: Mesh) -> Ints:
-    """Mesh numbers (P,) of the nodes on `pad` along the outline, in growing x on the side that faces down.
+    """Mesh numbers (P,) of the nodes on `pad` along the outline, in growing x on the side that
+    faces down.
 
-    On quadratic meshes ends and middles of edges alternate. Raises InputError where the pad is not one open
-    line.
+    On quadratic meshes ends and middles of edges alternate. Raises InputError where the pad is not
+    one open line.
 
     >>> from evfem.finger.fingerpad import FingerPad
     >>> mesh = FingerPad(resolution="coarse").mesh(order=2)
@@ -72,8 +74,8 @@ def contact_spans(x: Floats, gap: Floats, touching: Flags) -> Floats:
 
 
 def _reach(x: Floats, gap: Floats, touching: Flags, last: int, step: int, wide: bool) -> float:
-    """How far contact reaches beyond the node `last`, in spacings of nodes: from -1/2 (0 for a lone node)
-    to 1.
+    """How far contact reaches beyond the node `last`, in spacings of nodes: from -1/2 (0 for a
+    lone node) to 1.
     """
     outside: list[int] = []
     for node in range(last + step, last + 4 * step, step):

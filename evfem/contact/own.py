@@ -21,7 +21,8 @@ LENGTH = 1e-4
 def completed(surface: Surface) -> CompleteSurface:
     """The surface itself if it has everything, else an `OwnSurface` around it.
 
-    Raises InputError for an object without `height(x)`, and for a friction, y or insulator that cannot be.
+    Raises InputError for an object without `height(x)`, and for a friction, y or insulator that
+    cannot be.
 
     >>> class Ramp:
     ...     friction = 0.3
@@ -43,7 +44,9 @@ def completed(surface: Surface) -> CompleteSurface:
 
 @dataclass(frozen=True)
 class OwnSurface:
-    """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
+    """A user's surface `own` with derivatives, and with what it does not say itself taken from
+    `plain`.
+    """
 
     own: Any
     plain: Flat

@@ -1,11 +1,11 @@
-r"""The outline that faces the surface: pad nodes, tributary lengths projected on x, gaps, normals and contact
-widths.
+r"""The outline that faces the surface: pad nodes, tributary lengths projected on x, gaps, normals
+and contact widths.
 
-A pad edge with ends a, b carries :math:`\max(0, x_b - x_a)` of projected length, shared 1/2, 1/2 between its
-nodes, or 1/6, 4/6, 1/6 on quadratic edges (the outward normal faces down exactly where x grows along the
-edge, the body being on its left). The vertical gap is :math:`g = y - h(x)`, positive when open; normal and
-tangent of the surface are :math:`n = (-h', 1)/r`, :math:`t = (1, h')/r`, :math:`r = \sqrt{1 + h'^2}`. Arrays:
-P pad nodes in ascending number.
+A pad edge with ends a, b carries :math:`\max(0, x_b - x_a)` of projected length, shared 1/2, 1/2
+between its nodes, or 1/6, 4/6, 1/6 on quadratic edges (the outward normal faces down exactly where
+x grows along the edge, the body being on its left). The vertical gap is :math:`g = y - h(x)`,
+positive when open; normal and tangent of the surface are :math:`n = (-h', 1)/r`,
+:math:`t = (1, h')/r`, :math:`r = \sqrt{1 + h'^2}`. Arrays: P pad nodes in ascending number.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ SHARES = {2: np.array([0.5, 0.5]), 3: np.array([1.0, 1.0, 4.0]) / 6.0}
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those not on the
-    bone).
+    """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those
+    not on the bone).
 
-    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free` (P,) bool.
+    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free`
+    (P,) bool.
     """
 
     nodes: Ints
@@ -46,7 +47,9 @@ class Pad:
         return np.bincount(self.edges.ravel(), shared, self.nodes.size).astype(float, copy=False)
 
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
+        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node,
+        value).
+        """
         start, end = self.edges[:, :1], self.edges[:, 1:2]
         facing = (x[end] > x[start]) * self.shares
         of = np.broadcast_to(self.edges, facing.shape).ravel()
@@ -58,8 +61,8 @@ class Pad:
         )
 
     def contact_widths(self, x: Floats, touching: Any) -> tuple[float, float]:
-        """Overall and real contact width (mm): outer ends of the first and last touching node's share,
-        and the sum of all shares.
+        """Overall and real contact width (mm): outer ends of the first and last touching node's
+        share, and the sum of all shares.
         """
         if not touching.any():
             return 0.0, 0.0
@@ -114,8 +117,8 @@ class SurfaceState:
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at current node positions (P, 2); `surface` has y set, so that h(x) = surface.y +
-    surface.height(x).
+    """Surface frame at current node positions (P, 2); `surface` has y set, so that h(x) =
+    surface.y + surface.height(x).
     """
     x = position[:, 0]
     if surface.is_flat:

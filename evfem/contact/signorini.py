@@ -1,10 +1,11 @@
 r"""Unilateral contact with Coulomb friction, solved exactly on the dense compliance of the contact
 candidates.
 
-For k candidates in their local frames (n normal, t tangential), with the contact forces :math:`\lambda` the
-new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d are optional extra unknowns (the
-bone's travel under a prescribed force, the squared voltage under a prescribed friction force) with the
-equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
+For k candidates in their local frames (n normal, t tangential), with the contact forces
+:math:`\lambda` the new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d are
+optional extra unknowns (the bone's travel under a prescribed force, the squared voltage under a
+prescribed friction force) with the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb
+ask, per node, for exactly one of
 
 ========  ==========================  =================================================
 status    equations                   stays if
@@ -15,9 +16,10 @@ FORWARD   g = 0, lam_t = -mu lam_n    lam_n >= 0 and s >= 0
 BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 ========  ==========================  =================================================
 
-The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it has become,
-its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs none, its gap is known:
-the attraction is what it is at g = 0. So a thin insulator's steep law acts only where it can.
+The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
+has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
+none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
+only where it can.
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -30,18 +32,21 @@ Algorithm (`solve_contact`), a primal-dual active set::
         change all violated nodes; only the worst one if these statuses have been met before
     start again from all nodes sticking, then from all open, before giving up
 
-A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to slip with
-the sign of its force when it leaves the cone, from slip to stick (never straight to the other slip) when it
-moves along its own friction. It passes through slip between open and stick: one that sticks beside a pulling
-shear force would seem to open. No constant has to be chosen. What has not converged is never used.
+A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
+slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
+other slip) when it moves along its own friction. It passes through slip between open and stick:
+one that sticks beside a pulling shear force would seem to open. No constant has to be chosen. What
+has not converged is never used.
 
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution;
-its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
+If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
+solution; its negative stiffness is then scaled to 0.9 of the critical value
+(`solve_with_attraction`).
 
-Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175, doi:10.1016/0045-7825(86)90095-2 (the
-frictional problem as complementarity); P. Alart and A.
-Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X; S. Hueeber, G.
-Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061 (primal-dual active set).
+Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175,
+doi:10.1016/0045-7825(86)90095-2 (the frictional problem as complementarity); P. Alart and A.
+Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X; S.
+Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061
+(primal-dual active set).
 """
 
 from __future__ import annotations
@@ -62,8 +67,8 @@ class ContactNotSolved(ArithmeticError):
 
 @dataclass(frozen=True)
 class ExtraUnknowns:
-    """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations that settle
-    them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,).
+    """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations
+    that settle them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,).
     """
 
     columns: Floats
@@ -74,9 +79,9 @@ class ExtraUnknowns:
 
 @dataclass(frozen=True)
 class AttractionStiffness:
-    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,) per unit
-    of gap from its value at `reference_gap` (k,) while open, and is stronger by `gain_on_closing` (k,) at g =
-    0.
+    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
+    per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
+    `gain_on_closing` (k,) at g = 0.
     """
 
     negative_stiffness: Floats
@@ -86,10 +91,11 @@ class AttractionStiffness:
 
 @dataclass(frozen=True)
 class ContactProblem:
-    """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients (k,),
-    optional extra_unknowns.
+    """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients
+    (k,), optional extra_unknowns.
 
-    The first k entries are normal (gap, pressing force), the last k tangential (slip, shear force).
+    The first k entries are normal (gap, pressing force), the last k tangential (slip, shear
+    force).
     """
 
     start: Floats
@@ -104,14 +110,17 @@ class ContactProblem:
         return self.friction.size
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given statuses."""
+        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given
+        statuses.
+        """
         return _solve_statuses(self, status)
 
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns (p,), new gaps
-    and slips (2 k,), the number of dense solves, and whether the negative stiffness had to be scaled down.
+    """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns
+    (p,), new gaps and slips (2 k,), the number of dense solves, and whether the negative stiffness
+    had to be scaled down.
     """
 
     force: Floats
@@ -124,9 +133,9 @@ class ContactSolution:
 
 
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
-    """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from all nodes
-    sticking or all open; raises `ContactNotSolved` when none of them ends within `ACTIVE_SET_LIMIT` solves
-    and one per node.
+    """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from
+    all nodes sticking or all open; raises `ContactNotSolved` when none of them ends within
+    `ACTIVE_SET_LIMIT` solves and one per node.
     """
     most, failed = ACTIVE_SET_LIMIT + problem.size, ContactNotSolved("")
     for start in (status, np.full(problem.size, STICK), np.full(problem.size, OPEN)):
@@ -138,8 +147,8 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
 
 
 def lost_stability(problem: ContactProblem) -> bool:
-    """Whether the body gives way the more, the more it is loaded: its compliance, which contains the forces
-    that turn with the profile, is not positive.
+    """Whether the body gives way the more, the more it is loaded: its compliance, which contains
+    the forces that turn with the profile, is not positive.
     """
     C = problem.compliance
     return bool(np.linalg.eigvalsh(0.5 * (C + C.T))[0] < 0.0)
@@ -170,9 +179,10 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted.
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the linear problem
-    has no solution or the wrong one. Its negative stiffness is then scaled to `STABLE` of the critical value,
-    which goes the right way in small steps; with `snap` the nodes that are being lost close instead.
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
+    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
+    `STABLE` of the critical value, which goes the right way in small steps; with `snap` the nodes
+    that are being lost close instead.
     """
     if not attraction.negative_stiffness.any():
         return solve_contact(problem, status)
@@ -196,8 +206,8 @@ def solve_with_attraction(
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> tuple[float, Floats]:
-    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held, and
-    the gaps (k,) that grow with it.
+    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes
+    held, and the gaps (k,) that grow with it.
     """
     k, C, stiffness = problem.size, problem.compliance, attraction.negative_stiffness
     free, closed = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), np.flatnonzero(status != OPEN)
@@ -216,8 +226,8 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
 
 
 def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> Ints:
-    """Statuses (k,) with those open nodes closed that move most in the mode that is being lost, if it is on
-    its way to the surface.
+    """Statuses (k,) with those open nodes closed that move most in the mode that is being lost, if
+    it is on its way to the surface.
     """
     factor, mode = _feedback(problem, attraction, status)
     drift = solve_contact(problem, status).state[: problem.size] - attraction.reference_gap
@@ -228,8 +238,8 @@ def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: I
 
 
 def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
-    """Contact forces (2 k,), drops of the attraction (2 k,) and extra unknowns (p,) for given statuses: one
-    dense linear system.
+    """Contact forces (2 k,), drops of the attraction (2 k,) and extra unknowns (p,) for given
+    statuses: one dense linear system.
     """
     k, C, extra = problem.size, problem.compliance, problem.extra_unknowns
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
@@ -271,8 +281,8 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
 def _next_statuses(
     problem: ContactProblem, status: Ints, force: Floats, state: Floats
 ) -> tuple[Ints, Floats]:
-    """Statuses that the solution asks for, and by how much each node violates its own, in comparable
-    units.
+    """Statuses that the solution asks for, and by how much each node violates its own, in
+    comparable units.
     """
     k, mu = problem.size, problem.friction
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]

@@ -1,11 +1,12 @@
-"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient, insulator.
+"""Rigid counter-surfaces: height, slope and curvature of the outline, friction coefficient,
+insulator.
 
-A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED profile: the
-scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical gap of the undeformed
-finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear between its rows, constant beyond
-them; at a repeated x the later row holds from that x on. `insulator` is the layer between the surface and
-the electrode under it (None: no electrode). x may be any array, real or complex (for
-`tensor.complex_step`); the results have its shape.
+A surface is a function height(x) in mm; the finger is above it. The methods give the UNSHIFTED
+profile: the scene adds `y` (mm), and where `y` is None chooses it so that the smallest vertical
+gap of the undeformed finger is 0. `friction` is a number, or a table [[x, mu], ...]: linear
+between its rows, constant beyond them; at a repeated x the later row holds from that x on.
+`insulator` is the layer between the surface and the electrode under it (None: no electrode). x may
+be any array, real or complex (for `tensor.complex_step`); the results have its shape.
 """
 
 from __future__ import annotations
@@ -45,7 +46,9 @@ EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi 
 
 
 class _Surface:
-    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`, `insulator`."""
+    """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
+    `insulator`.
+    """
 
     friction: float | Rows
     y: float | None
@@ -90,7 +93,8 @@ class _Surface:
 
     @property
     def friction_jumps(self) -> Array:
-        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from there on.
+        """Jumps of the friction coefficient, (J, 3): position in mm, coefficient before and from
+        there on.
 
         >>> Flat(friction=[[0.0, 0.5], [2.0, 0.5], [2.0, 0.6]]).friction_jumps.tolist()
         [[2.0, 0.5, 0.6]]
@@ -165,7 +169,8 @@ class Flat(_Level):
 
 @dataclass(frozen=True)
 class Display(_Level):
-    """A level display: an insulator over an electrode, by default that of Table 2 (0.09 mm, eps_r 3.35).
+    """A level display: an insulator over an electrode, by default that of Table 2 (0.09 mm, eps_r
+    3.35).
 
     >>> Display().insulator
     Layer(thickness=0.09, eps_r=3.35)
@@ -183,8 +188,8 @@ class Display(_Level):
 class Sinusoid(_Surface):
     """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
 
-    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the paper,
-    height(x) = 0.025 (sin 6x + cos 12x - 1).
+    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the
+    paper, height(x) = 0.025 (sin 6x + cos 12x - 1).
 
     >>> float(Sinusoid().height(0.0))
     0.0
@@ -224,11 +229,12 @@ class Sinusoid(_Surface):
 
 @dataclass(frozen=True, eq=False, init=False)
 class Profile(_Surface):
-    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond the ends.
+    """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond
+    the ends.
 
-    x must increase; at least two points (kept as `x` and `samples`). Between two samples the height stays
-    between their heights, its slope is continuous, its curvature jumps at samples. Source: Fritsch and
-    Carlson, SIAM J. Numer. Anal. 17 (1980) 238-246, doi:10.1137/0717021.
+    x must increase; at least two points (kept as `x` and `samples`). Between two samples the
+    height stays between their heights, its slope is continuous, its curvature jumps at samples.
+    Source: Fritsch and Carlson, SIAM J. Numer. Anal. 17 (1980) 238-246, doi:10.1137/0717021.
 
     >>> Profile([0.0, 1.0, 2.0], [0.0, 0.5, 0.0]).height(np.array([-1.0, 1.0, 1.5])).tolist()
     [0.0, 0.5, 0.375]
@@ -262,7 +268,9 @@ class Profile(_Surface):
         y: float | None = None,
         insulator: Layer | None = None,
     ) -> Profile:
-        """The profile in a file with the header `x,height` and one point (mm) in each further line."""
+        """The profile in a file with the header `x,height` and one point (mm) in each further
+        line.
+        """
         x, height = read_columns(Path(path), ["x", "height"], "surface.file")
         return cls(x, height, friction, y, insulator)
 
@@ -274,7 +282,9 @@ class Profile(_Surface):
 
     @cached_property
     def _cubics(self) -> Array:
-        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left end."""
+        """Coefficients (4, pieces) of the powers 3, 2, 1, 0 of the distance from a piece's left
+        end.
+        """
         from scipy.interpolate import PchipInterpolator
 
         with np.errstate(over="ignore"):  # slopes next to nothing have infinite inverses, and so vanish

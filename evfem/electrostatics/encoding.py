@@ -1,8 +1,10 @@
-"""Closed-form rendering: from the friction of a real surface to a display's voltage, (1), (12)-(20b).
+"""Closed-form rendering: from the friction of a real surface to a display's voltage, (1),
+(12)-(20b).
 
-Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is ``F_e = A p(0, U)`` with
-the contact area ``A = k F_n^m``; the air layer around it is left out. Units: mm, N, V. In plane strain,
-forces are per mm of depth; then only a linear area law (m = 1) keeps its k, in mm^2/N.
+Friction on a display is ``F_t = mu (F_n + F_e)``. The attraction of touching skin is
+``F_e = A p(0, U)`` with the contact area ``A = k F_n^m``; the air layer around it is left out.
+Units: mm, N, V. In plane strain, forces are per mm of depth; then only a linear area law (m = 1)
+keeps its k, in mm^2/N.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ class AreaLaw:
         return plain(self.k * np.asarray(force) ** self.m)
 
     def linearised(self, highest: float) -> AreaLaw:
-        """The line through the origin closest to this law in least squares over 0 <= F_n <= `highest`.
+        """The line through the origin closest to this law in least squares over 0 <= F_n <=
+        `highest`.
 
         k' = 3 k highest^(m - 1) / (m + 2): what the paper's k' in (20a) stands for.
 
@@ -53,10 +56,11 @@ class AreaLaw:
 
 
 def required_attraction(friction: Values, display_friction: Values, normal_force: Values) -> Values:
-    """Attraction (force of `normal_force`'s unit) that makes the display feel like `friction`, equation (18).
+    """Attraction (force of `normal_force`'s unit) that makes the display feel like `friction`,
+    equation (18).
 
-    ``F_e = (mu_rs / mu_hd - 1) F_n``; 0 where the surface is slipperier than the display, because attraction
-    can only add friction (see `share_not_renderable`).
+    ``F_e = (mu_rs / mu_hd - 1) F_n``; 0 where the surface is slipperier than the display, because
+    attraction can only add friction (see `share_not_renderable`).
     """
     surface = at_least("friction", friction, 0.0, "a friction coefficient, not negative")
     display = above("display_friction", display_friction, 0.0, "a friction coefficient above zero")
@@ -66,7 +70,8 @@ def required_attraction(friction: Values, display_friction: Values, normal_force
 
 
 def share_not_renderable(position: Values, friction: Values, display_friction: float) -> float:
-    """Share of the path on which `friction` (linear between `position` in mm) is below the display's own.
+    """Share of the path on which `friction` (linear between `position` in mm) is below the
+    display's own.
 
     >>> share_not_renderable([0.0, 1.0, 2.0], [0.4, 0.6, 0.6], display_friction=0.5)
     0.25
@@ -85,11 +90,12 @@ def share_not_renderable(position: Values, friction: Values, display_friction: f
 
 @dataclass(frozen=True)
 class Encoding:
-    """A display with what is needed to encode friction as voltage: law, solid layers, area law, own friction.
+    """A display with what is needed to encode friction as voltage: law, solid layers, area law,
+    own friction.
 
-    The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with `StrongTroxel`;
-    (20a) and (20b) have a linear area law, where the voltage does not depend on the normal force. The
-    law must be quadratic in the voltage, as electrostatics is.
+    The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with
+    `StrongTroxel`; (20a) and (20b) have a linear area law, where the voltage does not depend on
+    the normal force. The law must be quadratic in the voltage, as electrostatics is.
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer
     >>> skin, film = Layer(0.20, 1650.0), Layer(0.09, 3.35)
@@ -127,8 +133,8 @@ class Encoding:
     def voltage_for_friction(self, friction: Values, normal_force: Values = 1.0) -> Values:
         """U in V that makes the display feel like `friction`, equations (19), (20a), (20b).
 
-        0 where the surface is slipperier than the display. `normal_force` in N matters only if m differs
-        from 1.
+        0 where the surface is slipperier than the display. `normal_force` in N matters only if m
+        differs from 1.
         """
         wanted = required_attraction(friction, self.friction, normal_force)
         return self.voltage_for_attraction(wanted, normal_force)
@@ -136,7 +142,9 @@ class Encoding:
 
 @dataclass(frozen=True)
 class PowerFit:
-    """``y = k x^m`` fitted to points, with the standard errors of both (infinite with only two points)."""
+    """``y = k x^m`` fitted to points, with the standard errors of both (infinite with only two
+    points).
+    """
 
     k: float
     m: float
@@ -148,8 +156,9 @@ def fit_power(x: Values, y: Values, *, relative: bool = True) -> PowerFit:
     """Least-squares fit of ``y = k x^m`` to at least two points.
 
     `relative` (the default) minimises the errors of ln y, which needs y > 0; otherwise those of y
-    itself. Area laws (15) are ``fit_power(normal_force, area)``; in (11), alpha is k and beta is -m.
-    Raises InputError for other than two equally long lists, x <= 0, or fewer than two different x.
+    itself. Area laws (15) are ``fit_power(normal_force, area)``; in (11), alpha is k and beta is
+    -m. Raises InputError for other than two equally long lists, x <= 0, or fewer than two
+    different x.
 
     >>> fit = fit_power([0.1, 0.5, 1.0], [63.0 * 0.1**0.68, 63.0 * 0.5**0.68, 63.0])
     >>> round(fit.k, 9), round(fit.m, 9)
@@ -196,7 +205,9 @@ def _straight_line(log_x: Floats, log_y: Floats) -> tuple[float, float]:
 
 
 def _standard_errors(jacobian: Floats, residual: Floats) -> Floats:
-    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters, points)."""
+    """Square roots of the diagonal of s^2 (J J^T)^-1, s^2 per degree of freedom; J (parameters,
+    points).
+    """
     freedom = residual.size - len(jacobian)
     if freedom == 0:
         return np.full(len(jacobian), np.inf)
@@ -209,9 +220,9 @@ def fit_area_to_friction(
 ) -> PowerFit:
     """Area law that explains friction measured with `voltage` on: (16a), (16b) fitted for k and m.
 
-    `display` gives law, layers and friction coefficient (its own area law is not used). Least squares in the
-    tangential force, in N; k in mm^2/N^m. The two laws give the same m, and k in the inverse ratio of their
-    contact pressures.
+    `display` gives law, layers and friction coefficient (its own area law is not used). Least
+    squares in the tangential force, in N; k in mm^2/N^m. The two laws give the same m, and k in
+    the inverse ratio of their contact pressures.
     """
     above("voltage", voltage, 0.0, "a voltage in V above zero")
     excess = np.asarray(tangential_force) / display.friction - np.asarray(normal_force)

@@ -1,10 +1,11 @@
-"""Friction over position as MPEG haptics: the JSON interchange file `.hjif` of ISO/IEC 23090-31:2025.
+"""Friction over position as MPEG haptics: the JSON interchange file `.hjif` of ISO/IEC
+23090-31:2025.
 
-Names, types and limits follow MPEG's reference software, which is public under a BSD licence: repository
-MPEGGroup/HapticReferenceSoftware, `source/IOHaptics/src/IOJson.cpp` and `source/Types`, commit 2de9ff1. It
-counts friction among the spatial modalities, whose positions are lengths in units of 10^unit_exponent m, and
-plays every band in ticks of 1 / timescale s. Here a tick is both: one unit of length, and the time the finger
-needs for it.
+Names, types and limits follow MPEG's reference software, which is public under a BSD licence:
+repository MPEGGroup/HapticReferenceSoftware, `source/IOHaptics/src/IOJson.cpp` and `source/Types`,
+commit 2de9ff1. It counts friction among the spatial modalities, whose positions are lengths in
+units of 10^unit_exponent m, and plays every band in ticks of 1 / timescale s. Here a tick is both:
+one unit of length, and the time the finger needs for it.
 """
 
 from __future__ import annotations
@@ -29,13 +30,14 @@ NO_AVATAR, ANY_BODY_PART = 0, 0
 
 
 def ticks(length: float, speed: float) -> tuple[int, int]:
-    """Unit exponent and ticks per second for `length` (mm) passed at `speed` (mm/s): the finest that fit.
+    """Unit exponent and ticks per second for `length` (mm) passed at `speed` (mm/s): the finest
+    that fit.
 
     >>> ticks(length=10.0, speed=20.0)  # micrometres
     (-6, 20000)
 
-    The ticks per second are whole, so that time can be 1 % off, in signals of minutes; InputError where it
-    would be more.
+    The ticks per second are whole, so that time can be 1 % off, in signals of minutes; InputError
+    where it would be more.
     """
     for exponent in range(-12, 1):
         unit = 10.0 ** (exponent + 3)
@@ -55,9 +57,10 @@ def document(
 
     .. math:: \mu(x) = \mu_0 + (\mu_1 - \mu_0) (U(x) / U_{full})^2
 
-    `friction` is (mu_0, mu_1): the display's own coefficient, and that at `full_scale` volts, because
-    attraction grows with the square of the voltage. A keyframe's amplitude times the channel's gain is mu.
-    `profile` has a length, `speed` is in mm/s; `signalfile.write_signal` checks all this.
+    `friction` is (mu_0, mu_1): the display's own coefficient, and that at `full_scale` volts,
+    because attraction grows with the square of the voltage. A keyframe's amplitude times the
+    channel's gain is mu. `profile` has a length, `speed` is in mm/s; `signalfile.write_signal`
+    checks all this.
 
     >>> file = document(VoltageProfile([0.0, 10.0], [0.0, 2000.0]), 2000.0, 20.0, (0.5, 0.6))
     >>> channel = file["perceptions"][0]["channels"][0]

@@ -1,4 +1,5 @@
-"""Electrostatic attraction between skin and an insulated electrode: solid layers and the two force laws.
+"""Electrostatic attraction between skin and an insulated electrode: solid layers and the two force
+laws.
 
 Both laws treat skin and electrode as parallel plates with solid layers (stratum corneum, insulator) and
 a gap in series. With ``s`` = sum of d / eps_r over the solid layers (`Layers.reduced`), ``D`` = their
@@ -8,11 +9,11 @@ and the voltage ``U``::
     StrongTroxel   p = e eps_0 U^2 / (2 (g + e s)^2)            equations (3), (6), (8a), (9a)
     Kaczmarek      p = e eps_0 U^2 / (2 (g + e s) (g + D))      equations (5), (7), (8b), (9b)
 
-`StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers stretch
-with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are positive where
-they attract. Equation numbers are those of the paper on modelling and validating electrovibration
-displays that the project starts from. Every function takes scalars or arrays that broadcast, real or
-complex (for derivatives by complex step); scalars give a float.
+`StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers
+stretch with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
+positive where they attract. Equation numbers are those of the paper on modelling and validating
+electrovibration displays that the project starts from. Every function takes scalars or arrays that
+broadcast, real or complex (for derivatives by complex step); scalars give a float.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ __all__ = ["Kaczmarek", "Layer", "Layers", "StrongTroxel", "eps_0", "traction_de
 
 @dataclass(frozen=True)
 class Layer:
-    """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or arrays.
+    """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or
+    arrays.
 
     >>> Layer(thickness=0.09, eps_r=3.35)
     Layer(thickness=0.09, eps_r=3.35)
@@ -55,7 +57,8 @@ class Layer:
 
 @dataclass(frozen=True)
 class Layers:
-    """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d, in mm.
+    """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d,
+    in mm.
 
     Both are numbers or arrays per node. `Layers.of` adds up any number of layers.
 
@@ -101,8 +104,8 @@ def _check_medium(gap_eps_r: float) -> None:
 class StrongTroxel:
     """Attraction of rigid layers over a movable gap, equations (3) and (6).
 
-    ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))`` with
-    ``p = dPi/dg``. A slightly negative gap (a penetrating trial state) continues the formula.
+    ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))``
+    with ``p = dPi/dg``. A slightly negative gap (a penetrating trial state) continues the formula.
     `gap_eps_r` is ``e``, the permittivity of what fills the gap: 1 for air.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
@@ -116,7 +119,9 @@ class StrongTroxel:
         _check_medium(self.gap_eps_r)
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be
+        infinite.
+        """
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         return plain(0.5 * self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2)
 
@@ -151,8 +156,9 @@ class Kaczmarek:
     """Attraction of layers that stretch with the gap, equations (5) and (7).
 
     ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
-    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for ``D -> e s``
-    both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap: 1 for air.
+    ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for
+    ``D -> e s`` both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap:
+    1 for air.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(1e3 * Kaczmarek().traction(0.0, 2000.0, layers), 2)         # kPa, touching skin
@@ -165,7 +171,9 @@ class Kaczmarek:
         _check_medium(self.gap_eps_r)
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be infinite."""
+        """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be
+        infinite.
+        """
         near, far = _lengths(gap, layers, self.gap_eps_r)
         return plain(0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far))
 
@@ -176,16 +184,20 @@ class Kaczmarek:
         return plain(-traction * (1.0 / near + 1.0 / far))
 
     def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
-        """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e s."""
+        """Pi in N/mm (= N mm per mm^2), zero at infinite gap; exact to rounding also where D = e
+        s.
+        """
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         ratio = np.asarray((layers.thickness - self.gap_eps_r * layers.reduced) / near)
         return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * _log1p_ratio(ratio))
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:
-    """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on `traction`.
+    """dp/dg in MPa/mm of any law: its own `traction_derivative`, else a complex step on
+    `traction`.
 
-    A law that drops the imaginary part (it takes absolute values, say) is differenced over `GAP_STEP`.
+    A law that drops the imaginary part (it takes absolute values, say) is differenced over
+    `GAP_STEP`.
     """
     own = getattr(law, "traction_derivative", None)
     if own is not None:

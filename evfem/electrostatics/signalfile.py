@@ -1,8 +1,9 @@
-"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv and WAV.
+"""Voltage signals in files: out as csv, 16-bit WAV, friction map and MPEG haptics, back from csv
+and WAV.
 
-A WAV runs over time, a signal over position; the sliding speed turns one into the other. What a file needs to
-be understood (volts of the largest sample, speed, first position) stands in its own comment. Units: V, mm,
-mm/s, Hz.
+A WAV runs over time, a signal over position; the sliding speed turns one into the other. What a
+file needs to be understood (volts of the largest sample, speed, first position) stands in its own
+comment. Units: V, mm, mm/s, Hz.
 """
 
 from __future__ import annotations
@@ -37,12 +38,13 @@ WAV_ALLOWED = f"a 16-bit mono WAV with evfem's comment ({WAV_FORM}) in it"
 
 @dataclass(frozen=True)
 class Playback:
-    """What turns volts over millimetres into a file for a device: the scale, and how the finger slides.
+    """What turns volts over millimetres into a file for a device: the scale, and how the finger
+    slides.
 
-    `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav and .hjif;
-    `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is the WAV's, `carrier`
-    (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which attracts like the effective U.
-    `pixel` (mm) is the width of a column of the friction map.
+    `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav
+    and .hjif; `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is
+    the WAV's, `carrier` (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which
+    attracts like the effective U. `pixel` (mm) is the width of a column of the friction map.
 
     >>> Playback(full_scale=2000.0, speed=-1.0)
     Traceback (most recent call last):
@@ -97,8 +99,8 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
       stands in the text chunk Comment (JSON), the size of a pixel in pHYs.
     - `.hjif`: MPEG haptics, see `hjif.document`.
 
-    Raises InputError for another ending, a profile without length, more volts than full scale, or something
-    missing in `playback`; StorageError when the disk refuses.
+    Raises InputError for another ending, a profile without length, more volts than full scale, or
+    something missing in `playback`; StorageError when the disk refuses.
 
     >>> slope = VoltageProfile([0.0, 5.0, 10.0], [0.0, 1500.0, 1500.0])
     >>> write_signal("slope.wav", slope, Playback(full_scale=2000.0, speed=20.0, rate=8000))
@@ -129,12 +131,14 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
 
 
 def read_signal(path: str | Path) -> VoltageProfile:
-    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for `Scene`.
+    """The voltage over the position in a `.wav` that `write_signal` wrote, or in a csv file, for
+    `Scene`.
 
-    A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the samples, linear
-    in between, so that a jump takes speed / rate mm. A file with another ending is taken for csv. Raises
-    InputError for `.png` and `.hjif`, a missing, cut off or foreign file, more than 1,000,000 rows, and a
-    WAV with a carrier, whose samples are not the effective voltage.
+    A WAV gives a row per sample: the voltage within half a step (full_scale / 32767) at the
+    samples, linear in between, so that a jump takes speed / rate mm. A file with another ending is
+    taken for csv. Raises InputError for `.png` and `.hjif`, a missing, cut off or foreign file,
+    more than 1,000,000 rows, and a WAV with a carrier, whose samples are not the effective
+    voltage.
     """
     ending = Path(path).suffix.lower()
     if ending == ".wav":

@@ -1,4 +1,5 @@
-"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make of it.
+"""Voltage as a function of position, its effective value, and what a carrier and an amplifier make
+of it.
 
 The laws need the effective voltage across skin and insulator. Units: V, mm (of bone position), s.
 """
@@ -25,10 +26,11 @@ LARGEST = 1e6
 
 @dataclass(frozen=True)
 class VoltageProfile:
-    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and the last.
+    """Voltage in V over the position in mm: linear between the rows, constant beyond the first and
+    the last.
 
-    Positions must not fall; at a repeated position the later row holds from that position on (a jump).
-    Calling the profile with positions gives voltages of the same shape.
+    Positions must not fall; at a repeated position the later row holds from that position on (a
+    jump). Calling the profile with positions gives voltages of the same shape.
 
     >>> profile = VoltageProfile([0.0, 5.0, 5.0], [0.0, 100.0, 400.0])
     >>> profile(2.5), profile(5.0), profile(9.0)
@@ -69,7 +71,8 @@ class VoltageProfile:
 
     @classmethod
     def from_csv(cls, path: str | Path) -> VoltageProfile:
-        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per point.
+        """Read a file with the header ``position,voltage`` and a row of numbers in mm and V per
+        point.
 
         Raises InputError for a missing file, another header, or a row that is not two numbers.
         """
@@ -81,7 +84,8 @@ class VoltageProfile:
         write_text(path, ",".join(HEADER) + "\n" + "".join(rows))
 
     def rms(self, start: float, stop: float) -> float:
-        """Root mean square in V over start <= position <= stop: exact, since the profile is piecewise linear.
+        """Root mean square in V over start <= position <= stop: exact, since the profile is
+        piecewise linear.
 
         At constant speed this is the mean over time. The mean attraction follows rms(U)^2.
         """
@@ -100,7 +104,9 @@ class VoltageProfile:
         return float(reverse(-position))
 
     def steepest(self) -> float:
-        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in V/s."""
+        """Largest change in V per mm, infinite at a jump; times the speed it is the slew rate in
+        V/s.
+        """
         rise, run = np.abs(np.diff(self.voltage)), np.diff(self.position)
         rise, run = rise[rise > 0], run[rise > 0]
         if rise.size == 0:
@@ -110,11 +116,12 @@ class VoltageProfile:
 
 @dataclass(frozen=True)
 class FollowForce:
-    """A voltage that is not given but found: whatever makes the friction force on the bone follow a target.
+    """A voltage that is not given but found: whatever makes the friction force on the bone follow
+    a target.
 
-    `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between its rows;
-    during slides the effective voltage stays between 0 and `largest_voltage` (V), elsewhere it stays as it
-    is. For `Scene(voltage=...)`.
+    `position` (mm) and `tangential_force` (N/mm, along x on the bone) are a table, linear between
+    its rows; during slides the effective voltage stays between 0 and `largest_voltage` (V),
+    elsewhere it stays as it is. For `Scene(voltage=...)`.
 
     >>> FollowForce([0.0, 1.0], [0.0, 0.02], largest_voltage=2000.0)(0.5)
     0.01
@@ -136,7 +143,8 @@ class FollowForce:
 
 
 def carrier_amplitude(effective: Values) -> Values:
-    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage: sqrt(2) U.
+    """Amplitude in V of a sinusoidal carrier with the mean attraction of the `effective` voltage:
+    sqrt(2) U.
 
     >>> round(carrier_amplitude(1000.0), 3)
     1414.214
@@ -145,17 +153,19 @@ def carrier_amplitude(effective: Values) -> Values:
 
 
 def applied_voltage(effective: Values) -> Values:
-    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17): about 2 U.
+    """Voltage in V to apply with a sinusoidal carrier above 10 kHz, after the footnote to (17):
+    about 2 U.
 
-    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is the
-    mean alone.
+    This is a rule from experience that contains losses outside the finger; `carrier_amplitude` is
+    the mean alone.
     """
     return plain(APPLIED_TO_EFFECTIVE * np.asarray(effective))
 
 
 @dataclass(frozen=True)
 class Amplifier:
-    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the profile).
+    """What a display's amplifier can do: `voltage_max` in V and, if given, `slew` in V/s (of the
+    profile).
 
     >>> Amplifier(voltage_max=200.0).limit(VoltageProfile([0.0, 4.0], [0.0, 400.0])).voltage.tolist()
     [0.0, 200.0, 200.0]
@@ -174,11 +184,12 @@ class Amplifier:
             above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
-        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s).
+        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed`
+        (mm/s).
 
-        Both are exact: rows are added where the profile crosses the limit, and where the amplifier, which
-        moves towards the target as fast as it can, catches up with it. Raises InputError for a slew without
-        a speed.
+        Both are exact: rows are added where the profile crosses the limit, and where the
+        amplifier, which moves towards the target as fast as it can, catches up with it. Raises
+        InputError for a slew without a speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:

@@ -1,20 +1,24 @@
-r"""The pad alone: where its nodes go under given forces, remembered from a few equilibria of the finger.
+r"""The pad alone: where its nodes go under given forces, remembered from a few equilibria of the
+finger.
 
-At equilibrium k of the full model the pad nodes have moved by :math:`q_k` relative to the bone and carry the
-forces :math:`f_k`; the condensed tangent gives their compliance :math:`C_k = \partial q/\partial f`. The
-equilibria of a press are told apart by the downward force N on the pad, those of a slide by the shear force
-T. With weights :math:`w_k(f)` that are linear between neighbours on these two axes and add up to one,
+At equilibrium k of the full model the pad nodes have moved by :math:`q_k` relative to the bone and
+carry the forces :math:`f_k`; the condensed tangent gives their compliance
+:math:`C_k = \partial q/\partial f`. The equilibria of a press are told apart by the downward force
+N on the pad, those of a slide by the shear force T. With weights :math:`w_k(f)` that are linear
+between neighbours on these two axes and add up to one,
 
 .. math:: q(f) = \sum_k w_k \left(q_k - \tfrac12 C_k f_k\right) + \bar C\,\left(f - \tfrac12 \bar f\right),
           \qquad \bar C = \sum_k w_k C_k, \quad \bar f = \sum_k w_k f_k .
 
-This is exact at the stored equilibria, to first order around them, and everywhere between them for a pad
-whose compliance changes linearly with the force. What is left out is how the compliance changes with the part
-of the force that differs from :math:`\bar f` though its sums are the same, and beyond the outermost
-equilibria. Only the forces count, not where the finger is: the surface must be flat.
+This is exact at the stored equilibria, to first order around them, and everywhere between them for
+a pad whose compliance changes linearly with the force. What is left out is how the compliance
+changes with the part of the force that differs from :math:`\bar f` though its sums are the same,
+and beyond the outermost equilibria. Only the forces count, not where the finger is: the surface
+must be flat.
 
-Nodes near contact are kept one by one. The others are attracted but do not touch: their displacements are
-interpolated along the outline between a few of them (knots), which take over their forces.
+Nodes near contact are kept one by one. The others are attracted but do not touch: their
+displacements are interpolated along the outline between a few of them (knots), which take over
+their forces.
 """
 
 from __future__ import annotations
@@ -36,11 +40,12 @@ BEYOND = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Which of P pad nodes are kept: `near` (k,) may touch, `knots` stand for the others, K in all.
+    """Which of P pad nodes are kept: `near` (k,) may touch, `knots` stand for the others, K in
+    all.
 
-    Every pad node moves like the mean of the kept nodes number `low` and `high` (P,), the second one with
-    weight `share` (P,) and the first one with what `hold` (P,) leaves of it: hold is 1, or 0 for a node that
-    is fixed to the bone.
+    Every pad node moves like the mean of the kept nodes number `low` and `high` (P,), the second
+    one with weight `share` (P,) and the first one with what `hold` (P,) leaves of it: hold is 1,
+    or 0 for a node that is fixed to the bone.
     """
 
     near: Ints
@@ -62,8 +67,9 @@ class Kept:
 
     @classmethod
     def along(cls, order: Ints, arc: Floats, touched: Ints, size: int) -> Kept:
-        """From the free pad nodes in the `order` of the outline at the arc lengths `arc` (mm), those from the
-        first to the last of the places `touched` in that order, with a margin; `size` is P.
+        """From the free pad nodes in the `order` of the outline at the arc lengths `arc` (mm),
+        those from the first to the last of the places `touched` in that order, with a margin;
+        `size` is P.
 
         >>> kept = Kept.along(np.arange(40), np.arange(40.0), np.array([17, 22]), 40)
         >>> kept.near.size, kept.knots.tolist()
@@ -105,10 +111,11 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class CondensedPad:
-    """S equilibria of a pad with P nodes of which K are kept: displacements relative to the bone and forces
-    (S, P, 2), compliances (S, 2 K, 2 K) of the kept nodes, y components before x.
+    """S equilibria of a pad with P nodes of which K are kept: displacements relative to the bone
+    and forces (S, P, 2), compliances (S, 2 K, 2 K) of the kept nodes, y components before x.
 
-    `press` numbers those along growing N, `slide` those along growing T; the last of `press` is in `slide`.
+    `press` numbers those along growing N, `slide` those along growing T; the last of `press` is in
+    `slide`.
     """
 
     kept: Kept
@@ -170,7 +177,9 @@ class CondensedPad:
         return np.asarray(mean)
 
     def beyond(self, force: Floats) -> float:
-        """How far the sums of forces (P, 2) are beyond those of the equilibria, relative to their range."""
+        """How far the sums of forces (P, 2) are beyond those of the equilibria, relative to their
+        range.
+        """
         N, T = sums(force)
         low, high = self.sums.min(axis=0), self.sums.max(axis=0)
         outside = np.maximum(np.maximum([N, T] - high, low - [N, T]), 0.0)
@@ -178,14 +187,16 @@ class CondensedPad:
 
 
 def sums(force: Floats) -> Floats:
-    """Downward force and shear force towards -x (2,) of forces (P, 2) on the pad, as the bone feels them."""
+    """Downward force and shear force towards -x (2,) of forces (P, 2) on the pad, as the bone
+    feels them.
+    """
     x, y = force.sum(axis=0)
     return np.array([y, -x])
 
 
 def _hats(nodes: Floats, x: float) -> Floats:
-    """Weights of linear interpolation at x between growing nodes; beyond the ends linear for `BEYOND` of the
-    last interval, then constant.
+    """Weights of linear interpolation at x between growing nodes; beyond the ends linear for
+    `BEYOND` of the last interval, then constant.
     """
     weight = np.ones(nodes.size)
     if nodes.size == 1:

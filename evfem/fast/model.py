@@ -1,13 +1,15 @@
-r"""A fast model of one finger on a flat surface, with a stated error: for sweeps and signal design.
+r"""A fast model of one finger on a flat surface, with a stated error: for sweeps and signal
+design.
 
-`reduce` runs a scene once in full and remembers a few of its equilibria with their condensed tangents
-(`evfem.fast.memory`). `FastModel.simulate` then runs other scenes of the same finger with contact, friction
-and attraction solved as ever (`evfem.fast.step`), but without the tissue: other voltages, laws, insulators,
-friction coefficients and motions. Some of its steps are done again by the full model, from the same state of
-friction; the differences are the stated error, and where they are too large the whole scene is.
+`reduce` runs a scene once in full and remembers a few of its equilibria with their condensed
+tangents (`evfem.fast.memory`). `FastModel.simulate` then runs other scenes of the same finger with
+contact, friction and attraction solved as ever (`evfem.fast.step`), but without the tissue: other
+voltages, laws, insulators, friction coefficients and motions. Some of its steps are done again by
+the full model, from the same state of friction; the differences are the stated error, and where
+they are too large the whole scene is.
 
-Make it from a scene with the largest load and the most friction that will be used: between its equilibria the
-fast model errs by some 1e-5 of the force, beyond them by percents.
+Make it from a scene with the largest load and the most friction that will be used: between its
+equilibria the fast model errs by some 1e-5 of the force, beyond them by percents.
 """
 
 from __future__ import annotations
@@ -65,12 +67,12 @@ ADVICE = "a fast model made from a scene with more load or friction may go furth
 
 
 def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE, progress: bool = False) -> FastModel:
-    """Run `scene` in full and keep the pad of it: `press` equilibria while it presses, up to `slide` more
-    for each direction it slides in, spread evenly over the forces.
+    """Run `scene` in full and keep the pad of it: `press` equilibria while it presses, up to
+    `slide` more for each direction it slides in, spread evenly over the forces.
 
-    Give it the largest load and friction that will be needed. The time is that of the run and of one dense
-    factorisation per equilibrium; `progress` shows a bar. Raises InputError for scenes the
-    fast model cannot stand for (`FastModel`), `NotConverged` where the run fails.
+    Give it the largest load and friction that will be needed. The time is that of the run and of
+    one dense factorisation per equilibrium; `progress` shows a bar. Raises InputError for scenes
+    the fast model cannot stand for (`FastModel`), `NotConverged` where the run fails.
 
     >>> import evfem as ev
     >>> display = ev.Display(insulator=ev.Layer(0.09, 3.35), friction=0.5)
@@ -106,14 +108,16 @@ def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE, progress: bo
 
 @dataclass(eq=False)
 class FastModel:
-    """The pad of one finger on a flat surface, ready for many scenes; made by `reduce` or `FastModel.load`.
+    """The pad of one finger on a flat surface, ready for many scenes; made by `reduce` or
+    `FastModel.load`.
 
     `memory` is what is remembered of the finger, `identity` fingerprints of what must not change,
     `provenance` that of the run it was made from.
 
-    A scene may differ from that one in voltage, law, insulator, friction, direction, air layer, coupling and
-    motion. Finger, element and height of the surface must be the same; textured surfaces, forms of the
-    user's, time (`dynamics`), penalty contact and `FollowForce` are refused.
+    A scene may differ from that one in voltage, law, insulator, friction, direction, air layer,
+    coupling and motion. Finger, element and height of the surface must be the same; textured
+    surfaces, forms of the user's, time (`dynamics`), penalty contact and `FollowForce` are
+    refused.
     """
 
     memory: Memory
@@ -129,15 +133,16 @@ class FastModel:
         return f"FastModel of {name!r}: {count} equilibria, to {N:.4g} N/mm of load and {T:.4g} N/mm of shear"
 
     def simulate(self, scene: Scene, *, tolerance: float = 0.01, checks: int = 3) -> Result:
-        """Run `scene` fast, do `checks` of its steps again with the full model, and if these forces differ by
-        more than `tolerance` (relative to the largest of the run) run all of it in full, with a warning.
+        """Run `scene` fast, do `checks` of its steps again with the full model, and if these
+        forces differ by more than `tolerance` (relative to the largest of the run) run all of it
+        in full, with a warning.
 
         The result has the usual columns, forces and works among them; `stored_energy`,
         `integrator_dissipation` and `snap_dissipation` are NaN and there are no fields. Its
-        `provenance["fast"]` says `error` (largest relative difference of each force over the checks),
-        `checked` (which steps), `outside` (how far N and T have left those of the run it was made from, as a
-        share of their range; 0 inside) and `fallback`. With `checks=0` no error is stated.
-        Raises InputError for other scenes than the class allows, `NotConverged`.
+        `provenance["fast"]` says `error` (largest relative difference of each force over the
+        checks), `checked` (which steps), `outside` (how far N and T have left those of the run it
+        was made from, as a share of their range; 0 inside) and `fallback`. With `checks=0` no
+        error is stated. Raises InputError for other scenes than the class allows, `NotConverged`.
         """
         parts = self._parts_for(scene)
         if not (isinstance(checks, int) and 0 <= checks <= scene.total_steps):
@@ -161,7 +166,9 @@ class FastModel:
         return result
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one .npz file, in one step. Raises StorageError when the disk refuses."""
+        """Write everything to one .npz file, in one step. Raises StorageError when the disk
+        refuses.
+        """
         arrays = {"format": np.array(FORMAT), "version": np.array(evfem.__version__)}
         arrays |= {f"pad/{name}": getattr(self.memory.pad, name) for name in PAD}
         arrays |= {f"kept/{name}": getattr(self.memory.pad.kept, name) for name in KEPT}
@@ -247,7 +254,9 @@ class FastModel:
         return {name: abs(float(value) - run.rows[step - 1][name]) for name, value in found.items()}
 
     def _lifted(self, state: State) -> State:
-        """A state of the pad as one of the whole finger, the tissue as between the stored equilibria."""
+        """A state of the pad as one of the whole finger, the tissue as between the stored
+        equilibria.
+        """
         weight = self.memory.pad.weights(on_pad(state))
         u = state.bone + np.tensordot(weight, self.memory.whole, 1)
         return replace(state, u=u, velocity=np.zeros_like(u), last_increment=np.zeros_like(u))
@@ -259,8 +268,8 @@ def on_pad(state: State) -> Floats:
 
 
 class FastRun(Run):
-    """A scene on its way without the tissue; `states` before the first and after every step, and `targets` of
-    the steps.
+    """A scene on its way without the tissue; `states` before the first and after every step, and
+    `targets` of the steps.
     """
 
     def __init__(self, pad: CondensedPad, scene: Scene, mesh: Mesh, whole: Pad) -> None:
@@ -303,7 +312,9 @@ class FastRun(Run):
         self.targets.append(request.path(0.0, 1.0))
 
     def _row(self, request: Request) -> dict[str, Any]:
-        """The row of the present state; where only the place has changed, that of the step before serves."""
+        """The row of the present state; where only the place has changed, that of the step before
+        serves.
+        """
         before, now = self.states[-1], self.state
         place = (request.step, request.motion_index, request.kind, self.time)
         if not self.rows or before.contact_force is not now.contact_force:
@@ -354,8 +365,8 @@ def _in_full(scene: Scene, stated: dict[str, Any]) -> Result:
 
 
 def _worth_checking(run: FastRun, outside: Sequence[float], checks: int) -> list[int]:
-    """Steps (from 1) to check: farthest outside the trained forces, at the extremes of the forces, half way
-    to the largest friction force, then evenly spread ones.
+    """Steps (from 1) to check: farthest outside the trained forces, at the extremes of the forces,
+    half way to the largest friction force, then evenly spread ones.
     """
     columns = {name: np.abs([row[name] for row in run.rows]) for name in COMPARED}
     shear = columns["tangential_force"]

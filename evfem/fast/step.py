@@ -1,11 +1,12 @@
-r"""Equilibrium steps of the condensed pad on a flat surface: contact, friction and attraction solved exactly,
-the tissue only as the displacements its forces make (`evfem.fast.memory`).
+r"""Equilibrium steps of the condensed pad on a flat surface: contact, friction and attraction
+solved exactly, the tissue only as the displacements its forces make (`evfem.fast.memory`).
 
 With contact forces :math:`\lambda`, attraction a and the bone at b the pad nodes have moved by
-:math:`b + q(\lambda + a)`. Each iteration solves Signorini-Coulomb (`evfem.contact.signorini`, with the fall
-of the attraction with the gap of open nodes) for the linear change
-:math:`\bar C(\lambda^+ - \lambda + a(g) - a)` of these positions and evaluates q again. The laws of contact
-and the attraction hold at the accepted positions; what differs from the full model is q.
+:math:`b + q(\lambda + a)`. Each iteration solves Signorini-Coulomb (`evfem.contact.signorini`,
+with the fall of the attraction with the gap of open nodes) for the linear change
+:math:`\bar C(\lambda^+ - \lambda + a(g) - a)` of these positions and evaluates q again. The laws
+of contact and the attraction hold at the accepted positions; what differs from the full model is
+q.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ from evfem.solver.state import Balance, Limits, Record, Reusable, State
 
 
 class RememberedPad:
-    """The remembered pad behind `evfem.solver.equilibrium.LinearisedBody`. Displacements (P, 2) of its states
-    are those of the pad nodes alone.
+    """The remembered pad behind `evfem.solver.equilibrium.LinearisedBody`. Displacements (P, 2) of
+    its states are those of the pad nodes alone.
     """
 
     def __init__(
@@ -75,7 +76,9 @@ class RememberedPad:
         return replace(old, u=old.u + moved, bone=np.array([target.x, old.bone[1]]))
 
     def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
-        """Where iterations start: `start`, or for the first touch under a force the stored equilibria."""
+        """Where iterations start: `start`, or for the first touch under a force the stored
+        equilibria.
+        """
         self._frozen = frozen
         begin = start if start is not old else self._first_guess(old, target)
         bone = target.bone(begin.bone)
@@ -105,8 +108,8 @@ class RememberedPad:
         """Nothing to put back."""
 
     def _goes_on(self, old: State, target: Target) -> bool:
-        """Whether the pad, in full slip already, is carried along as it is: a level surface with one
-        coefficient of friction, and nothing else changes.
+        """Whether the pad, in full slip already, is carried along as it is: a level surface with
+        one coefficient of friction, and nothing else changes.
         """
         way = target.x - old.bone[0]
         if way == 0.0 or old.voltage != target.drive.voltage or not self._same_friction(old, way):
@@ -130,8 +133,8 @@ class RememberedPad:
         return bool((found == found.flat[0]).all())
 
     def _first_guess(self, old: State, target: Target) -> State:
-        """Where iterations begin: the old state, or for the first touch under a prescribed force the stored
-        equilibria with that force.
+        """Where iterations begin: the old state, or for the first touch under a prescribed force
+        the stored equilibria with that force.
         """
         if not isinstance(target.height, Force) or old.touching.any():
             return old
@@ -187,8 +190,8 @@ class RememberedPad:
         return replace(state, u=u, contact_force=force, status=status, bone=bone, attraction=attraction)
 
     def _attraction_stiffness(self, old: State, state: State, attracted: Floats) -> tuple[Floats, Floats]:
-        """How fast the attraction of every pad node weakens with its gap (P,), and what it gains on closing
-        (P,); nothing where it is frozen.
+        """How fast the attraction of every pad node weakens with its gap (P,), and what it gains
+        on closing (P,); nothing where it is frozen.
         """
         stiffness, gain = np.zeros((2, self.size))
         if self.attraction is not None and not self._frozen:
@@ -202,8 +205,8 @@ class RememberedPad:
     def _contact(
         self, known: Candidates, moved: Floats, compliance: Floats, lacking: float | None
     ) -> ContactSolution:
-        """Contact among the near nodes; if their pressing forces shall add up to `lacking` (N/mm), the bone's
-        height is one more unknown.
+        """Contact among the near nodes; if their pressing forces shall add up to `lacking` (N/mm),
+        the bone's height is one more unknown.
         """
         own = np.diagonal(compliance)[: known.slip.size]
         extra_unknowns = None
@@ -230,8 +233,8 @@ class RememberedPad:
         return np.repeat([1.0, 0.0], near)
 
     def _stiffness_at(self, position: Floats, voltage: float, old: State) -> Floats:
-        """Negative stiffness of every pad node (P,), at or shortly before `position`: the contact problem's
-        factors are kept with it.
+        """Negative stiffness of every pad node (P,), at or shortly before `position`: the contact
+        problem's factors are kept with it.
         """
         assert self.attraction is not None
         made_at, stiffness = self._stiffness
@@ -241,8 +244,8 @@ class RememberedPad:
         return stiffness
 
     def _compliance(self, state: State) -> tuple[Floats, Floats]:
-        """Compliance among the k nodes in play, near nodes that touch or may do so soon (2 k, 2 k), and from
-        all kept nodes to them (2 k, 2 K).
+        """Compliance among the k nodes in play, near nodes that touch or may do so soon (2 k, 2
+        k), and from all kept nodes to them (2 k, 2 K).
         """
         weight = self.body.weights(_on_pad(state))
         near = self.body.kept.near

@@ -1,4 +1,6 @@
-r"""Which equilibria of a full run a fast model remembers, and their compliances (`evfem.fast.memory`)."""
+r"""Which equilibria of a full run a fast model remembers, and their compliances
+(`evfem.fast.memory`).
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,8 @@ from evfem.solver.state import State
 
 @dataclass(frozen=True, eq=False)
 class Memory:
-    """What a fast model remembers: the condensed pad, and the displacements (S, N, 2) of all nodes relative
-    to the bone (mm), from where the full model starts its checks.
+    """What a fast model remembers: the condensed pad, and the displacements (S, N, 2) of all nodes
+    relative to the bone (mm), from where the full model starts its checks.
     """
 
     pad: CondensedPad
@@ -28,9 +30,9 @@ class Memory:
 
 
 def remember(model: Model, states: Sequence[State], kinds: Sequence[str], press: int, slide: int) -> Memory:
-    """From the `states` of a run, the undeformed one first, reached by motions of these `kinds`: `press`
-    equilibria of the press and up to `slide` more for each direction of sliding. Raises InputError for a run
-    without contact.
+    """From the `states` of a run, the undeformed one first, reached by motions of these `kinds`:
+    `press` equilibria of the press and up to `slide` more for each direction of sliding. Raises
+    InputError for a run without contact.
     """
     pad, points = model.pad, model.mesh.points[model.pad.nodes]
     force = [model.equilibrium.contact_forces(state) + state.attraction for state in states]
@@ -57,8 +59,8 @@ def remember(model: Model, states: Sequence[State], kinds: Sequence[str], press:
 
 
 def chosen(totals: Floats, kinds: Sequence[str], press: int, slide: int) -> tuple[list[int], list[int]]:
-    """Numbers of the states to keep: along growing N from rest to the end of the press, and along growing T
-    with the end of the press among them.
+    """Numbers of the states to keep: along growing N from rest to the end of the press, and along
+    growing T with the end of the press among them.
     """
     first = kinds.index("slide")
     N, T = totals.T

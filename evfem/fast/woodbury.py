@@ -1,8 +1,8 @@
-r"""Contact problems whose compliance stays the same for many solves: the factorisation is kept, and rows of
-nodes that have changed status are exchanged by Woodbury's formula.
+r"""Contact problems whose compliance stays the same for many solves: the factorisation is kept,
+and rows of nodes that have changed status are exchanged by Woodbury's formula.
 
-All statuses share one system M x = b in the pressing and shear forces x of every node (and the extra
-unknowns); a status is a choice of the node's two rows:
+All statuses share one system M x = b in the pressing and shear forces x of every node (and the
+extra unknowns); a status is a choice of the node's two rows:
 
 ========================  =====================================================
 row                       equation
@@ -13,8 +13,8 @@ open and attracted           row of the compliance times x - x / stiffness = gap
 slip                      shear force - ratio x pressing force = 0
 ========================  =====================================================
 
-With rows exchanged, :math:`M = M_0 + E D`, a solve costs one back-substitution and one more for every row
-that has not been exchanged before.
+With rows exchanged, :math:`M = M_0 + E D`, a solve costs one back-substitution and one more for
+every row that has not been exchanged before.
 """
 
 from __future__ import annotations
@@ -105,7 +105,9 @@ class KeptProblem(ContactProblem):
     factors: Factors = field(default_factory=Factors)
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given statuses."""
+        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given
+        statuses.
+        """
         kinds, values = row_kinds(self, status)
         right, grown = _right(self, kinds)
         x, k = self.factors.solve(self, kinds, values, right), self.size
@@ -114,8 +116,8 @@ class KeptProblem(ContactProblem):
 
 
 def row_kinds(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats]:
-    """Kind of every row (2 k,), and the number in it: 1 / negative stiffness of attracted nodes, ratio of
-    slipping ones.
+    """Kind of every row (2 k,), and the number in it: 1 / negative stiffness of attracted nodes,
+    ratio of slipping ones.
     """
     k = problem.size
     kinds, values = np.full(2 * k, ZERO), np.zeros(2 * k)
@@ -151,7 +153,9 @@ def _rows(problem: ContactProblem, kinds: Ints, values: Floats, which: Ints, ext
 
 
 def _right(problem: ContactProblem, kinds: Ints) -> tuple[Floats, Floats]:
-    """Right-hand side (2 k + p,), and the known drop of the attraction (2 k,) of nodes that have closed."""
+    """Right-hand side (2 k + p,), and the known drop of the attraction (2 k,) of nodes that have
+    closed.
+    """
     k = problem.size
     full = (kinds == FULL) | (kinds == ATTRACTED)
     right = np.where(full, -problem.start, 0.0)

@@ -1,8 +1,8 @@
 """The finger: a parametric cross-section, or a user's mesh, with its materials.
 
-`FingerPad` is the finger of the paper: outline, stratum corneum, ridges and moduli of its Table 2. What the
-paper leaves open (thicknesses of the other layers, nail, bone, shape of the ridges) are parameters with the
-defaults given there; every length is in mm.
+`FingerPad` is the finger of the paper: outline, stratum corneum, ridges and moduli of its Table 2.
+What the paper leaves open (thicknesses of the other layers, nail, bone, shape of the ridges) are
+parameters with the defaults given there; every length is in mm.
 """
 
 from __future__ import annotations
@@ -87,35 +87,39 @@ class Electrical:
 
 @dataclass(frozen=True)
 class FingerPad:
-    """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail above.
+    """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail
+    above.
 
-    **Outline.** Full axes `width` and `height`; on the lower side fingerprint ridges: their crests lie on
-    the ellipse, grooves are cut in. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the
-    point of the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, measured along the ellipse's
-    normal. Crests stand at x = (k + `ridge_phase`) `ridge_width`. With `ridge_crest` > 0 the ridges are
-    flat-topped instead: crest and groove are flat over the fractions `ridge_crest` and `ridge_groove` of
-    the pitch, with cosine-shaped walls. Ridges fade out between 0.72 and 0.79 of half the width (6.0 to 6.6
-    mm). `ridge_exponent` 7 is the shape that meets the ratio of ridge to gross contact area of Adams et al.
+    **Outline.** Full axes `width` and `height`; on the lower side fingerprint ridges: their crests
+    lie on the ellipse, grooves are cut in. With t = abs(x - crest) / (`ridge_width`/2), x the
+    abscissa of the point of the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep,
+    measured along the ellipse's normal. Crests stand at x = (k + `ridge_phase`) `ridge_width`.
+    With `ridge_crest` > 0 the ridges are flat-topped instead: crest and groove are flat over the
+    fractions `ridge_crest` and `ridge_groove` of the pitch, with cosine-shaped walls. Ridges fade
+    out between 0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape
+    that meets the ratio of ridge to gross contact area of Adams et al.
     (doi:10.1098/rsif.2012.0467) within 10 %.
 
-    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
-    stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height` less in a groove. Its
-    default and those of outline and ridges are Table 2 of the paper. Assumed, of the size that finger
-    models use (for example doi:10.1115/1.1613673): epidermis 0.47 mm, dermis 1.0 mm. Below the nail
-    everything down to the bone is dermis (the nail bed). The hypodermis fills the rest.
+    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the
+    ridges: the stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height`
+    less in a groove. Its default and those of outline and ridges are Table 2 of the paper.
+    Assumed, of the size that finger models use (for example doi:10.1115/1.1613673): epidermis 0.47
+    mm, dermis 1.0 mm. Below the nail everything down to the bone is dermis (the nail bed). The
+    hypodermis fills the rest.
 
-    **Nail and bone.** Nail 0.45 mm thick (measured 0.40 to 0.48 mm: Wollina et al., Skin Res. Technol. 7
-    (2001) 60-64), `nail_width` its chord (assumed). The bone is an ellipse with the full axes `bone_width`,
-    `bone_height` of the benchmark problem, its centre `bone_offset` above that of the finger (assumed:
-    there is more pulp than nail bed).
+    **Nail and bone.** Nail 0.45 mm thick (measured 0.40 to 0.48 mm: Wollina et al., Skin Res.
+    Technol. 7 (2001) 60-64), `nail_width` its chord (assumed). The bone is an ellipse with the
+    full axes `bone_width`, `bone_height` of the benchmark problem, its centre `bone_offset` above
+    that of the finger (assumed: there is more pulp than nail bed).
 
-    **Mesh.** `resolution` coarse, medium, paper or fine: about 3k, 10k, 22k and 50k nodes, with 12, 24, 24
-    and 48 linear cells per ridge within about 3.5 mm of the middle. `paper` spreads its cells over the
-    layers as the paper does. Sets of nodes: `pad` (the outline with y <= 0), `bone`, `nail` (the outer side
-    of the nail).
+    **Mesh.** `resolution` coarse, medium, paper or fine: about 3k, 10k, 22k and 50k nodes, with
+    12, 24, 24 and 48 linear cells per ridge within about 3.5 mm of the middle. `paper` spreads its
+    cells over the layers as the paper does. Sets of nodes: `pad` (the outline with y <= 0),
+    `bone`, `nail` (the outer side of the nail).
 
-    `materials` replaces the laws of Table 2 by region; `viscosity` is the relaxation time (s) of materials
-    without their own. Raises `InputError` for values out of range and for geometry that cannot exist.
+    `materials` replaces the laws of Table 2 by region; `viscosity` is the relaxation time (s) of
+    materials without their own. Raises `InputError` for values out of range and for geometry that
+    cannot exist.
 
     >>> finger = FingerPad(resolution="coarse", materials={"nail": NeoHookean(E=20.0, nu=0.3)})
     >>> mesh = finger.mesh(order=1)
@@ -182,9 +186,11 @@ class FingerPad:
         )
 
     def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order 2.
+        """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order
+        2.
 
-        Both have about the same number of nodes; mid-nodes lie on the true outline, interfaces and bone.
+        Both have about the same number of nodes; mid-nodes lie on the true outline, interfaces and
+        bone.
         """
         if order not in (1, 2):
             raise InputError("order", order, "1 or 2")
@@ -292,9 +298,9 @@ def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
 class MeshedFinger:
     """A finger on a mesh of the user's own: a file or a `Mesh`, one material law per region.
 
-    `regions` maps names to numbers as in `meshfile.read`; `viscosity` is the relaxation time in s of every
-    material that has none of its own. The mesh is read and checked at once: raises `InputError` when it is
-    faulty or does not fit the materials.
+    `regions` maps names to numbers as in `meshfile.read`; `viscosity` is the relaxation time in s
+    of every material that has none of its own. The mesh is read and checked at once: raises
+    `InputError` when it is faulty or does not fit the materials.
     """
 
     source: str | os.PathLike[str] | Mesh

@@ -1,9 +1,9 @@
-"""A ring of quadrilaterals in parameters: columns around, rows inwards, columns merged three to one on the
-way.
+"""A ring of quadrilaterals in parameters: columns around, rows inwards, columns merged three to
+one on the way.
 
-The parameters of a node are its column u (in base columns, from 0 to their number, the ring closing there)
-and its row r (0 at the outline). A base column starts as 1, 3 or 9 columns. A transition row merges three
-columns into one:
+The parameters of a node are its column u (in base columns, from 0 to their number, the ring
+closing there) and its row r (0 at the outline). A base column starts as 1, 3 or 9 columns. A
+transition row merges three columns into one:
 
     o0---o1---o2---o3      outline
      |   p1---p2    |
@@ -28,8 +28,8 @@ MIDDLE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Lattice:
-    """Nodes with parameters u, r (N,), cells (E, 4 or 9), and for each cell its row and its base column
-    (E,)."""
+    """Nodes with parameters u, r (N,), cells (E, 4 or 9), and for each cell its row and its base
+    column (E,)."""
 
     u: Floats
     r: Floats
@@ -39,10 +39,11 @@ class Lattice:
 
 
 def ring(splits: Ints, rows: int, transitions: tuple[int, ...], order: int) -> Lattice:
-    """The closed ring with `splits` (1, 3 or 9 columns per base column) and `rows` rows, numbered from
-    outside.
+    """The closed ring with `splits` (1, 3 or 9 columns per base column) and `rows` rows, numbered
+    from outside.
 
-    In the rows `transitions` base columns of nine become columns of three, then those of three become one.
+    In the rows `transitions` base columns of nine become columns of three, then those of three
+    become one.
 
     >>> mesh = ring(np.array([1, 3, 3, 1]), 3, (1,), 1)
     >>> len(mesh.u), np.bincount(mesh.row).tolist()
@@ -71,7 +72,9 @@ def ring(splits: Ints, rows: int, transitions: tuple[int, ...], order: int) -> L
 
 
 class _Line:
-    """The nodes of one line of the open ring: `u`, and the number of the first node of each base column."""
+    """The nodes of one line of the open ring: `u`, and the number of the first node of each base
+    column.
+    """
 
     def __init__(self, split: Ints, start: int) -> None:
         column = np.repeat(np.arange(len(split)), split)

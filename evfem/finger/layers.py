@@ -1,7 +1,8 @@
 """The layers of the finger pad: one row each, from the outline to the bone, and the nail.
 
-A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`, and its
-thickness a parameter of `FingerPad`: the field `NAME_thickness`, with the default `thickness_of("NAME")`.
+A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`,
+and its thickness a parameter of `FingerPad`: the field `NAME_thickness`, with the default
+`thickness_of("NAME")`.
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ class Thickness(NamedTuple):
 class TissueLayer:
     """One layer of the cross-section, a region of its mesh.
 
-    `number` is the region's in files and stays what it is when layers are added. `moduli` are those of the
-    default neo-Hookean material. A layer without `thickness` fills what the others leave. `rows`: its rows
-    of quadratic cells for each resolution (the nail has those of the layer that it replaces).
+    `number` is the region's in files and stays what it is when layers are added. `moduli` are
+    those of the default neo-Hookean material. A layer without `thickness` fills what the others
+    leave. `rows`: its rows of quadratic cells for each resolution (the nail has those of the layer
+    that it replaces).
     """
 
     name: str

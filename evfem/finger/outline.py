@@ -1,4 +1,6 @@
-"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its lower side."""
+"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its
+lower side.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ from evfem.common.arrays import Floats
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x axis."""
+    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x
+    axis.
+    """
 
     a: float
     b: float
@@ -38,7 +42,9 @@ class Ellipse:
         return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]
 
     def evenly(self, start: float, end: float, count: int) -> Floats:
-        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between them."""
+        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between
+        them.
+        """
         fine = np.linspace(start, end, 2001)
         middle = 0.5 * (fine[1:] + fine[:-1])
         speed = np.hypot(self.a * np.sin(middle), self.b * np.cos(middle))
@@ -48,8 +54,8 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Ridges:
-    """Profile of the ridges over the abscissa x of the ellipse (mm): how deep a point lies below the crest
-    line.
+    """Profile of the ridges over the abscissa x of the ellipse (mm): how deep a point lies below
+    the crest line.
 
     t = |x - crest| / (pitch/2) runs from 0 at a crest to 1 in a groove; crests at x = (k + phase) pitch.
     Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped (`crest` > 0): crest and groove are

@@ -1,8 +1,8 @@
 """The mesh of a finger's cross-section: rings of layers between the outline and the bone.
 
-The nodes of a column lie on one normal of the outer ellipse, as far as the dermis reaches: there the
-interfaces are true offsets of the smooth ellipse. Straight lines towards the bone's centre fill the
-hypodermis. Under the pad the columns are fine and merge three to one inwards.
+The nodes of a column lie on one normal of the outer ellipse, as far as the dermis reaches: there
+the interfaces are true offsets of the smooth ellipse. Straight lines towards the bone's centre
+fill the hypodermis. Under the pad the columns are fine and merge three to one inwards.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ class Divisions:
     """How finely to divide, in quadratic cells (twice as many linear ones).
 
     `per_ridge`: columns per ridge in the finest zone (a third of it beyond, a ninth in the depth);
-    `transitions`: the rows in which columns merge, as (name of the layer, row in it), negative from its end;
-    base columns: `side` from the zone's end to the widest point, `upper` from there to the nail's edge,
-    `nail` along the nail. The rows of the layers stand in `LAYERS`.
+    `transitions`: the rows in which columns merge, as (name of the layer, row in it), negative
+    from its end; base columns: `side` from the zone's end to the widest point, `upper` from there
+    to the nail's edge, `nail` along the nail. The rows of the layers stand in `LAYERS`.
     """
 
     per_ridge: int
@@ -49,8 +49,8 @@ class Divisions:
 class Section:
     """Geometry of a cross-section (mm).
 
-    `layers` from the outline to the bone, `thickness` of all of them but the innermost, `rows` of quadratic
-    cells in each; `nail` is the thickness of the nail.
+    `layers` from the outline to the bone, `thickness` of all of them but the innermost, `rows` of
+    quadratic cells in each; `nail` is the thickness of the nail.
     """
 
     outer: Ellipse
@@ -64,8 +64,8 @@ class Section:
     divisions: Divisions
 
     def mesh(self, order: int) -> Mesh:
-        """Quadrilaterals of `order` 1 or 2, the latter with half the divisions and mid-nodes on the true
-        curves."""
+        """Quadrilaterals of `order` 1 or 2, the latter with half the divisions and mid-nodes on
+        the true curves."""
         rows = [n * (3 - order) for n in self.rows]
         columns = Columns(self, order)
         names, start = [layer.name for layer in self.layers], np.concatenate([[0], np.cumsum(rows)])
@@ -78,8 +78,8 @@ class Section:
         return self._named(points, lattice, columns, rows, order)
 
     def _row_depths(self, rows: list[int], merging: tuple[int, ...], width: float) -> Floats:
-        """Depth of each line of the lattice, in layers: 0 the outline, 1 below the outermost ..., their
-        number at the bone."""
+        """Depth of each line of the lattice, in layers: 0 the outline, 1 below the outermost ...,
+        their number at the bone."""
         below = self.outer.b - self.bone.b + self.bone.centre - sum(self.thickness)
         thickness = [*self.thickness, below]
         wish = {row: TRANSITION * width * 3.0**i for i, row in enumerate(merging)}
@@ -122,7 +122,9 @@ class Section:
 
 
 def _heights(n: int, total: float, first: float, fixed: Mapping[int, float]) -> Floats:
-    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from `first`."""
+    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from
+    `first`.
+    """
     heights = np.zeros(n)
     for row, height in fixed.items():
         heights[row] = np.clip(height, 0.4 * total / n, max(1.3 / n, 0.35) * total)
@@ -133,8 +135,8 @@ def _heights(n: int, total: float, first: float, fixed: Mapping[int, float]) -> 
 
 
 def _progression(n: int, total: float, first: float) -> Floats:
-    """`n` terms with the sum `total` that start at about `first`; the last is at most eight times the
-    first."""
+    """`n` terms with the sum `total` that start at about `first`; the last is at most eight times
+    the first."""
     low, high = 8.0 ** (-1.0 / max(n - 1, 1)), 8.0 ** (1.0 / max(n - 1, 1))
     for _ in range(60):
         ratio = 0.5 * (low + high)
@@ -144,11 +146,11 @@ def _progression(n: int, total: float, first: float) -> Floats:
 
 
 class Columns:
-    """Where the columns of the lattice stand: base columns from the nail's middle around the pad and back
-    to it.
+    """Where the columns of the lattice stand: base columns from the nail's middle around the pad
+    and back to it.
 
-    In the zone of the pad they are equally wide in x, so that every ridge is divided in the same way;
-    elsewhere equally long along the ellipse.
+    In the zone of the pad they are equally wide in x, so that every ridge is divided in the same
+    way; elsewhere equally long along the ellipse.
     """
 
     def __init__(self, section: Section, order: int) -> None:
@@ -174,7 +176,9 @@ class Columns:
         self.splits[middle - fine : middle + fine] = 9
 
     def _angles(self, base: int, around: list[int]) -> tuple[Floats, list[int]]:
-        """Eccentric angles of the base columns' borders, and the number of columns of each stretch."""
+        """Eccentric angles of the base columns' borders, and the number of columns of each
+        stretch.
+        """
         outer, edge = self.section.outer, self._edge
         x = self.first_x + self.step * np.arange(base + 1)
         pad = -np.arccos(x / outer.a)
@@ -196,8 +200,8 @@ class Columns:
         return float(np.arccos(0.5 * self.section.nail_width / self.section.outer.a))
 
     def at(self, u: Floats) -> tuple[Floats, Floats, Floats]:
-        """Points (N, 2) and normals (N, 2) of the smooth ellipse, depths there of the outline and of the
-        interfaces between the layers (number of layers, N)."""
+        """Points (N, 2) and normals (N, 2) of the smooth ellipse, depths there of the outline and
+        of the interfaces between the layers (number of layers, N)."""
         section = self.section
         first, last = self.zone
         theta = np.interp(u, np.arange(len(self.theta)), self.theta)

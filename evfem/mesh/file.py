@@ -1,9 +1,9 @@
 """A user's mesh in, any finger mesh out: names, encoding and checks.
 
-Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ... (nonzero: belongs).
-Files written here also carry the names of the regions as field data (`region:NAME` = number), so that no
-table is needed to read them back.
-Encoding of `.msh` files: physical groups of surfaces (regions) and of lines or points (sets of nodes).
+Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ...
+(nonzero: belongs). Files written here also carry the names of the regions as field data
+(`region:NAME` = number), so that no table is needed to read them back. Encoding of `.msh` files:
+physical groups of surfaces (regions) and of lines or points (sets of nodes).
 """
 
 from __future__ import annotations
@@ -35,12 +35,13 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh, in mm, of a `.vtu` or `.msh` file of at most 128 MB, or of another that meshio reads.
+    """The checked mesh, in mm, of a `.vtu` or `.msh` file of at most 128 MB, or of another that
+    meshio reads.
 
-    `regions` maps a name to its number in the cell data `region`; it is not needed for physical groups of
-    gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are turned
-    counter-clockwise. Raises `InputError` naming `finger.mesh` or `finger.regions` for everything that
-    cannot be a finger.
+    `regions` maps a name to its number in the cell data `region`; it is not needed for physical
+    groups of gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are
+    turned counter-clockwise. Raises `InputError` naming `finger.mesh` or `finger.regions` for
+    everything that cannot be a finger.
     """
     path = Path(path)
     raw = _parts(path)
@@ -88,12 +89,16 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
 
 
 def _dimension(kind: str) -> int:
-    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused there."""
+    """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused
+    there.
+    """
     return CELLS[kind].dimension if kind in CELLS else BODY
 
 
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
-    """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is refused."""
+    """x and y of points (N, 2 or 3): a finger in the plane has no z, and one that varies is
+    refused.
+    """
     points = np.asarray(points, dtype=float)
     if points.shape[1] == 3 and len(points) and np.ptp(points[:, 2]) > 1e-9:
         given = f"{path} with z from {points[:, 2].min():g} to {points[:, 2].max():g}"
@@ -168,7 +173,9 @@ def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict
 
 
 def _point_sets(path: Path, raw: Parts) -> dict[str, Ints]:
-    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and 1."""
+    """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and
+    1.
+    """
     sets = {}
     for name, values in raw.point_data.items():
         values = np.asarray(values)
@@ -186,9 +193,11 @@ def _point_sets(path: Path, raw: Parts) -> dict[str, Ints]:
 
 
 def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
-    """Write `.vtu` (binary, uncompressed) or `.msh` (2.2, named physical groups), the whole file or nothing.
+    """Write `.vtu` (binary, uncompressed) or `.msh` (2.2, named physical groups), the whole file
+    or nothing.
 
-    Raises `InputError` for a format that cannot carry the names, `StorageError` if the file cannot be made.
+    Raises `InputError` for a format that cannot carry the names, `StorageError` if the file cannot
+    be made.
     """
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
@@ -226,7 +235,8 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
 
 
 def add_region_names(path: Path, mesh: Mesh) -> None:
-    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` = number.
+    """Put the names of the regions into an uncompressed `.vtu` file, as field data `region:NAME` =
+    number.
 
     The bytes are patched because meshio reads field data of this format but does not write them.
     """
@@ -239,8 +249,8 @@ def add_region_names(path: Path, mesh: Mesh) -> None:
 def _write_msh(mesh: Mesh, path: Path) -> None:
     """Gmsh's 2.2, with a physical group for each region and for each set of outer edges.
 
-    The names are patched into the bytes because meshio keeps one group per name, while `nail` is both a
-    region and a boundary.
+    The names are patched into the bytes because meshio keeps one group per name, while `nail` is
+    both a region and a boundary.
     """
     import meshio
 

@@ -1,9 +1,9 @@
 """What the readers of mesh files share: the parts of a file, the kinds of cells, and limits.
 
-The readers are strict and small, for files may come from anywhere: no entities, no array longer than the
-file, no loop longer than the file, and no more memory than about fifteen times `LARGEST`. Every other format
-that meshio knows (VTK legacy, Abaqus, MED and so on) is left to meshio, whose readers know no limits of
-memory and time: such files should come from people one trusts.
+The readers are strict and small, for files may come from anywhere: no entities, no array longer
+than the file, no loop longer than the file, and no more memory than about fifteen times `LARGEST`.
+Every other format that meshio knows (VTK legacy, Abaqus, MED and so on) is left to meshio, whose
+readers know no limits of memory and time: such files should come from people one trusts.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ class Unreadable(ValueError):
 
 @dataclass
 class Parts:
-    """Points (N, 3) as these formats have them, whose third column `evfem.mesh.file` checks and cuts off;
-    blocks (kind, cells (E, n)) in the order of the file; data of points; data of cells as one array per
-    block; named numbers; Gmsh's physical names by (dimension, number).
+    """Points (N, 3) as these formats have them, whose third column `evfem.mesh.file` checks and
+    cuts off; blocks (kind, cells (E, n)) in the order of the file; data of points; data of cells
+    as one array per block; named numbers; Gmsh's physical names by (dimension, number).
     """
 
     points: Floats
@@ -71,7 +71,9 @@ def integers(values: np.ndarray) -> Ints:
 
 
 def read(path: Path) -> Parts:
-    """The parts of a mesh file; raises `Unreadable` if meshio does not know its ending or cannot read it."""
+    """The parts of a mesh file; raises `Unreadable` if meshio does not know its ending or cannot
+    read it.
+    """
     import meshio
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:

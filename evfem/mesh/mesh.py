@@ -1,6 +1,7 @@
 """The finite element mesh: points, cells of one kind, named regions and named sets of nodes.
 
-Nodes keep the order of the file they came from; cells are in VTK order, counter-clockwise. Lengths in mm.
+Nodes keep the order of the file they came from; cells are in VTK order, counter-clockwise. Lengths
+in mm.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ from evfem.errors import InputError
 
 
 class CellKind(NamedTuple):
-    """A kind of cell: dimension, numbers of corners and nodes, order, and its numbers in VTK and in Gmsh.
+    """A kind of cell: dimension, numbers of corners and nodes, order, and its numbers in VTK and
+    in Gmsh.
 
     The local edges of a triangle or quad are (corner i, corner i+1[, mid-node i]).
     """
@@ -51,8 +53,8 @@ KINDS = ("quad", "quad9", "triangle", "triangle6")
 class Mesh:
     """Points (N, dim), cells (E, n) in VTK order, an integer region per cell, and named sets.
 
-    `region_names` maps a name to its number in `region`; `node_sets` maps `pad`, `bone`, `nail` ... to sorted
-    node numbers.
+    `region_names` maps a name to its number in `region`; `node_sets` maps `pad`, `bone`, `nail`
+    ... to sorted node numbers.
     """
 
     points: Floats
@@ -90,8 +92,8 @@ class Mesh:
 
     @property
     def cell_edges(self) -> Ints:
-        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle], counter-
-        clockwise.
+        """The edges of each cell, (E, corners, 2) or (E, corners, 3): start, end[, middle],
+        counter- clockwise.
         """
         m = self.corners
         i = np.arange(m)
@@ -100,7 +102,9 @@ class Mesh:
 
     @cached_property
     def edges(self) -> tuple[Ints, Ints]:
-        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E, corners)."""
+        """All edges once, (K, 2) corner nodes in rising order, and the edges of each cell, (E,
+        corners).
+        """
         ends = np.sort(self.cell_edges[..., :2], axis=2).reshape(-1, 2)
         code, inverse = np.unique(ends[:, 0] * len(self.points) + ends[:, 1], return_inverse=True)
         return np.column_stack(np.divmod(code, len(self.points))), inverse.reshape(-1, self.corners)
@@ -115,8 +119,8 @@ class Mesh:
 def raised(mesh: Mesh) -> Mesh:
     """The quadratic mesh on the same cells: straight edges, new nodes halfway.
 
-    New nodes are numbered after the old ones. The new node of an outer edge belongs to every set that holds
-    both ends of that edge; other new nodes belong to none.
+    New nodes are numbered after the old ones. The new node of an outer edge belongs to every set
+    that holds both ends of that edge; other new nodes belong to none.
 
     >>> square = Mesh(np.array([[0., 0.], [1., 0.], [1., 1.], [0., 1.]]), np.array([[0, 1, 2, 3]]), "quad",
     ...               np.zeros(1, int), {"skin": 0}, {"pad": np.array([0, 1])})
@@ -144,12 +148,12 @@ def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> In
 
 
 def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
-    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that layer
-    there.
+    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that
+    layer there.
 
-    The interface is every edge that a cell of `region` shares with a cell of another region; on quadratic
-    cells it is the parabola through the edge's nodes. Raises `InputError` if there is no such region or
-    interface.
+    The interface is every edge that a cell of `region` shares with a cell of another region; on
+    quadratic cells it is the parabola through the edge's nodes. Raises `InputError` if there is no
+    such region or interface.
     """
     if region not in mesh.region_names:
         raise InputError("region", region, " | ".join(mesh.region_names))
@@ -167,8 +171,8 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
 
 
 def _parabolas(ends: Floats) -> Floats:
-    """Coefficients (3, K, dim) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[, middle], which
-    are (K, 2 or 3, dim).
+    """Coefficients (3, K, dim) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[,
+    middle], which are (K, 2 or 3, dim).
     """
     middle = 0.5 * (ends[:, 0] + ends[:, 1])
     centre = ends[:, 2] if ends.shape[1] == 3 else middle
@@ -176,7 +180,9 @@ def _parabolas(ends: Floats) -> Floats:
 
 
 def _distance(points: Floats, curves: Floats) -> Floats:
-    """Smallest distance of points (P, dim) from the curves: Newton's method on the six nearest of each."""
+    """Smallest distance of points (P, dim) from the curves: Newton's method on the six nearest of
+    each.
+    """
     places = np.array([-1.0, 0.0, 1.0])
     samples = curves[0] + places[:, None, None] * curves[1] + (places**2)[:, None, None] * curves[2]
     away = np.linalg.norm(points[:, None, None] - samples, axis=-1)

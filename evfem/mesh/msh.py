@@ -1,8 +1,8 @@
 """Reads Gmsh's .msh files, versions 2 and 4.1, written as text (Gmsh's own default).
 
-Format: Gmsh reference manual, https://gmsh.info/doc/texinfo/gmsh.html#File-formats. Read are the physical
-names, entities, nodes and elements; other sections are passed over. An element that is in several physical
-groups belongs to the first.
+Format: Gmsh reference manual, https://gmsh.info/doc/texinfo/gmsh.html#File-formats. Read are the
+physical names, entities, nodes and elements; other sections are passed over. An element that is in
+several physical groups belongs to the first.
 """
 
 from __future__ import annotations

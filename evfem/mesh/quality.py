@@ -1,7 +1,7 @@
 """What a mesh in the plane must fulfil before anything is computed on it.
 
-`check` asks one question after the other, in the order of the file, and every fault becomes one sentence; the
-shape of cells is their scaled Jacobian, at the end.
+`check` asks one question after the other, in the order of the file, and every fault becomes one
+sentence; the shape of cells is their scaled Jacobian, at the end.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ Refuse = Callable[[str, str], None]  # (fault, what is allowed): raises InputErr
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     """The same mesh, its cells counter-clockwise and its set `pad` reduced to the outline.
 
-    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first fault found:
-    values, numbers of nodes, units, names, double and unused nodes, orientation, connection, overlap.
+    `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first
+    fault found: values, numbers of nodes, units, names, double and unused nodes, orientation,
+    connection, overlap.
     """
 
     def refuse(fault: str, allowed: str) -> None:
@@ -152,8 +153,8 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _outline(mesh: Mesh, refuse: Refuse) -> None:
-    """The outline must not cross or touch itself: else cells overlap, or nodes hang on another cell's
-    edge.
+    """The outline must not cross or touch itself: else cells overlap, or nodes hang on another
+    cell's edge.
     """
     edges = mesh.outer_edges
     if not len(edges):
@@ -190,7 +191,9 @@ def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
 
 
 def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2) each."""
+    """Ends of the segments b (K, 2, 2) across and along the segments a, in lengths of a, (K, 2)
+    each.
+    """
     direction = a[:, 1] - a[:, 0]
     away = b - a[:, :1]
     square = (direction**2).sum(axis=1)[:, None]
@@ -220,12 +223,12 @@ TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.
 
 
 def scaled_jacobian(mesh: Mesh) -> Floats:
-    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or equilateral
-    triangle.
+    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or
+    equilateral triangle.
 
-    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate lines at the
-    node; in triangles the longest two of the three directions count, and sin 60 degrees is divided out.
-    Zero or less: the cell is degenerate or turned inside out.
+    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate
+    lines at the node; in triangles the longest two of the three directions count, and sin 60
+    degrees is divided out. Zero or less: the cell is degenerate or turned inside out.
 
     >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     >>> square = Mesh(corners, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, dtype=int), {"skin": 0})

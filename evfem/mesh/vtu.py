@@ -1,4 +1,5 @@
-"""Reads .vtu files: XML with numbers as text, or in binary, inline or appended, plain or compressed.
+"""Reads .vtu files: XML with numbers as text, or in binary, inline or appended, plain or
+compressed.
 
 Format: "VTK File Formats", https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html.
 One piece; zlib and LZMA; both byte orders. Document types, and with them entities, are refused.

@@ -1,8 +1,10 @@
-"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the file.
+"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the
+file.
 
-Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps, csv files of
-64 MB and one million rows, meshes of 128 MB (`evfem.mesh.formats`). Beyond what files written by hand need,
-`dump` uses three keys so that a file stands alone: `points` of a profile, `voltage_profile`, `gap_eps_r`.
+Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps,
+csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.formats`). Beyond what files
+written by hand need, `dump` uses three keys so that a file stands alone: `points` of a profile,
+`voltage_profile`, `gap_eps_r`.
 """
 
 from __future__ import annotations
@@ -260,8 +262,8 @@ def _materials(tables: object) -> dict[str, Any]:
 def dump(scene: Scene) -> str:
     """The scene as TOML; `loads` makes an equal scene of it.
 
-    An insulator without a law has no effect and no place in a file. Raises InputError for what a file cannot
-    hold: a mesh object, a law or a weak form of the user's own.
+    An insulator without a law has no effect and no place in a file. Raises InputError for what a
+    file cannot hold: a mesh object, a law or a weak form of the user's own.
     """
     if scene.forms:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")

@@ -37,8 +37,8 @@ def _required(allowed: str) -> Any:
 def derived(cls: type, **own: Any) -> type[Table]:
     """The table of a dataclass: its fields' names, types and defaults, and what their rules allow.
 
-    `own`: keys that are not in the file what they are in the dataclass. A class with a `kind` is chosen by
-    that key, which the caller has looked at.
+    `own`: keys that are not in the file what they are in the dataclass. A class with a `kind` is
+    chosen by that key, which the caller has looked at.
     """
     types = get_type_hints(cls)
     keys: dict[str, Any] = {"kind": (str, _required("a kind"))} if hasattr(cls, "kind") else {}
@@ -135,7 +135,9 @@ T = TypeVar("T", bound=Table)
 
 
 def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
-    """The checked table, or the first mistake in it; an unknown key comes before what it may stand for."""
+    """The checked table, or the first mistake in it; an unknown key comes before what it may stand
+    for.
+    """
     try:
         return model.model_validate(table)
     except ValidationError as error:

@@ -1,4 +1,6 @@
-"""What the finger does: press, slide, hover, and voltage ramps; frozen and validated (mm, N/mm, V, s)."""
+"""What the finger does: press, slide, hover, and voltage ramps; frozen and validated (mm, N/mm, V,
+s).
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,11 @@ _STEPS, _HOLD = whole(), one_of(*get_args(Hold))
 
 @dataclass(frozen=True)
 class Press:
-    """Press to a `force` (N/mm, on the bone) or an `indentation` (mm), absolute, in `steps` equal parts.
+    """Press to a `force` (N/mm, on the bone) or an `indentation` (mm), absolute, in `steps` equal
+    parts.
 
-    `speed` (mm/s, only with `indentation`) sets how much time passes; without it the press takes no time
-    and is quasi-static. Raises InputError unless exactly one target is given.
+    `speed` (mm/s, only with `indentation`) sets how much time passes; without it the press takes
+    no time and is quasi-static. Raises InputError unless exactly one target is given.
 
     >>> Press(force=0.05).steps
     10
@@ -55,8 +58,8 @@ class Press:
 class Slide:
     """Slide by `distance` (mm, negative towards -x) in `steps` equal parts.
 
-    `hold` keeps the indentation or the applied force of the moment before. `speed` (mm/s) sets how much time
-    passes; it is needed with `dynamics` other than quasistatic.
+    `hold` keeps the indentation or the applied force of the moment before. `speed` (mm/s) sets how
+    much time passes; it is needed with `dynamics` other than quasistatic.
 
     >>> Slide(distance=5.0).steps
     100
@@ -74,7 +77,8 @@ class Slide:
 
 @dataclass(frozen=True)
 class Hover:
-    """Hold the bone so that the undeformed outline is `gap` (mm) off the surface: `indentation = -gap`.
+    """Hold the bone so that the undeformed outline is `gap` (mm) off the surface:
+    `indentation = -gap`.
 
     The tissue is free to move under the attraction. Going there takes no time.
     """

@@ -1,4 +1,5 @@
-"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its reason.
+"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its
+reason.
 
 `make_model` builds what the plan says, so the printout and the run cannot disagree.
 """
@@ -112,7 +113,9 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
 
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
-    """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
+    """The plan of a scene whose mesh is already there; raises InputError for parts that no run
+    could use.
+    """
     check_parts(scene)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
@@ -164,8 +167,8 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
 
 
 def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
-    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None where it
-    must deform.
+    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None
+    where it must deform.
     """
     hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
     if (

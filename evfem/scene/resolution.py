@@ -1,4 +1,6 @@
-"""Whether the pad's nodes are close enough together to feel a profile, and the profile smooth enough."""
+"""Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
+enough.
+"""
 
 from __future__ import annotations
 
@@ -21,9 +23,10 @@ PER_SPACING, MOST = 8, 200_000
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     """A sentence if the surface is sharper or rougher than the node spacing of the pad, else None.
 
-    Compared are the profile's height in the middle between two nodes with the mean of its heights below
-    them, and its slope there with that from node to node, all along the way. Noise of a scan hardly shows in
-    the heights, but contact acts along the slope: nodes that follow it stick and slip one by one.
+    Compared are the profile's height in the middle between two nodes with the mean of its heights
+    below them, and its slope there with that from node to node, all along the way. Noise of a scan
+    hardly shows in the heights, but contact acts along the slope: nodes that follow it stick and
+    slip one by one.
     """
     surface: Any = scene.ground
     if surface.is_flat or not len(mesh.edges_of("pad")):

@@ -1,8 +1,9 @@
-"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing computed.
+"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing
+computed.
 
-Units mm, N, MPa, V, s; forces of the plane model are per mm of depth (N/mm). The bone translates by
-(`position`, -(`indentation` + g0)), g0 being the smallest vertical gap of the undeformed outline at the
-start.
+Units mm, N, MPa, V, s; forces of the plane model are per mm of depth (N/mm). The bone translates
+by (`position`, -(`indentation` + g0)), g0 being the smallest vertical gap of the undeformed
+outline at the start.
 """
 
 from __future__ import annotations
@@ -56,9 +57,9 @@ class Finger(Protocol):
 class Solver:
     """How a scene is solved; the defaults are the recommended ones.
 
-    `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free residual over
-    max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go with `contact="penalty"`
-    alone. `strategy` says how hard steps are tried.
+    `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free
+    residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go
+    with `contact="penalty"` alone. `strategy` says how hard steps are tried.
     """
 
     element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
@@ -123,10 +124,10 @@ class Motions:
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
-    `voltage` in V: a number, acting in full from the first step, or a `VoltageProfile` over the position
-    of the bone. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the surface.
-    `air_layer` False: only touching nodes carry electrostatic force. Raises InputError for anything that
-    does not fit together.
+    `voltage` in V: a number, acting in full from the first step, or a `VoltageProfile` over the
+    position of the bone. `law` None and `voltage` 0: no electrostatics. The insulator belongs to
+    the surface. `air_layer` False: only touching nodes carry electrostatic force. Raises
+    InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -182,7 +183,9 @@ class Scene:
         return sum(motion.steps for motion in self.motion)
 
     def with_term(self, form: Form, on: Region | Boundary) -> Scene:
-        """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
+        """A copy of the scene with `form` added to the internal residual over the region or
+        boundary `on`.
+        """
         if not isinstance(form, Form):
             raise InputError("form", form, "a function marked with @evfem.form")
         if not isinstance(on, (Region, Boundary)):

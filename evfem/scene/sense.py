@@ -1,8 +1,9 @@
-"""Whether a scene makes sense: mistakes in a user's parts, and what is hardly meant, before it is solved.
+"""Whether a scene makes sense: mistakes in a user's parts, and what is hardly meant, before it is
+solved.
 
-`check_parts` evaluates a user's laws once, near rest and at three gaps, and raises InputError for what no
-run could use. `doubts` says in a sentence each what may be meant, but hardly is: units, fields that no
-insulator withstands, slides that never touch. Built-in laws are not evaluated.
+`check_parts` evaluates a user's laws once, near rest and at three gaps, and raises InputError for
+what no run could use. `doubts` says in a sentence each what may be meant, but hardly is: units,
+fields that no insulator withstands, slides that never touch. Built-in laws are not evaluated.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ TRAVEL, WAY_STEP = ("indentation", "distance", "gap"), 0.02
 
 
 def check_parts(scene: Scene) -> None:
-    """Raise InputError for a material or force law that no run could use, and for a voltage out of all
-    reason.
+    """Raise InputError for a material or force law that no run could use, and for a voltage out of
+    all reason.
     """
     for name, law in scene.finger.materials.items():
         if isinstance(law, Form) or not type(law).__module__.startswith("evfem."):
@@ -97,7 +98,9 @@ def _whole_stress(law: SplitLaw, F: Array) -> Array:
 
 
 def _evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) -> Array:
-    """The values of a user's function; InputError where it raises anything, or they are not finite."""
+    """The values of a user's function; InputError where it raises anything, or they are not
+    finite.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -185,8 +188,8 @@ def largest_voltage(scene: Scene) -> float:
 
 
 def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the shear moduli
-    (MPa) of the materials.
+    """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
+    shear moduli (MPa) of the materials.
     """
     return (*_hard(scene, moduli), *_small(scene), *_breakdown(scene), *_hovering(scene, mesh))
 
@@ -263,10 +266,12 @@ def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
 
 
 def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
-    """Upper estimate of the relative change of the attraction by the deformation of a hovering pad.
+    """Upper estimate of the relative change of the attraction by the deformation of a hovering
+    pad.
 
-    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln p)/dg,
-    of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the smallest gap.
+    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln
+    p)/dg, of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the
+    smallest gap.
     """
     assert scene.law is not None
     layers = Layers.of(scene.ground.insulator)

@@ -1,9 +1,11 @@
-"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
+"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would
+have done.
 
-Beside the state a run carries over from step to step: the contact candidates, the substep that worked
-last, the works so far with the forces that they go on from, and a factorisation made some steps ago. Of the
-last one the checkpoint keeps where it was made; a resumed run makes it there again, and the iterations that
-follow are the same to the last bit (with one thread, on the same machine and backend).
+Beside the state a run carries over from step to step: the contact candidates, the substep that
+worked last, the works so far with the forces that they go on from, and a factorisation made some
+steps ago. Of the last one the checkpoint keeps where it was made; a resumed run makes it there
+again, and the iterations that follow are the same to the last bit (with one thread, on the same
+machine and backend).
 """
 
 from __future__ import annotations
@@ -31,7 +33,9 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
-    """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
+    """What a solver takes with it to the next step; of the same shapes with and without a
+    factorisation.
+    """
     at, nowhere = carried.tangent_point, np.zeros_like(state.u)
     return {
         "candidates": carried.candidates,
@@ -80,8 +84,8 @@ def ledger_of(model: Model, arrays: Mapping[str, np.ndarray]) -> Ledger:
 
 
 def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, np.ndarray]:
-    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps that has just
-    been set up.
+    """The arrays of a checkpoint, if they fit the `fresh` ones of a run of `most_rows` steps that
+    has just been set up.
 
     Raises InputError for what is missing, of another shape or kind, not finite, or out of range.
     """

@@ -19,8 +19,8 @@ from evfem.solver.state import State
 
 @dataclass
 class Ledger:
-    """Running sums of a run, by the names of the history's columns, and the books at the end of its last
-    part.
+    """Running sums of a run, by the names of the history's columns, and the books at the end of
+    its last part.
     """
 
     model: Model

@@ -1,5 +1,5 @@
-"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction, equilibrium
-solver.
+"""From a scene to exactly the parts it needs: mesh, body, pad, surface in place, attraction,
+equilibrium solver.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from evfem.tissue.weakform import check_laws
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical
-    gap at the start.
+    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest
+    vertical gap at the start.
     """
 
     scene: Scene

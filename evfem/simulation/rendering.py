@@ -1,9 +1,9 @@
 """From sliding over a real surface to a display's voltage, and back to what the finger then feels.
 
-A reference is recorded, its apparent friction F_t / F_n becomes a voltage over the position by (17)-(20b),
-and the display replays it. The closed forms leave out the air layer, take the contact area from a power law
-and the load as constant; `exact` asks the coupled model itself for the voltage instead. Forces on the bone,
-N/mm; mm, V, s.
+A reference is recorded, its apparent friction F_t / F_n becomes a voltage over the position by
+(17)-(20b), and the display replays it. The closed forms leave out the air layer, take the contact
+area from a power law and the load as constant; `exact` asks the coupled model itself for the
+voltage instead. Forces on the bone, N/mm; mm, V, s.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ NOISE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """A scene, its result, and the position (mm) of the first step in which no touching node sticks.
+    """A scene, its result, and the position (mm) of the first step in which no touching node
+    sticks.
 
     `full_slip` is None if some node sticks in every step of the slides.
     """
@@ -117,13 +118,15 @@ def _slide_rows(result: Result) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """An effective voltage over the position, and what is known of it before anything is simulated.
+    """An effective voltage over the position, and what is known of it before anything is
+    simulated.
 
-    `share_not_renderable`: share of the path on which the wish is below the display's own friction; while
-    the finger still sticks at the start, that is no loss. Voltages in V: `largest`, `rms` over the path,
-    `carrier` (amplitude of a sinusoidal carrier at the largest). `error_of_display`: relative L2 error of
-    the friction force by (16a), (16b) without the amplifier, `error_of_amplifier` the change it makes,
-    relative to the wish; `share_limited` the share of the path on which it acts.
+    `share_not_renderable`: share of the path on which the wish is below the display's own
+    friction; while the finger still sticks at the start, that is no loss. Voltages in V:
+    `largest`, `rms` over the path, `carrier` (amplitude of a sinusoidal carrier at the largest).
+    `error_of_display`: relative L2 error of the friction force by (16a), (16b) without the
+    amplifier, `error_of_amplifier` the change it makes, relative to the wish; `share_limited` the
+    share of the path on which it acts.
     """
 
     profile: VoltageProfile
@@ -148,10 +151,11 @@ def voltage_for(
 
     .. math:: U = \sqrt{F_e / (p_1 k F_n^m)}, \quad F_e = (\mu_{rs} / \mu_{hd} - 1) F_n \ge 0
 
-    with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear area law
-    (m = 1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops out. Otherwise the
-    area law needs the force of `depth` mm. The voltage is 0 where the wish is below the display's own
-    friction. `amplifier` limits the profile (its slew needs `speed` in mm/s).
+    with p_1 the contact pressure at 1 V: equation (17) with (18), which is (19); with a linear
+    area law (m = 1) it is (20a) for `Kaczmarek` and (20b) for `StrongTroxel`, and the load drops
+    out. Otherwise the area law needs the force of `depth` mm. The voltage is 0 where the wish is
+    below the display's own friction. `amplifier` limits the profile (its slew needs `speed` in
+    mm/s).
 
     >>> from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
     >>> from evfem.electrostatics.encoding import AreaLaw
@@ -186,7 +190,9 @@ def voltage_for(
 
 
 def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
-    """Share of the path on which two profiles differ; pieces between rows are judged in their middle."""
+    """Share of the path on which two profiles differ; pieces between rows are judged in their
+    middle.
+    """
     x = np.unique(np.concatenate([one.position, other.position]))
     middle = 0.5 * (x[:-1] + x[1:])
     apart = np.abs(one(middle) - other(middle)) > 1e-9 * np.max(np.abs(one.voltage), initial=1.0)
@@ -198,8 +204,8 @@ def replay(
 ) -> Recording:
     """The reference's finger, motion and solver on a display under a voltage.
 
-    As in the paper the finger is pressed to the load that the reference had at the end of its press, and
-    slid in the same steps.
+    As in the paper the finger is pressed to the load that the reference had at the end of its
+    press, and slid in the same steps.
     """
     motion = list(reference.scene.motion)
     kinds = [isinstance(part, Slide) for part in motion]
@@ -215,13 +221,14 @@ def replay(
 def exact(
     reference: Recording, display: Surface, law: ForceLaw, largest_voltage: float = 10_000.0
 ) -> Recording:
-    """The display's own voltage that makes the coupled model reproduce the reference: exact encoding.
+    """The display's own voltage that makes the coupled model reproduce the reference: exact
+    encoding.
 
-    In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t = reference as
-    its equation; where that lies outside, the voltage stays at its limit. While part of the contact sticks,
-    attraction hardly changes the friction force; a wish that then no voltage meets leaves the voltage as it
-    was. The voltage found is in `result.voltage`; `Comparison.unmet` says where
-    the wish was out of reach.
+    In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t =
+    reference as its equation; where that lies outside, the voltage stays at its limit. While part
+    of the contact sticks, attraction hardly changes the friction force; a wish that then no
+    voltage meets leaves the voltage as it was. The voltage found is in `result.voltage`;
+    `Comparison.unmet` says where the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
@@ -232,8 +239,8 @@ def exact(
 class Comparison:
     """How well the friction force of a rendering follows its reference over the whole slide.
 
-    `position` (n,) mm, `error` (n,) N/mm = rendered - reference; `pearson` is nan where a force is constant.
-    `voltage_difference` (V) is the largest one between the two runs.
+    `position` (n,) mm, `error` (n,) N/mm = rendered - reference; `pearson` is nan where a force is
+    constant. `voltage_difference` (V) is the largest one between the two runs.
 
     >>> found = Comparison(np.arange(3.0), np.array([1e-3, 0.0, 1e-9]), 0.99, 0.01, 0.0)
     >>> found.largest_error, found.unmet(1e-6).tolist()
@@ -259,8 +266,8 @@ class Comparison:
 def compare(reference: Result, rendered: Result) -> Comparison:
     """Pearson's r and relative L2 error ||F - F_ref|| / ||F_ref|| of `applied_tangential_force`.
 
-    At equal positions, over all steps of the slide from its first one. Raises InputError if the slides
-    differ.
+    At equal positions, over all steps of the slide from its first one. Raises InputError if the
+    slides differ.
     """
     rows, others = _slide_rows(reference), _slide_rows(rendered)
     x, y = reference.position[rows], rendered.position[others]

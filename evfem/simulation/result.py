@@ -1,6 +1,8 @@
-"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came about.
+"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came
+about.
 
-Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz without pickled objects.
+Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz without pickled
+objects.
 """
 
 from __future__ import annotations
@@ -75,14 +77,16 @@ _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
+    """Every column of the history as an array over the steps, the frames kept, the mesh and the
+    provenance.
 
-    A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of saved
-    results and checkpoints. `Ledger.row` computes its value; a whole number also stands in `INTEGERS`.
+    A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of
+    saved results and checkpoints. `Ledger.row` computes its value; a whole number also stands in
+    `INTEGERS`.
 
-    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are the sums
-    of the contact forces on the finger, +y and -x components; `electrostatic_force` is the downward
-    attraction.
+    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
+    the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
+    the downward attraction.
     """
 
     step: Ints
@@ -121,7 +125,9 @@ class Result:
     def from_rows(
         cls, rows: Sequence[Row], frames: Sequence[Frame], mesh: Mesh, provenance: dict[str, Any]
     ) -> Result:
-        """A result from rows as the solver reports them; each row has exactly the keys of `COLUMNS`."""
+        """A result from rows as the solver reports them; each row has exactly the keys of
+        `COLUMNS`.
+        """
         for row in rows:
             if set(row) != set(COLUMNS):
                 odd = sorted(set(row) ^ set(COLUMNS))
@@ -191,7 +197,9 @@ class Result:
         ]
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one .npz file, in one step. Raises StorageError when the disk refuses."""
+        """Write everything to one .npz file, in one step. Raises StorageError when the disk
+        refuses.
+        """
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
         arrays |= {f"history/{name}": np.array(getattr(self, name)) for name in COLUMNS}
         for spec in fields(Frame):
@@ -210,9 +218,9 @@ COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file without
-    one of those is refused as of another version. No object is unpickled, and no more memory is taken than
-    the file is long (at most 4 GB).
+    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file
+    without one of those is refused as of another version. No object is unpickled, and no more
+    memory is taken than the file is long (at most 4 GB).
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     lacking = [f"history/{name}" for name in NEEDED if f"history/{name}" not in arrays]
@@ -294,9 +302,11 @@ def origin() -> dict[str, Any]:
 
 
 def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
-    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for JSON.
+    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
+    JSON.
 
-    `parameters` is the scene as TOML, or its representation where it holds a law or form of the user's own.
+    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
+    user's own.
     """
     from evfem.scene.file import dump
 
@@ -333,7 +343,9 @@ class Checkpoint:
     path: Path
 
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
-        """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
+        """Store the state in one step; the file before stays as it is if the disk refuses
+        (StorageError).
+        """
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
         plain_rows = [{name: plain(value) for name, value in row.items()} for row in rows]
@@ -341,8 +353,8 @@ class Checkpoint:
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
 
     def read(self, scene_digest: str) -> Saved:
-        """The state of the same scene. Raises InputError for another scene's, another version's or a
-        damaged file.
+        """The state of the same scene. Raises InputError for another scene's, another version's or
+        a damaged file.
         """
         allowed = "a checkpoint of the same scene and version"
         arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)

@@ -1,5 +1,5 @@
-"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged step
-out.
+"""Run a scene: build the parts it needs, follow its motions step by step, and hand every converged
+step out.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less fr
 
 @dataclass(frozen=True)
 class Request:
-    """One requested step: its number in the run, its motion, and the path from the state before to its
-    exact target.
+    """One requested step: its number in the run, its motion, and the path from the state before to
+    its exact target.
     """
 
     step: int
@@ -62,16 +62,18 @@ class Request:
 def simulate(
     scene: Scene, *, progress: bool = False, observers: Sequence[Observer] = (), resume: Saved | None = None
 ) -> Result:
-    """Press, slide and attract as the scene says; returns the history, the fields of every n-th step and how
-    they came about.
+    """Press, slide and attract as the scene says; returns the history, the fields of every n-th
+    step and how they came about.
 
-    `observers` are objects with any of `started(mesh, scene, total_steps)`, `step(row, frame, checkpoint)`
-    after every converged step (`frame` is None on steps without fields, `checkpoint()` gives the arrays to
-    resume from) and `finished(result)`, see `evfem.protocols`. One that raises `StopRun` in `step` ends the
-    run after that step: the result so far, with the fields of its last step, is returned, and has the reason
-    in its provenance under `stopped`. `resume` continues from such arrays and rows, to the same numbers as
-    without the interruption; the result then has all rows, but fields only of the steps since. Raises
-    `NotConverged`, with the result so far, and leaves everything up to the last good step with the observers.
+    `observers` are objects with any of `started(mesh, scene, total_steps)`,
+    `step(row, frame, checkpoint)` after every converged step (`frame` is None on steps without
+    fields, `checkpoint()` gives the arrays to resume from) and `finished(result)`, see
+    `evfem.protocols`. One that raises `StopRun` in `step` ends the run after that step: the result
+    so far, with the fields of its last step, is returned, and has the reason in its provenance
+    under `stopped`. `resume` continues from such arrays and rows, to the same numbers as without
+    the interruption; the result then has all rows, but fields only of the steps since. Raises
+    `NotConverged`, with the result so far, and leaves everything up to the last good step with the
+    observers.
     """
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
@@ -192,7 +194,9 @@ class Run:
         return FollowFriction(float(wish(position)), wish.largest_voltage)
 
     def _path(self, start: Target, end: Target, seconds: float) -> Path:
-        """Straight from one target to the next; a voltage profile or wished force is followed on the way."""
+        """Straight from one target to the next; a voltage profile or wished force is followed on
+        the way.
+        """
 
         def target(done: float, fraction: float) -> Target:
             duration = (fraction - done) * seconds
@@ -215,7 +219,9 @@ class Run:
     # -- one requested step
 
     def advance(self, request: Request) -> Frame | None:
-        """Reach a request's target exactly, record its row, and return its fields if they are wanted."""
+        """Reach a request's target exactly, record its row, and return its fields if they are
+        wanted.
+        """
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)

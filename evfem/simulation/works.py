@@ -1,9 +1,10 @@
 r"""Works and dissipations of one accepted part of a run, each from its own definition.
 
-Between two equilibria 0 and 1, with :math:`\Delta` the change of a quantity and :math:`\bar f = (f_0 +
-f_1)/2`: internal forces f (tissue, viscosity, mass), forms of the user :math:`f_u`, attraction :math:`f_e`,
-contact :math:`\lambda` and the reaction r of the bone b balance at both ends, :math:`f + f_u = f_e + \lambda
-+ r`. So the trapezoidal works telescope to the solver's tolerance,
+Between two equilibria 0 and 1, with :math:`\Delta` the change of a quantity and
+:math:`\bar f = (f_0 + f_1)/2`: internal forces f (tissue, viscosity, mass), forms of the user
+:math:`f_u`, attraction :math:`f_e`, contact :math:`\lambda` and the reaction r of the bone b
+balance at both ends, :math:`f + f_u = f_e + \lambda + r`. So the trapezoidal works telescope to
+the solver's tolerance,
 
 .. math:: \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + \bar f_e\cdot\Delta u
           = \bar f\cdot\Delta u - \bar\lambda\cdot\Delta u .
@@ -19,27 +20,28 @@ The history has
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
-What separates them is found term by term, without the work of the bone, and so closes the books only where
-the forces of the accepted states balance:
+What separates them is found term by term, without the work of the bone, and so closes the books
+only where the forces of the accepted states balance:
 
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) .
 
-First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a share that
-telescopes; then the work of nodes that land, leave or begin to slip; then what the way adds to the
-attraction's work. Over a motion the sum falls with the square of the step, in time with the step, and is
-``integrator_dissipation``.
+First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a
+share that telescopes; then the work of nodes that land, leave or begin to slip; then what the way
+adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
+with the step, and is ``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses
-are, where time stops), and the end is far away however small the part. Then L does not fall with the step.
-It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at
-their final values, moves along forces that grow faster than the tissue's,
+A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous
+stresses are, where time stops), and the end is far away however small the part. Then L does not
+fall with the step. It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and
+either the body, the loads at their final values, moves along forces that grow faster than the
+tissue's,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
 
-or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small parts, and
-only say which of two columns has L.
+or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small
+parts, and only say which of two columns has L.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
@@ -87,8 +89,9 @@ SLIDE, PART = _gauss(4)
 
 @dataclass(frozen=True, eq=False)
 class Books:
-    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those of the
-    user's forms, stored energy of the tissue, that of the interface's springs, kinetic energy.
+    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those
+    of the user's forms, stored energy of the tissue, that of the interface's springs, kinetic
+    energy.
     """
 
     forces: Floats
@@ -189,7 +192,9 @@ class Part:
 
     @cached_property
     def _slip(self) -> Floats:
-        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
+        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they
+        left.
+        """
         model, old, new = self.model, self.old, self.new
         interface = model.equilibrium.interface
         stretch = [surface_state(model.surface, interface.positions(s.u)).stretch for s in (old, new)]
@@ -224,8 +229,8 @@ class Part:
         return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
 
     def _pulled_along(self, along: Floats) -> float:
-        """Work of the change of attraction and friction on the way `along` (P, dim) that the bone does not
-        go, the loads at their final values.
+        """Work of the change of attraction and friction on the way `along` (P, dim) that the bone
+        does not go, the loads at their final values.
         """
         model, old, new = self.model, self.old, self.new
         carried = replace(old, u=old.u + (new.bone - old.bone))

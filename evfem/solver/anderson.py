@@ -1,15 +1,15 @@
 r"""Anderson's acceleration of iterations that use one factorisation for several steps.
 
-An iteration with an older tangent is a fixed-point map, x -> g(x), that contracts slowly along the few
-directions in which the tangent has changed. With the steps :math:`r_k = g(x_k) - x_k` of the last iterations,
-the next iterate is the affine combination
+An iteration with an older tangent is a fixed-point map, x -> g(x), that contracts slowly along the
+few directions in which the tangent has changed. With the steps :math:`r_k = g(x_k) - x_k` of the
+last iterations, the next iterate is the affine combination
 
 .. math:: x_{k+1} = g_k - \sum_j \theta_j\,(g_{k-j+1} - g_{k-j}), \qquad
           \theta = \arg\min \| r_k - \sum_j \theta_j\,(r_{k-j+1} - r_{k-j}) \| .
 
-Closed gaps, stick and slipping shear forces are linear relations between displacements and forces, so a
-combination obeys them too as long as no status has changed. Source: D. G. Anderson, J. ACM 12 (1965) 547,
-doi:10.1145/321296.321305.
+Closed gaps, stick and slipping shear forces are linear relations between displacements and forces,
+so a combination obeys them too as long as no status has changed. Source: D. G. Anderson, J. ACM 12
+(1965) 547, doi:10.1145/321296.321305.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Anderson:
         self._images: list[Floats] = []
 
     def next_iterate(self, before: State, after: State) -> State:
-        """A better iterate than `after`, to which the map has taken `before`; `after` itself while nothing
-        is known of the map, or where a node has changed its status.
+        """A better iterate than `after`, to which the map has taken `before`; `after` itself while
+        nothing is known of the map, or where a node has changed its status.
         """
         if not np.array_equal(before.status, after.status):
             self.reset()

@@ -1,15 +1,15 @@
 r"""Sparse factorisation of the tissue's tangent with exact condensation onto a few unknowns.
 
-The symmetric tangent is split into interior unknowns i and kept unknowns c (contact candidates and the bone's
-two translations):
+The symmetric tangent is split into interior unknowns i and kept unknowns c (contact candidates and
+the bone's two translations):
 
 .. math:: S = K_{cc} - K_{ci} K_{ii}^{-1} K_{ic}, \qquad g = b_c - K_{ci} K_{ii}^{-1} b_i, \qquad
           S x_c = g, \qquad K_{ii} x_i = b_i - K_{ic} x_c .
 
-Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to the small
-dense S by the caller. `Pardiso` (from evfem[fast]) returns S with its factorisation and solves in two halves.
-`SuperLU` eliminates the kept unknowns last, so that S is the product of the trailing blocks of L and U. Only
-i must be positive definite: the bone may be free to move.
+Everything unsymmetric or jumpy (friction, electrostatic stiffness, prescribed forces) is added to
+the small dense S by the caller. `Pardiso` (from evfem[fast]) returns S with its factorisation and
+solves in two halves. `SuperLU` eliminates the kept unknowns last, so that S is the product of the
+trailing blocks of L and U. Only i must be positive definite: the bone may be free to move.
 """
 
 from __future__ import annotations
@@ -44,7 +44,9 @@ class Condensation(Protocol):
     schur: Floats
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side (m,))."""
+        """Eliminate the interior from b (n,): (state for `backward`, condensed right-hand side
+        (m,)).
+        """
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
         """Solution (n,) once the kept unknowns (m,) are known."""
@@ -52,7 +54,9 @@ class Condensation(Protocol):
 
 @cache
 def pardiso_library() -> Any:
-    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for it."""
+    """pypardiso's handle of the library; told where it is, as it would search the whole prefix for
+    it.
+    """
     if PLACE not in os.environ and (place := mkl_library()) is not None:
         os.environ[PLACE] = place
     from pypardiso.pardiso_wrapper import PyPardisoSolver
@@ -71,8 +75,8 @@ def mkl_library() -> str | None:
 
 
 def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
-    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves S
-    singular.
+    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves
+    S singular.
     """
     return float(np.abs(upper[pattern.diagonal[kept]]).max())
 
@@ -125,8 +129,8 @@ class Pardiso:
         return error.value
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if even the indefinite factorisation
-        fails.
+        """Factorise new values of the pattern; raises `Singular` if even the indefinite
+        factorisation fails.
         """
         shift = shift_of_kept(self.pattern, self.kept, upper)
         self._values = upper.copy()

@@ -1,8 +1,9 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
+r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction
+force.
 
-A control says which part of the step is known; where a force is prescribed instead, it gives the extra
-unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share of the residual,
-and its bounds:
+A control says which part of the step is known; where a force is prescribed instead, it gives the
+extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
+of the residual, and its bounds:
 
 ==================  ===========================  ============================  ====================
 control             known                        unknown                       equation
@@ -13,9 +14,9 @@ control             known                        unknown                       e
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
-Attraction is proportional to the squared voltage, so that this unknown enters linearly. A control of one's
-own (a spring behind the bone, a prescribed charge) is a class with the methods of `HeightControl` or
-`VoltageControl`; `docs/howto/extend.md` builds one.
+Attraction is proportional to the squared voltage, so that this unknown enters linearly. A control
+of one's own (a spring behind the bone, a prescribed charge) is a class with the methods of
+`HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
 """
 
 from __future__ import annotations
@@ -100,8 +101,9 @@ class Force:
 
 @dataclass(frozen=True)
 class Drive:
-    """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a solved
-    contact problem, and what one kV^2 more does: the state for the backward solve and the condensed forces.
+    """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a
+    solved contact problem, and what one kV^2 more does: the state for the backward solve and the
+    condensed forces.
     """
 
     squared: float
@@ -111,8 +113,8 @@ class Drive:
 
 @dataclass(frozen=True)
 class DrivenStep:
-    """A solved contact step, the change of the squared voltage (kV^2) in it, and the state for the backward
-    solve per kV^2 where it has changed.
+    """A solved contact step, the change of the squared voltage (kV^2) in it, and the state for the
+    backward solve per kV^2 where it has changed.
     """
 
     solution: StepSolution
@@ -138,7 +140,9 @@ class VoltageControl(Protocol):
         """Voltage at which the iterations of a step begin that comes from `voltage`."""
 
     def missing(self, reaction: Floats) -> float:
-        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
+        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions
+        (2,).
+        """
 
     def solve(self, step: LinearContactStep, drive: Drive) -> DrivenStep:
         """Contact, together with the voltage where it is an unknown."""
@@ -180,8 +184,8 @@ class GivenVoltage:
 class FollowFriction:
     """The voltage, from 0 to `voltage` (V), makes the bone's force along x `force` (N/mm).
 
-    Friction hardly depends on the voltage of a pad that sticks: there the wish has no sensible answer, and
-    the voltage stays as it was.
+    Friction hardly depends on the voltage of a pad that sticks: there the wish has no sensible
+    answer, and the voltage stays as it was.
     """
 
     force: float
@@ -215,8 +219,8 @@ class FollowFriction:
         return DrivenStep(found, change, unit)
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """At a bound the force may miss the wish in the direction that the bound forbids to correct; else the
-        voltage becomes an unknown again.
+        """At a bound the force may miss the wish in the direction that the bound forbids to
+        correct; else the voltage becomes an unknown again.
         """
         if self.free:
             return True
@@ -239,7 +243,9 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), what settles its height and the voltage, and its seconds."""
+    """Where a step goes: x of the bone (mm), what settles its height and the voltage, and its
+    seconds.
+    """
 
     x: float
     height: HeightControl
@@ -256,7 +262,9 @@ class Target:
         return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage))
 
     def bone(self, present: Floats) -> Floats:
-        """Translation of the bone (2,) as far as it is known; the `present` height where it is not."""
+        """Translation of the bone (2,) as far as it is known; the `present` height where it is
+        not.
+        """
         return np.array([self.x, self.height.known(float(present[1]))])
 
     def reached(self, bone: Floats) -> bool:

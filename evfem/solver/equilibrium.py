@@ -14,10 +14,10 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
-What a body must offer, and nothing else, is in `LinearisedBody`: finite elements (`evfem.solver.factorised`)
-and the remembered pad of the fast model (`evfem.fast.step`) are two of them. What the stepper, the ledger and
-the run need of a solver is in `StepSolver`. Friction is counted from the last accepted state; nothing is
-committed before acceptance.
+What a body must offer, and nothing else, is in `LinearisedBody`: finite elements
+(`evfem.solver.factorised`) and the remembered pad of the fast model (`evfem.fast.step`) are two of
+them. What the stepper, the ledger and the run need of a solver is in `StepSolver`. Friction is
+counted from the last accepted state; nothing is committed before acceptance.
 """
 
 from __future__ import annotations
@@ -141,8 +141,8 @@ class Statics:
         return self.interface.contact_forces(state)
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken from
-        `old`, the last converged state.
+        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken
+        from `old`, the last converged state.
         """
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
@@ -150,7 +150,9 @@ class Statics:
 
 
 class Equilibrium(Statics):
-    """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
+    """Finds equilibria of a body on a surface, with or without attraction, one step after the
+    other.
+    """
 
     def __init__(
         self,
@@ -167,8 +169,9 @@ class Equilibrium(Statics):
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
     ) -> State:
-        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead of the
-        current one if given; iterations begin at `start` (default `old`). Raises `StepFailed`.
+        """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead
+        of the current one if given; iterations begin at `start` (default `old`). Raises
+        `StepFailed`.
         """
         found = None
         try:
@@ -238,8 +241,8 @@ class Equilibrium(Statics):
         return target.drive.accepts(forward, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
-        """Whether contact and friction hold at the present positions; a node that penetrates becomes a
-        candidate.
+        """Whether contact and friction hold at the present positions; a node that penetrates
+        becomes a candidate.
         """
         penetration = self.interface.shallowest_penetration(state)
         if penetration is not None:

@@ -1,6 +1,8 @@
-r"""Finite elements behind `evfem.solver.equilibrium.LinearisedBody`: factorise, solve contact, move.
+r"""Finite elements behind `evfem.solver.equilibrium.LinearisedBody`: factorise, solve contact,
+move.
 
-With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and the bone b,
+With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and
+the bone b,
 
 .. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b = g_c + \lambda^+ - \lambda + \Delta f, \qquad
           S_{bc}\,\Delta u_c + S_{bb}\,\Delta u_b = g_b + F_b .
@@ -53,8 +55,8 @@ from evfem.tissue.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2) in mm, the
-    squared voltage in kV^2; and the fraction of it that may be taken.
+    """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2)
+    in mm, the squared voltage in kV^2; and the fraction of it that may be taken.
     """
 
     contact: StepSolution
@@ -96,8 +98,8 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Where iterations begin: the present state moved on along its last increment, or with the bone if
-        nothing touches.
+        """Where iterations begin: the present state moved on along its last increment, or with the
+        bone if nothing touches.
         """
         state = replace(state, voltage=target.drive.guess(state.voltage))
         if state.touching.any():
@@ -106,7 +108,9 @@ class FactorisedBody:
         return replace(state, u=state.u + (bone - state.bone), bone=bone)
 
     def _extrapolated(self, state: State, target: Target) -> State:
-        """As far along the last increment of the displacements as the bone's next one is along its last."""
+        """As far along the last increment of the displacements as the bone's next one is along its
+        last.
+        """
         node = self.body.space.mesh.node_sets["bone"][0]
         last, way = state.last_increment[node], target.bone(state.bone) - state.bone
         axis = int(np.argmax(np.abs(way)))
@@ -137,8 +141,8 @@ class FactorisedBody:
         return state, Balance(forces, float(free / largest), attraction)
 
     def _rounding(self, state: State) -> float:
-        """Forces (N/mm) below which the balance is rounding of displacements that contain the bone's
-        travel.
+        """Forces (N/mm) below which the balance is rounding of displacements that contain the
+        bone's travel.
         """
         epsilon = float(np.finfo(float).eps)
         return 4.0 * epsilon * self.linearisation.stiffest * float(np.abs(state.bone).max())
@@ -166,8 +170,9 @@ class FactorisedBody:
     def _linear_step(
         self, old: State, state: State, target: Target, balance: Balance, search: bool = False
     ) -> State:
-        """Solve the contact problem of the linearised body, move, shorten where cells would collapse; with
-        `search`, a travel of the bone that the problem cannot settle is searched for.
+        """Solve the contact problem of the linearised body, move, shorten where cells would
+        collapse; with `search`, a travel of the bone that the problem cannot settle is searched
+        for.
         """
         factor = self.linearisation.factor
         saved, residual = factor.forward(-balance.forces)
@@ -206,7 +211,9 @@ class FactorisedBody:
         return found
 
     def _driven(self, step: LinearContactStep, state: State, target: Target) -> DrivenStep:
-        """Contact as the voltage control wants it, with the attraction of one kV^2 at its disposal."""
+        """Contact as the voltage control wants it, with the attraction of one kV^2 at its
+        disposal.
+        """
 
         def unit() -> tuple[Floats, Floats]:
             assert self.attraction is not None
@@ -222,7 +229,9 @@ class FactorisedBody:
     def _limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,), shortened where it is too long for a linear step."""
+        """The solution and the bone's increment (2,), shortened where it is too long for a linear
+        step.
+        """
         if not step.unknowns:
             return found, step.bone
         bone = np.array([step.bone[0], found.extra[0]])
@@ -237,19 +246,20 @@ class FactorisedBody:
         return found, bone
 
     def _longest_flight(self, state: State) -> float:
-        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as far again,
-        at least a small fraction of the largest increment.
+        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as
+        far again, at least a small fraction of the largest increment.
         """
         gap = float(surface_state(self.interface.surface, self.interface.positions(state.u)).gap.min())
         least = SEARCH_START * self.largest_bone_increment
         return float(np.clip(2.0 * gap, least, self.largest_bone_increment))
 
     def _searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,) at which the bone lacks least force, where no travel
-        settles it: an attraction that is extrapolated over a long way has none, for example.
+        """The solution and the bone's increment (2,) at which the bone lacks least force, where no
+        travel settles it: an attraction that is extrapolated over a long way has none, for
+        example.
 
-        The travel grows towards the lacking force, twice as far each time, and is halved where that
-        overshoots.
+        The travel grows towards the lacking force, twice as far each time, and is halved where
+        that overshoots.
         """
 
         def at(travel: float) -> tuple[float, StepSolution, Floats]:

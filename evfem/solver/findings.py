@@ -1,4 +1,6 @@
-"""How an iterate looks that is no equilibrium, in one line: what a person needs to see why a step failed."""
+"""How an iterate looks that is no equilibrium, in one line: what a person needs to see why a step
+failed.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +14,8 @@ from evfem.tissue.body import Body
 
 
 def findings(body: Body, state: State, balance: Balance) -> str:
-    """The largest out-of-balance forces and where they sit (current positions), the state of contact, and the
-    smallest volume ratio of a cell.
+    """The largest out-of-balance forces and where they sit (current positions), the state of
+    contact, and the smallest volume ratio of a cell.
     """
     nodal = np.hypot(*_free(body, balance.forces).T)
     worst = np.argsort(nodal)[::-1][:NAMED]

@@ -1,10 +1,10 @@
-"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys their
-laws.
+"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys
+their laws.
 
-Contact forces of a state are along the profile's normal and tangent at the node's x. Slip is counted along
-the profile from the last accepted x, or from the jump of friction that holds the node (`Pins`). With
-penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0 and s + (lam_t - lam_t0) / (p_t
-A) = 0 instead of g = 0 and s = 0.
+Contact forces of a state are along the profile's normal and tangent at the node's x. Slip is
+counted along the profile from the last accepted x, or from the jump of friction that holds the
+node (`Pins`). With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from evfem.solver.state import State
 class Pins:
     """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
 
-    A node slides up to a jump to higher friction and stays there, its shear force growing from the lower to
-    the higher limit, before it slides on. Taken at the node's own x the coefficient then has no consistent
-    value on either side: the iterations put the node before the jump, behind it, before it again. Such a node
-    is pinned to the jump, a hair inside the rougher side, where it sticks with the higher coefficient. It is
-    released when its shear force falls below the lower limit.
+    A node slides up to a jump to higher friction and stays there, its shear force growing from the
+    lower to the higher limit, before it slides on. Taken at the node's own x the coefficient then
+    has no consistent value on either side: the iterations put the node before the jump, behind it,
+    before it again. Such a node is pinned to the jump, a hair inside the rougher side, where it
+    sticks with the higher coefficient. It is released when its shear force falls below the lower
+    limit.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
@@ -73,9 +74,9 @@ class Pins:
 
 
 def steps_of_friction(surface: Any, short: float) -> Floats:
-    """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J, 3) in
-    ascending order: position, coefficient before and behind. A ramp that a node crosses in one iteration is
-    to it a jump at its rougher end.
+    """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
+    3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
+    one iteration is to it a jump at its rougher end.
     """
     jumps, ramps = surface.friction_jumps, getattr(surface, "friction_ramps", np.zeros((0, 4)))
     begin, end, before, behind = ramps[ramps[:, 1] - ramps[:, 0] < short].T
@@ -99,8 +100,8 @@ class Interface:
         return self.points + u[self.pad.nodes]
 
     def resting(self, state: State) -> Floats:
-        """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface: below a thin
-        insulator the rounding of their gaps would be a force.
+        """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface:
+        below a thin insulator the rounding of their gaps would be a force.
         """
         position = self.positions(state.u)
         touching = state.status != OPEN
@@ -117,8 +118,8 @@ class Interface:
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
-        """What the contact problem has to know of the candidates c (numbers of pad nodes); of every pad node
-        the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
+        """What the contact problem has to know of the candidates c (numbers of pad nodes); of
+        every pad node the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
         """
         position = self.positions(state.u)[c]
         surface = surface_state(self.surface, position)
@@ -139,17 +140,21 @@ class Interface:
         )
 
     def _origin(self, old: State) -> Floats:
-        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds
+        a node.
+        """
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm: 0, contact is exact."""
+        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm: 0, contact
+        is exact.
+        """
         return np.zeros_like(old.contact_force)
 
     def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:
-        """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the last
-        accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask for it here;
-        `Pins` alone takes the coefficients on both sides of a jump from the surface.
+        """Friction coefficient of these pad nodes (k,) at the positions x (k,) in mm; `old` is the
+        last accepted state. The contact problem (`candidates`) and acceptance (`obeyed`) both ask
+        for it here; `Pins` alone takes the coefficients on both sides of a jump from the surface.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
@@ -188,13 +193,15 @@ class Interface:
 
 
 class PenaltyInterface(Interface):
-    """An interface that yields: 1 / (penalty x tributary length) of compliance per node; `penalties` in N/mm3
-    along normal and tangent.
+    """An interface that yields: 1 / (penalty x tributary length) of compliance per node;
+    `penalties` in N/mm3 along normal and tangent.
     """
 
     penalties: tuple[float, float] = (np.inf, np.inf)
 
     def compliance(self, old: State) -> Floats:
-        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
+        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last
+        step.
+        """
         length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), SHORTEST_LENGTH * self.length)
         return 1.0 / np.outer(length, self.penalties)

@@ -1,5 +1,5 @@
-r"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for how long
-that serves.
+r"""The body's tangent as a step uses it: which nodes may touch, where it was factorised, and for
+how long that serves.
 
 A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_needed`)::
 
@@ -9,7 +9,8 @@ A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_
         the residual has stalled, or falls so slowly that more iterations than `patience` would be left
     S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
 
-The coupling is the stiffness that the attraction's tributary lengths add between neighbouring nodes.
+The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
+nodes.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ from evfem.tissue.body import Body
 
 
 class Linearisation:
-    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in them."""
+    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in
+    them.
+    """
 
     def __init__(
         self,
@@ -60,7 +63,9 @@ class Linearisation:
         self.touching, self.frozen = old.status != OPEN, frozen
 
     def start_clock(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
+        """Start the clock of a step; a factorisation made for a much longer or shorter one is of
+        no use.
+        """
         dynamics = self.body.dynamics
         if dynamics is None:
             return
@@ -71,8 +76,8 @@ class Linearisation:
         dynamics.begin(old.u, old.velocity, duration)
 
     def choose_candidates(self, state: State, reach: float) -> None:
-        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously if the
-        present set does not do.
+        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously
+        if the present set does not do.
         """
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
@@ -94,8 +99,8 @@ class Linearisation:
         self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorise at the present state where there is no factorisation, the old one stalls, or a new
-        one saves iterations; says whether it did.
+        """Factorise at the present state where there is no factorisation, the old one stalls, or a
+        new one saves iterations; says whether it did.
         """
         if self.factor is not None and not self._outdated and not self._too_old(history):
             return False
@@ -169,9 +174,10 @@ class Linearisation:
         return np.maximum(now - closed, 0.0)
 
     def _coupling(self, state: State) -> Floats | None:
-        """The attraction's stiffness on the candidates but for the weakening with a node's own gap, which
-        belongs to the contact problem: what is left are changes of tributary lengths. None without
-        attraction, or where they are faint: a symmetric compliance takes a third of the time.
+        """The attraction's stiffness on the candidates but for the weakening with a node's own
+        gap, which belongs to the contact problem: what is left are changes of tributary lengths.
+        None without attraction, or where they are faint: a symmetric compliance takes a third of
+        the time.
         """
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return None

@@ -11,8 +11,8 @@ from evfem.solver.strategy import Strategy
 
 
 class StepFailed(ArithmeticError):
-    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong, `findings` how
-    the last iterate looked.
+    """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
+    `findings` how the last iterate looked.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -24,10 +24,10 @@ class StepFailed(ArithmeticError):
 class State:
     """A configuration of a body with N nodes, P of them on the pad.
 
-    Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and tangent
-    (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V, the attraction on
-    the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in mm/s, and the increment of
-    the displacements in the step that led here (N, 2).
+    Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and
+    tangent (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V,
+    the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
+    mm/s, and the increment of the displacements in the step that led here (N, 2).
     """
 
     u: Floats
@@ -48,8 +48,9 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,), whether the
-    attraction was frozen, and the time step's displacements at its beginning (N, 2) and its seconds.
+    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,),
+    whether the attraction was frozen, and the time step's displacements at its beginning (N, 2)
+    and its seconds.
     """
 
     u: Floats
@@ -62,8 +63,8 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What a solver takes with it from step to step: the contact candidates (numbers of pad nodes), where its
-    factorisation was made if it has one, and the seconds of the last time step.
+    """What a solver takes with it from step to step: the contact candidates (numbers of pad
+    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
     """
 
     candidates: Ints
@@ -93,8 +94,9 @@ class Record:
 
 @dataclass(frozen=True)
 class Balance:
-    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced unknowns in N/mm,
-    the largest of them relative to the reaction, and the attraction (P, 2) at its positions.
+    """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced
+    unknowns in N/mm, the largest of them relative to the reaction, and the attraction (P, 2) at
+    its positions.
     """
 
     forces: Floats

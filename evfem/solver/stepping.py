@@ -29,8 +29,8 @@ Path = Callable[[float, float], Target]
 
 @dataclass
 class Stepper:
-    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step, that worked
-    last.
+    """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
+    that worked last.
     """
 
     equilibrium: StepSolver
@@ -39,10 +39,11 @@ class Stepper:
     cuts: int = 0
 
     def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
-        """From `state` to the end of `path`; `accept(old, new)` sees every converged substep. Returns the end
-        and the number of substeps.
+        """From `state` to the end of `path`; `accept(old, new)` sees every converged substep.
+        Returns the end and the number of substeps.
 
-        Raises `StepFailed` when the smallest substep fails; what was accepted before stays accepted.
+        Raises `StepFailed` when the smallest substep fails; what was accepted before stays
+        accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
         while done < 1.0:
@@ -64,8 +65,8 @@ class Stepper:
         return state, substeps
 
     def solve(self, state: State, target: Target) -> State:
-        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction found
-        beforehand.
+        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction
+        found beforehand.
         """
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:

@@ -1,11 +1,11 @@
 """How hard steps are tried: the numbers behind globalisation and adaptive parts, all in one place.
 
-A step is one equilibrium from one accepted state to the next. It is tried whole first. Where it fails, it is
-cut into parts: half as long after each failure, longer again after easy ones. What makes the iterations of
-one part hold is not a choice: contact is solved exactly in each of them, cells cannot collapse, an attraction
-that the body cannot hold is followed in small moves or snaps, and under a force the bone moves by limited
-strides. Ill-posed scenes (sliding over texture, brittle snap-through) need physics instead: `dynamics`
-"viscous" or "inertial" with a speed.
+A step is one equilibrium from one accepted state to the next. It is tried whole first. Where it
+fails, it is cut into parts: half as long after each failure, longer again after easy ones. What
+makes the iterations of one part hold is not a choice: contact is solved exactly in each of them,
+cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
+and under a force the bone moves by limited strides. Ill-posed scenes (sliding over texture,
+brittle snap-through) need physics instead: `dynamics` "viscous" or "inertial" with a speed.
 """
 
 from __future__ import annotations
@@ -24,10 +24,11 @@ _REACH = number("a factor from 0 to 10", lambda f: 0.0 <= f <= 10.0)
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part; `patience`: renew the factorisation when more iterations than this would
-    be left with the old one; `smallest_part`: of a requested step, before it counts as not converged;
-    `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`: a part
-    begins at most so many times the last one's displacements ahead (0: at the last state).
+    `iterations`: most of one part; `patience`: renew the factorisation when more iterations than
+    this would be left with the old one; `smallest_part`: of a requested step, before it counts as
+    not converged; `easy`: a part with so few iterations lets the next one grow by the factor
+    `growth`; `reach`: a part begins at most so many times the last one's displacements ahead (0:
+    at the last state).
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)

@@ -1,9 +1,9 @@
 """What a sweep varies: grids and samples of dotted keys of a scene file; from TOML or from Python.
 
-A point of a sweep is a whole scene, as the text of a scene file: the base scene with some keys replaced. A
-dotted key names them as they stand in the file, entries of lists by their number: `surface.friction`,
-`finger.electrical.stratum_corneum_eps_r`, `motion.0.force`. Only the scene reader (`evfem.scene.file`) judges
-the values.
+A point of a sweep is a whole scene, as the text of a scene file: the base scene with some keys
+replaced. A dotted key names them as they stand in the file, entries of lists by their number:
+`surface.friction`, `finger.electrical.stratum_corneum_eps_r`, `motion.0.force`. Only the scene
+reader (`evfem.scene.file`) judges the values.
 """
 
 from __future__ import annotations
@@ -58,10 +58,11 @@ class Point:
 class Sweep:
     """A scene and what is varied in it: every combination of the grid, each with every sample.
 
-    `scene` is a `Scene` that a file can hold, or the tables of a scene file, in which paths are relative to
-    `folder`. An entry of `grid` is a dotted key with a list of its values, or a name of your own with rows
-    {row: {key: value, ...}} of keys that change together. `outputs` are `COLUMN.STATISTIC`: a column of the
-    history and last, mean, min or max over its steps, `COLUMN.STATISTIC.N` over those of motion N alone.
+    `scene` is a `Scene` that a file can hold, or the tables of a scene file, in which paths are
+    relative to `folder`. An entry of `grid` is a dotted key with a list of its values, or a name
+    of your own with rows {row: {key: value, ...}} of keys that change together. `outputs` are
+    `COLUMN.STATISTIC`: a column of the history and last, mean, min or max over its steps,
+    `COLUMN.STATISTIC.N` over those of motion N alone.
 
     >>> from evfem.scene.scene import default_scene
     >>> sweep = Sweep(default_scene(), grid={"surface.friction": [0.2, 0.3], "motion.0.force": [0.1, 0.2]})

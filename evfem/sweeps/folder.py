@@ -1,9 +1,10 @@
 """What a sweep leaves on disk: a file per point, one table of all, and how they came about.
 
-A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on, or one
-changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
-(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance, from the
-start, so that the folder can tell which sweep was its last.
+A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on,
+or one changed in other points, finds it again. Every file is written whole or not at all. The
+table is `sweep.csv` (and `sweep.parquet` where pyarrow is installed), a row per point;
+`sweep.json` has the provenance, from the start, so that the folder can tell which sweep was its
+last.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ STATUS = ("done", "refused", "not_converged", "failed")
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a point: `status` done, refused (by the scene reader), not_converged or failed, the
-    outputs of a point that is done, and the message of one that is not.
+    """What became of a point: `status` done, refused (by the scene reader), not_converged or
+    failed, the outputs of a point that is done, and the message of one that is not.
     """
 
     status: str
@@ -43,13 +44,17 @@ class Answer:
 
     @property
     def final(self) -> bool:
-        """Whether computing it again would give the same: not so where a process died or the memory ended."""
+        """Whether computing it again would give the same: not so where a process died or the
+        memory ended.
+        """
         return self.status != "failed"
 
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all points."""
+    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all
+    points.
+    """
 
     path: Path
     resume: bool = False
@@ -62,8 +67,8 @@ class SweepFolder:
     def open(self, keys: Collection[str], plan: str) -> None:
         """Make the folder of the sweep with these keys and the fingerprint `plan`, or clear it.
 
-        Raises InputError, with nothing touched, where files of others are in the way, or points that this
-        sweep does not have.
+        Raises InputError, with nothing touched, where files of others are in the way, or points
+        that this sweep does not have.
         """
         ours = (TABLE, PARQUET, PROVENANCE, POINTS)
         with disk(f"use {self.path}"):

@@ -1,7 +1,9 @@
-"""Where the points of a sweep are computed: in this process, in processes beside it, or on a Dask cluster.
+"""Where the points of a sweep are computed: in this process, in processes beside it, or on a Dask
+cluster.
 
-All three take calls as the executors of `concurrent.futures` do. Processes are started afresh, each with the
-BLAS on one thread, and end at once when the process that started them is gone, however it went.
+All three take calls as the executors of `concurrent.futures` do. Processes are started afresh,
+each with the BLAS on one thread, and end at once when the process that started them is gone,
+however it went.
 """
 
 from __future__ import annotations
@@ -42,11 +44,12 @@ Open = Callable[[], AbstractContextManager[Pool]]
 
 
 def open_pool(workers: int | None, scheduler: str | None) -> Open:
-    """What opens a pool: `workers` processes of this machine (None: one for each core), in this process with
-    `workers` 1, or the Dask cluster whose scheduler has the address `scheduler` ("local": one of `workers`
-    processes, started for this).
+    """What opens a pool: `workers` processes of this machine (None: one for each core), in this
+    process with `workers` 1, or the Dask cluster whose scheduler has the address `scheduler`
+    ("local": one of `workers` processes, started for this).
 
-    Raises InputError for workers beside an address, without Dask, and in a process that such a pool started.
+    Raises InputError for workers beside an address, without Dask, and in a process that such a
+    pool started.
     """
     if workers is not None:
         workers = count("workers", workers, 4096)
@@ -91,7 +94,8 @@ def _here() -> Iterator[Pool]:
 def processes(workers: int) -> Iterator[Pool]:
     """That many processes; whatever leaves the block early ends them in the middle of their work.
 
-    Raises InputError where new processes cannot start: they begin by importing the script they come from.
+    Raises InputError where new processes cannot start: they begin by importing the script they
+    come from.
     """
     reader, writer = Pipe(duplex=False)
     pool = ProcessPoolExecutor(
@@ -111,7 +115,9 @@ def processes(workers: int) -> Iterator[Pool]:
 
 
 def _begin(reader: Connection) -> None:
-    """What a new process does first: leave Ctrl-C to the one that started it, and end with that one."""
+    """What a new process does first: leave Ctrl-C to the one that started it, and end with that
+    one.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threadpool_limits(1)
     threading.Thread(target=_end_with, args=(reader,), daemon=True).start()

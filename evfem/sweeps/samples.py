@@ -1,7 +1,8 @@
 """Random parameters: distributions, and samples of them drawn at random or as a latin hypercube.
 
-Every parameter has a random stream of its own, made of the seed and its name: the values of one do not
-change when another is added or moved. Drawn at random, a longer sample begins with the shorter one.
+Every parameter has a random stream of its own, made of the seed and its name: the values of one do
+not change when another is added or moved. Drawn at random, a longer sample begins with the shorter
+one.
 """
 
 from __future__ import annotations
@@ -81,10 +82,12 @@ Distribution = Uniform | Normal
 
 @dataclass(frozen=True)
 class Samples:
-    """`count` values of every parameter, independent of each other; the same seed gives the same values.
+    """`count` values of every parameter, independent of each other; the same seed gives the same
+    values.
 
-    `method` latin_hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly one value of
-    each parameter into each of `count` equally likely intervals; random draws them freely.
+    `method` latin_hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly
+    one value of each parameter into each of `count` equally likely intervals; random draws them
+    freely.
 
     >>> sample = Samples({"surface.friction": Uniform(0.0, 1.0)}, count=4, seed=1)
     >>> np.sort(np.floor(4 * sample.draw()["surface.friction"]))

@@ -1,10 +1,12 @@
-r"""One engine for every weak form: nodal forces :math:`\sum_q w B^T s`, tangents :math:`\sum_q w B^T D B`.
+r"""One engine for every weak form: nodal forces :math:`\sum_q w B^T s`, tangents
+:math:`\sum_q w B^T D B`.
 
 The fluxes s = df/d(v, grad v, theta(v)) of a form are its values at unit test functions
-(`evfem.tissue.fields`); a complex step on each part of (u, grad u, theta) gives their derivatives D. The rows
-B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not linear in the
-displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n nodes each, Q quadrature
-points, S samples of ln J, K parts, m of them per component; N nodes, E cells of the mesh.
+(`evfem.tissue.fields`); a complex step on each part of (u, grad u, theta) gives their derivatives
+D. The rows B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not
+linear in the displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n
+nodes each, Q quadrature points, S samples of ln J, K parts, m of them per component; N nodes, E
+cells of the mesh.
 """
 
 from __future__ import annotations
@@ -23,16 +25,18 @@ from evfem.tissue.space import Space, scatter
 
 
 def volume_change(H: Array) -> Array:
-    """J - 1 = det(1 + H) - 1 of H (dim, dim, ...), with the digits that J loses where it is nearly 1."""
+    """J - 1 = det(1 + H) - 1 of H (dim, dim, ...), with the digits that J loses where it is nearly
+    1.
+    """
     middle: Array | float = 0.0 if len(H) == 2 else trace(cofactor(H))
     return trace(H) + (middle + det(H))
 
 
 @dataclass(frozen=True, eq=False)
 class VolumeMeasure:
-    """theta = Pi ln J of some cells: `gradient` (C, S, n, dim) of the shape functions where ln J is sampled;
-    `projection` (C, Q, S) is Pi, None where the samples are the quadrature points. A measure of
-    `small_strain` takes the trace of the strain for ln J.
+    """theta = Pi ln J of some cells: `gradient` (C, S, n, dim) of the shape functions where ln J
+    is sampled; `projection` (C, Q, S) is Pi, None where the samples are the quadrature points. A
+    measure of `small_strain` takes the trace of the strain for ln J.
     """
 
     gradient: Floats
@@ -72,8 +76,8 @@ class VolumeMeasure:
         return flat if self.projection is None else self.projection @ flat
 
     def curvature(self, push: Floats, q: Floats) -> Floats:
-        """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, weighted with q (C, Q), as (C, n, dim,
-        n, dim).
+        """Second derivative of ln J, -F^-T grad(du)^T F^-T : grad v, weighted with q (C, Q), as
+        (C, n, dim, n, dim).
         """
         C, S, n, dim = push.shape
         flat = push.reshape(C, S, n * dim)
@@ -83,9 +87,10 @@ class VolumeMeasure:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Quadrature points of some cells or facets: `cells` (C,) they lie in, `nodes` (C, n) of those, shape
-    functions `value` (C, Q, n) with `gradient` (C, Q, n, dim), `weight` (C, Q), the place `x` (dim, C, Q);
-    in cells the measure of `volume`, on facets the outward `normal` (dim, C, Q).
+    """Quadrature points of some cells or facets: `cells` (C,) they lie in, `nodes` (C, n) of
+    those, shape functions `value` (C, Q, n) with `gradient` (C, Q, n, dim), `weight` (C, Q), the
+    place `x` (dim, C, Q); in cells the measure of `volume`, on facets the outward `normal` (dim,
+    C, Q).
     """
 
     cells: Ints
@@ -129,8 +134,8 @@ def _flat_rows(gradient: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class State:
-    """Parts `x` (K, C, Q) of the displacement, and grad u `sampled` (dim, dim, C, S) where ln J is; no
-    samples where theta is not among the parts.
+    """Parts `x` (K, C, Q) of the displacement, and grad u `sampled` (dim, dim, C, S) where ln J
+    is; no samples where theta is not among the parts.
     """
 
     x: Floats
@@ -141,9 +146,9 @@ class State:
 class Integral:
     """A weak form over `points`: its nodal forces and their derivative.
 
-    `w` is the form's context. `moduli(u, w)` gives the fluxes' derivatives (K, K, C, Q) where they are known
-    in a faster way than by complex steps. A form whose arrays may have one more axis before (C, Q) can be
-    evaluated `at_once` for all test functions.
+    `w` is the form's context. `moduli(u, w)` gives the fluxes' derivatives (K, K, C, Q) where they
+    are known in a faster way than by complex steps. A form whose arrays may have one more axis
+    before (C, Q) can be evaluated `at_once` for all test functions.
     """
 
     form: Integrand
@@ -275,8 +280,8 @@ class Integral:
 
 
 class UserIntegral(Integral):
-    """The integral of a user's form. Its tangents are the symmetric part of the exact ones, which are
-    symmetric already if the form has a potential: the solver factorises a symmetric matrix.
+    """The integral of a user's form. Its tangents are the symmetric part of the exact ones, which
+    are symmetric already if the form has a potential: the solver factorises a symmetric matrix.
     """
 
     def cell_tangents(self, u: Floats) -> Floats:

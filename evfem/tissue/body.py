@@ -1,8 +1,9 @@
 """The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
 
-The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are (free
-nodes' displacements, bone x, bone y); forces of the bone's nodes add up to the reaction. User forms
-(`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the internal forces.
+The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are
+(free nodes' displacements, bone x, bone y); forces of the bone's nodes add up to the reaction.
+User forms (`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the
+internal forces.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from evfem.tissue.weakform import Tissue
 
 
 class Pattern:
-    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR matrix
-    of size n.
+    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR
+    matrix of size n.
     """
 
     def __init__(self, unknowns: Ints, size: int) -> None:
@@ -100,8 +101,8 @@ class Body:
         return total
 
     def tangent(self, u: Floats) -> Floats:
-        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the built-in
-        terms are symmetric, a user's form gives its symmetric part).
+        """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the
+        built-in terms are symmetric, a user's form gives its symmetric part).
         """
         cells = self.tissue.tangent(u)
         for term in self.terms:

@@ -1,15 +1,15 @@
-r"""Time: objective Kelvin-Voigt stress and inertia over one step of backward Euler, as further internal
-forces.
+r"""Time: objective Kelvin-Voigt stress and inertia over one step of backward Euler, as further
+internal forces.
 
-With the time step :math:`\Delta t`, the strain :math:`E = (F^T F - 1)/2` and the state (u_0, v_0) before the
-step,
+With the time step :math:`\Delta t`, the strain :math:`E = (F^T F - 1)/2` and the state (u_0, v_0)
+before the step,
 
 .. math:: P_v = F S_v, \quad S_v = 2\eta\,(E - E_0)/\Delta t, \quad \eta = \tau\mu; \qquad
           f = M\,(v - v_0)/\Delta t, \quad v = (u - u_0)/\Delta t .
 
-Only the shear modulus enters the viscosity, so nothing locks. The step dissipates :math:`\int S_v : (E -
-E_0)`. A step that takes no time has neither term. The forms are `kelvin_voigt` and `mass` of
-`evfem.tissue.forms`.
+Only the shear modulus enters the viscosity, so nothing locks. The step dissipates
+:math:`\int S_v : (E - E_0)`. A step that takes no time has neither term. The forms are
+`kelvin_voigt` and `mass` of `evfem.tissue.forms`.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ from evfem.tissue.weakform import compiled_kernels
 
 
 class Dynamics:
-    """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other term of
-    the internal forces.
+    """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other
+    term of the internal forces.
     """
 
     def __init__(self, space: Space, viscosity: Floats | None, density: Floats | None) -> None:
-        """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves the term
-        out.
+        """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves
+        the term out.
         """
         self.space = space
         self.viscosity = viscosity
@@ -50,7 +50,9 @@ class Dynamics:
         self._strain0: Any = None
 
     def begin(self, u: Floats, velocity: Floats, step: float) -> None:
-        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N, 2)."""
+        """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
+        2).
+        """
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = self._strain(u)
@@ -59,7 +61,9 @@ class Dynamics:
 
     @cached_property
     def _damping(self) -> Integral:
-        """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each step."""
+        """The Kelvin-Voigt form over the cells that have viscosity; its context is renewed by each
+        step.
+        """
         assert self.viscosity is not None
         cells = np.flatnonzero(self.viscosity)
         w = SimpleNamespace(eta=self.viscosity[cells, None], step=self.step, strain0=self._strain0)
@@ -121,15 +125,17 @@ class Dynamics:
         return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
 
     def _strain(self, u: Floats) -> Floats:
-        """Green strain of every damped point: (dim, dim, 1, C, Q) as the form takes it, or in blocks where
-        the compiled loops read it.
+        """Green strain of every damped point: (dim, dim, 1, C, Q) as the form takes it, or in
+        blocks where the compiled loops read it.
         """
         if self.kernels is not None:
             return self.kernels.strains(u, self.space.cells)
         return green_strain(deformation_gradient(self._damping.field(u)))[:, :, None]
 
     def _blocks(self) -> tuple[Any, ...]:
-        """What the compiled loops read: viscosity over the step (B, L), cells, strains before the step."""
+        """What the compiled loops read: viscosity over the step (B, L), cells, strains before the
+        step.
+        """
         from evfem.tissue.kernels.lanes import blocked
 
         assert self.viscosity is not None
@@ -155,8 +161,8 @@ def mass_matrices(space: Space) -> Floats:
 
 
 def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, inertia: bool) -> Dynamics | None:
-    """The time-dependent terms that the laws ask for, or None if there are none; `viscosity` is the laws'
-    default relaxation time (s).
+    """The time-dependent terms that the laws ask for, or None if there are none; `viscosity` is
+    the laws' default relaxation time (s).
     """
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
     for name, law in laws.items():

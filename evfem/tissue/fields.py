@@ -1,9 +1,9 @@
 r"""What a weak form sees at a point, and its fluxes.
 
-A form f(u, v, w) is linear in the test function, so its values at unit test functions are its fluxes
-s = df/d(v, grad v, theta(v)). The parts of one point are stacked in the order (r, i): r = 0 for the value,
-then one r for each direction X_r of the gradient, i the component; theta comes last. Only the parts that a
-form uses are there.
+A form f(u, v, w) is linear in the test function, so its values at unit test functions are its
+fluxes s = df/d(v, grad v, theta(v)). The parts of one point are stacked in the order (r, i): r = 0
+for the value, then one r for each direction X_r of the gradient, i the component; theta comes
+last. Only the parts that a form uses are there.
 """
 
 from __future__ import annotations
@@ -21,7 +21,9 @@ Integrand = Callable[[Any, Any, Any], Any]
 
 
 class Field(np.ndarray[Any, Any]):
-    """What a form sees as u or v: the value (dim, ...) with `grad` (dim, dim, ...) and `theta` (...)."""
+    """What a form sees as u or v: the value (dim, ...) with `grad` (dim, dim, ...) and `theta`
+    (...).
+    """
 
     _grad: Array | None = None
     _theta: Array | None = None
@@ -91,8 +93,9 @@ def fluxes(form: Integrand, parts: Parts, x: Array, w: Any) -> Array:
 
 
 def fluxes_at_once(form: Integrand, parts: Parts, x: Array, w: Any) -> Array:
-    """The same for all test functions in one call, which have an axis of their own before (C, Q): forms of
-    arrays with any number of trailing axes can do it, and share what does not depend on v.
+    """The same for all test functions in one call, which have an axis of their own before (C, Q):
+    forms of arrays with any number of trailing axes can do it, and share what does not depend on
+    v.
     """
     units = np.eye(len(x))[:, :, None, None]
     value = form(parts.field(x[:, None]), parts.field(units), w)

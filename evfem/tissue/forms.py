@@ -1,12 +1,13 @@
 r"""Weak forms: how one is written, and those that the package itself is about.
 
-A form is a function f(u, v, w) of the displacement u, the test function v and the context w. It returns the
-integrand of a residual, linear in v, over the reference configuration; arrays have tensor axes first, then
-those of the points. Its nodal forces and their tangent come from `evfem.tissue.assembly`.
+A form is a function f(u, v, w) of the displacement u, the test function v and the context w. It
+returns the integrand of a residual, linear in v, over the reference configuration; arrays have
+tensor axes first, then those of the points. Its nodal forces and their tangent come from
+`evfem.tissue.assembly`.
 
-`neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop of
-evfem[fast] does; those loops are tested against them. The attraction's form stands beside its nodal rule, in
-`evfem.contact.attraction`.
+`neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop
+of evfem[fast] does; those loops are tested against them. The attraction's form stands beside its
+nodal rule, in `evfem.contact.attraction`.
 """
 
 from __future__ import annotations
@@ -36,11 +37,12 @@ class Form:
 
 
 def form(function: WeakForm) -> Form:
-    """Mark `function(u, v, w)` as a weak form: the residual's integrand; its tangent comes by complex step.
+    """Mark `function(u, v, w)` as a weak form: the residual's integrand; its tangent comes by
+    complex step.
 
-    `u` and `v` are the displacement (mm) and its test function with gradient, over a region also with the
-    element's volume measure `theta`; `w` carries the coordinates; the integral is taken over the reference
-    configuration. The code must be safe for complex numbers (`evfem.tensor`).
+    `u` and `v` are the displacement (mm) and its test function with gradient, over a region also
+    with the element's volume measure `theta`; `w` carries the coordinates; the integral is taken
+    over the reference configuration. The code must be safe for complex numbers (`evfem.tensor`).
 
     >>> @form
     ... def nail_bed(u, v, w): return 2.0e-2 * dot(u, v)
@@ -70,7 +72,9 @@ def green_strain(F: Array) -> Array:
 
 @form
 def neo_hookean(u: Any, v: Any, w: Any) -> Any:
-    """mu F : grad v + (lambda theta - mu) dtheta(v); theta = Pi ln J is the element's volume measure."""
+    """mu F : grad v + (lambda theta - mu) dtheta(v); theta = Pi ln J is the element's volume
+    measure.
+    """
     F = deformation_gradient(u)
     return w.mu * ddot(F, grad(v)) + (w.lmbda * u.theta - w.mu) * v.theta
 
@@ -84,7 +88,9 @@ def hyperelastic(u: Any, v: Any, w: Any) -> Any:
 
 @form
 def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
-    """F S : grad v with S = 2 eta (E - E_0) / dt, over one step of backward Euler that began with E_0."""
+    """F S : grad v with S = 2 eta (E - E_0) / dt, over one step of backward Euler that began with
+    E_0.
+    """
     F = deformation_gradient(u)
     S = 2.0 * w.eta / w.step * (green_strain(F) - w.strain0)
     return ddot(mul(F, S), grad(v))
@@ -92,5 +98,7 @@ def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
 
 @form
 def mass(u: Any, v: Any, w: Any) -> Any:
-    """rho u . v: its tangent is the consistent mass matrix M, inertia is M (u - u_0 - dt v_0) / dt^2."""
+    """rho u . v: its tangent is the consistent mass matrix M, inertia is M (u - u_0 - dt v_0) /
+    dt^2.
+    """
     return w.density * dot(u, v)

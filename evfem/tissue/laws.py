@@ -3,18 +3,20 @@
 Public form: `psi(F)` in MPa (energy per reference volume), `P(F) = dpsi/dF` (3, 3, ...) and
 `tangent(F) = dP/dF` (3, 3, 3, 3, ...) for a deformation gradient F (3, 3, ...).
 
-Split form, for plane strain (F33 = 1) alone and for elements whose volume change is a field of its own. F is
-the in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law uses the volume change:
+Split form, for plane strain (F33 = 1) alone and for elements whose volume change is a field of its
+own. F is the in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law
+uses the volume change:
 
     split_energy(F, theta)      W(F, theta), W = psi where theta = ln det F
     split_stress(F, theta)      S = dW/dF at fixed theta (2, 2, ...), q = dW/dtheta at fixed F (...)
     split_tangent(F, theta)     A = dS/dF (2, 2, 2, 2, ...), c = dS/dtheta (2, 2, ...), k = dq/dtheta (...)
     split_sigma_zz(F, theta)    Cauchy stress out of the plane
 
-Where theta = ln det F, S + q F^-T is the in-plane part of P. The arrays of a tangent that do not depend on
-the state are read-only views without memory of their own. Laws that work with the small-strain volume change
-have `volume_measure = "trace"`: there theta stands for tr(F) - 2 (in the plane), and S + q I is the stress.
-All functions accept complex F and theta (for `tensor.complex_step`).
+Where theta = ln det F, S + q F^-T is the in-plane part of P. The arrays of a tangent that do not
+depend on the state are read-only views without memory of their own. Laws that work with the
+small-strain volume change have `volume_measure = "trace"`: there theta stands for tr(F) - 2 (in
+the plane), and S + q I is the stress. All functions accept complex F and theta (for
+`tensor.complex_step`).
 """
 
 from __future__ import annotations
@@ -46,9 +48,11 @@ def _spread(constant: Array, like: Array) -> Array:
 
 
 class _InvariantLaw:
-    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln J.
+    """Laws of the form psi = w(I1, theta), with I1 = tr(F^T F) in three dimensions and theta = ln
+    J.
 
-    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and `_slopes`.
+    With w_I, w_t the derivatives of w: P = 2 w_I F + w_t F^-T. A law supplies `_energy` and
+    `_slopes`.
     """
 
     volume_measure: Literal["log", "trace"] = "log"
@@ -103,10 +107,11 @@ class _InvariantLaw:
 class NeoHookean(Isotropic, _InvariantLaw):
     """Compressible neo-Hookean law, psi = mu/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2.
 
-    E (MPa) and nu are Young's modulus and Poisson's ratio at small strain; mu = E / (2 (1 + nu)) and
-    lambda = E nu / ((1 + nu)(1 - 2 nu)). `viscosity`: relaxation time of Kelvin-Voigt damping in s (None: the
-    finger's default); `density` in t/mm^3. Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite
-    Element Analysis, 2nd ed., 2008, doi:10.1017/CBO9780511755446, section 6.4.3.
+    E (MPa) and nu are Young's modulus and Poisson's ratio at small strain; mu = E / (2 (1 + nu))
+    and lambda = E nu / ((1 + nu)(1 - 2 nu)). `viscosity`: relaxation time of Kelvin-Voigt damping
+    in s (None: the finger's default); `density` in t/mm^3. Source: Bonet and Wood, Nonlinear
+    Continuum Mechanics for Finite Element Analysis, 2nd ed., 2008, doi:10.1017/CBO9780511755446,
+    section 6.4.3.
 
     >>> law = NeoHookean(E=3.0, nu=0.25)
     >>> law.mu, law.lmbda
@@ -136,10 +141,10 @@ class NeoHookean(Isotropic, _InvariantLaw):
 class Yeoh(_InvariantLaw):
     """Yeoh's law with a volumetric part in ln J.
 
-    psi = c1 (Ib - 3) + c2 (Ib - 3)^2 + c3 (Ib - 3)^3 + K/2 (ln J)^2 with Ib = J^(-2/3) tr C; c1, c2, c3 and K
-    in MPa. The initial shear modulus is 2 c1; the bulk modulus K is given as `bulk`, or by Poisson's ratio at
-    small strain as `nu`. `viscosity` and `density` as in `NeoHookean`. Source: Yeoh, Rubber Chem. Technol. 66
-    (1993) 754-771, doi:10.5254/1.3538343.
+    psi = c1 (Ib - 3) + c2 (Ib - 3)^2 + c3 (Ib - 3)^3 + K/2 (ln J)^2 with Ib = J^(-2/3) tr C; c1,
+    c2, c3 and K in MPa. The initial shear modulus is 2 c1; the bulk modulus K is given as `bulk`,
+    or by Poisson's ratio at small strain as `nu`. `viscosity` and `density` as in `NeoHookean`.
+    Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754-771, doi:10.5254/1.3538343.
 
     >>> Yeoh(c1=0.5, c2=0.1, c3=0.01, nu=0.25).bulk_modulus
     1.6666666666666667
@@ -190,9 +195,9 @@ class Yeoh(_InvariantLaw):
 class LinearElastic(Isotropic):
     """Small-strain isotropic elasticity, psi = mu e : e + lambda/2 (tr e)^2, e = (F + F^T)/2 - I.
 
-    E (MPa), nu, mu and lambda as in `NeoHookean`, `viscosity` and `density` too. Not objective: rotations of
-    more than a few degrees strain it. Its volume change is tr e: in the split form theta stands for tr(F) - 2
-    and S + q I is the stress.
+    E (MPa), nu, mu and lambda as in `NeoHookean`, `viscosity` and `density` too. Not objective:
+    rotations of more than a few degrees strain it. Its volume change is tr e: in the split form
+    theta stands for tr(F) - 2 and S + q I is the stress.
 
     >>> LinearElastic(E=2.6, nu=0.3).mu
     1.0
@@ -244,7 +249,8 @@ LAWS: Mapping[str, type] = {
 
 
 def from_table(table: Mapping[str, Any], key: str = "material") -> Any:
-    """The law that a table {"law": name, parameter: value, ...} describes; `key` names the table in errors.
+    """The law that a table {"law": name, parameter: value, ...} describes; `key` names the table
+    in errors.
 
     Raises `InputError` for an unknown law, an unknown, missing or impossible parameter.
 

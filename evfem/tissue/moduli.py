@@ -21,7 +21,9 @@ def check_rates(viscosity: object, density: object) -> None:
 
 
 def check_volumetric(nu: object, bulk: object) -> None:
-    """Raise `InputError` unless one of Poisson's ratio and the bulk modulus is given, and possible."""
+    """Raise `InputError` unless one of Poisson's ratio and the bulk modulus is given, and
+    possible.
+    """
     if (nu is None) == (bulk is None):
         raise InputError("nu, bulk", f"nu = {nu}, bulk = {bulk}", "exactly one of the two")
     if nu is None:
@@ -44,7 +46,9 @@ def bulk_modulus(mu: float, nu: float | None, bulk: float | None) -> float:
 
 @dataclass(frozen=True)
 class Isotropic:
-    """Parameters of the laws that are given by Young's modulus and Poisson's ratio at small strain."""
+    """Parameters of the laws that are given by Young's modulus and Poisson's ratio at small
+    strain.
+    """
 
     E: float
     nu: float

@@ -19,11 +19,12 @@ from evfem.tissue.splitlaw import stepped_tangent
 class Ogden:
     """Ogden's law with a volumetric part in ln J.
 
-    psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with l_i =
-    J^(-1/3) times the principal stretches. mu (MPa) and alpha (no unit) are numbers or sequences of equal
-    length; the initial shear modulus is the sum of mu_p alpha_p / 2. K is given as `bulk`, or by Poisson's
-    ratio at small strain as `nu`. `viscosity` and `density` as in `materials.NeoHookean`. Source: Ogden,
-    Proc. R. Soc. Lond. A 328 (1972) 567-583, doi:10.1098/rspa.1972.0096.
+    psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with
+    l_i = J^(-1/3) times the principal stretches. mu (MPa) and alpha (no unit) are numbers or
+    sequences of equal length; the initial shear modulus is the sum of mu_p alpha_p / 2. K is given
+    as `bulk`, or by Poisson's ratio at small strain as `nu`. `viscosity` and `density` as in
+    `materials.NeoHookean`. Source: Ogden, Proc. R. Soc. Lond. A 328 (1972) 567-583,
+    doi:10.1098/rspa.1972.0096.
 
     >>> Ogden(mu=[1.0, -0.2], alpha=[2.0, -2.0], nu=0.25).shear_modulus
     1.2
@@ -107,7 +108,9 @@ class Ogden:
         return self._stress(F, theta, 1.0)
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Second derivatives of W at real F and theta: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
+        """Second derivatives of W at real F and theta: A (2, 2, 2, 2, ...), c (2, 2, ...), k
+        (...).
+        """
         return stepped_tangent(self.split_stress, F, theta)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:

@@ -1,7 +1,9 @@
-r"""Displacement spaces: shape functions at quadrature points, and how an element measures its volume.
+r"""Displacement spaces: shape functions at quadrature points, and how an element measures its
+volume.
 
-An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak form (laws of
-small strain take the trace of the strain for ln J). The elements differ only in this measure:
+An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak
+form (laws of small strain take the trace of the strain for ln J). The elements differ only in this
+measure:
 
 =========  ====================================================  =============================
 element    theta at a quadrature point                           locking at nu -> 1/2
@@ -12,9 +14,10 @@ q1_fbar    ln J at the centroid, which is F-bar with             no
 q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
 =========  ====================================================  =============================
 
-`theta = Pi ln J(samples)` is linear in ln J, hence :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no
-unknown is added, the tangent is symmetric and the forces have a potential.
-Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes; dim dimensions.
+`theta = Pi ln J(samples)` is linear in ln J, hence
+:math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent is symmetric
+and the forces have a potential. Arrays: E cells, n nodes per cell, Q quadrature points, S sample
+points of ln J; N nodes; dim dimensions.
 """
 
 from __future__ import annotations
@@ -63,9 +66,11 @@ def straight_points(mesh: Mesh) -> Floats:
 
 
 def nodes_at(points: Floats, places: Floats) -> Ints:
-    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its unknowns.
+    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its
+    unknowns.
 
-    Raises `RuntimeError` where none lies within 1e-9 of the mesh's size: then the two meshes differ.
+    Raises `RuntimeError` where none lies within 1e-9 of the mesh's size: then the two meshes
+    differ.
     """
     distance, number = cKDTree(points).query(places)
     farthest, allowed = float(np.max(distance)), 1e-9 * float(np.ptp(points, axis=0).max())
@@ -76,13 +81,13 @@ def nodes_at(points: Floats, places: Floats) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Displacement space on a mesh: nodes of every cell, shape functions and their gradients, weights and ln
-    J samples.
+    """Displacement space on a mesh: nodes of every cell, shape functions and their gradients,
+    weights and ln J samples.
 
-    `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (E, Q, n); `gradient` (E, Q, n, dim)
-    with respect to the reference; `weight` (E, Q); `sample` (E, S, n, dim) gradients where ln J is sampled,
-    the same array as `gradient` where those are the quadrature points; `projection` (E, Q, S), or None where
-    theta is simply ln J of the quadrature point.
+    `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (E, Q, n); `gradient` (E,
+    Q, n, dim) with respect to the reference; `weight` (E, Q); `sample` (E, S, n, dim) gradients
+    where ln J is sampled, the same array as `gradient` where those are the quadrature points;
+    `projection` (E, Q, S), or None where theta is simply ln J of the quadrature point.
     """
 
     mesh: Mesh
@@ -180,7 +185,9 @@ def shape_gradients(basis: Any) -> Floats:
 
 
 def check_orientation(mesh: Mesh, basis: Any) -> None:
-    """Refuse inverted cells: scikit-fem takes the absolute determinant, so they would pass silently."""
+    """Refuse inverted cells: scikit-fem takes the absolute determinant, so they would pass
+    silently.
+    """
     sign = np.sign(np.linalg.det(np.moveaxis(np.asarray(basis.mapping.DF(basis.X)), (0, 1), (2, 3))))
     bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
     if bad.size:
@@ -193,8 +200,8 @@ def check_orientation(mesh: Mesh, basis: Any) -> None:
 
 
 def _linear_projection(x: Floats, weight: Floats) -> Floats:
-    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y[, Z]}, at the
-    same points x (dim, E, Q).
+    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y[,
+    Z]}, at the same points x (dim, E, Q).
     """
     centred = x - x.mean(axis=2, keepdims=True)
     centred = centred / np.abs(centred).max(axis=(0, 2), keepdims=True)

@@ -1,10 +1,12 @@
-"""The split form of a law, which elements with a volume change of their own need, for laws that lack it.
+"""The split form of a law, which elements with a volume change of their own need, for laws that
+lack it.
 
-`split(law)` returns a law that has the form already, and wraps an object that only has `P(F)` or `psi(F)` on
-F (3, 3, ...): its energy at in-plane F and theta is psi(Fbar) with Fbar = exp((theta - ln det F)/2) F in the
-plane and Fbar33 = 1, so that det Fbar = exp(theta). Derivatives come by complex step; where the second
-derivative of an energy is needed, by central differences of sixth order of the complex-step stress. A weak
-form of grad u and theta can be a law too. All of it is for plane strain.
+`split(law)` returns a law that has the form already, and wraps an object that only has `P(F)` or
+`psi(F)` on F (3, 3, ...): its energy at in-plane F and theta is psi(Fbar) with Fbar = exp((theta -
+ln det F)/2) F in the plane and Fbar33 = 1, so that det Fbar = exp(theta). Derivatives come by
+complex step; where the second derivative of an energy is needed, by central differences of sixth
+order of the complex-step stress. A weak form of grad u and theta can be a law too. All of it is
+for plane strain.
 """
 
 from __future__ import annotations
@@ -89,7 +91,9 @@ class UserLaw:
         return complex_step(self.law.psi, Fbar, rank=2)
 
     def split_energy(self, F: Array, theta: Array) -> Array:
-        """W(F, theta) (...) at real F; without `psi`, the work of P along a path from rest to Fbar."""
+        """W(F, theta) (...) at real F; without `psi`, the work of P along a path from rest to
+        Fbar.
+        """
         Fbar = _scaled(F, theta)
         if hasattr(self.law, "psi"):
             return np.asarray(self.law.psi(embed(Fbar)))
@@ -116,8 +120,8 @@ class UserLaw:
 class FormLaw:
     """A weak form of grad u and theta in the split form: its fluxes are S and q.
 
-    Its energy is the work along a path from rest; what it does out of the plane is unknown, so nan. `w` is
-    the form's context; without one the place is the origin.
+    Its energy is the work along a path from rest; what it does out of the plane is unknown, so
+    nan. `w` is the form's context; without one the place is the origin.
     """
 
     volume_measure: Literal["log", "trace"] = "log"
@@ -130,7 +134,9 @@ class FormLaw:
 
     @cached_property
     def shear_modulus(self) -> float:
-        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u itself."""
+        """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u
+        itself.
+        """
         rest = identity(2, 2), np.zeros((1, 1))
         A, c, k = self.split_tangent(*rest)
         if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
@@ -157,8 +163,8 @@ class FormLaw:
 
 
 def split(law: Any) -> SplitLaw:
-    """The law itself if it has the split form, else a `FormLaw` around a form or a `UserLaw` around `P(F)` or
-    `psi(F)`.
+    """The law itself if it has the split form, else a `FormLaw` around a form or a `UserLaw`
+    around `P(F)` or `psi(F)`.
 
     Raises `InputError` for an object that has none of them.
     """
@@ -195,7 +201,9 @@ def _scaled(F: Array, theta: Array) -> Array:
 
 
 def _work(stress: Stress, F: Array, theta: Array) -> Array:
-    """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)) and t theta, 0 <= t <= 1."""
+    """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)) and t theta, 0 <= t
+    <= 1.
+    """
     U = symmetric_power(mul(transpose(F), F), 0.5)
     phi = np.arctan2(F[1, 0] - F[0, 1], F[0, 0] + F[1, 1])
     eye = identity(2, phi.ndim)

@@ -1,9 +1,10 @@
 """A user's weak form over a named region or boundary, as a term of the internal forces.
 
-What the form uses of u and v (gradients, the volume measure) is found in a trial at random displacements, and
-so is whether it has a potential: then the derivative of its fluxes is symmetric. The derivative is exact, by
-complex step, but the solver's matrix is symmetric: of a form without potential it gets the symmetric part,
-while the residual is complete. The answer is the same, in a few iterations more.
+What the form uses of u and v (gradients, the volume measure) is found in a trial at random
+displacements, and so is whether it has a potential: then the derivative of its fluxes is
+symmetric. The derivative is exact, by complex step, but the solver's matrix is symmetric: of a
+form without potential it gets the symmetric part, while the residual is complete. The answer is
+the same, in a few iterations more.
 """
 
 from __future__ import annotations
@@ -28,7 +29,9 @@ PLACES, SIZE = 16, 0.1
 
 
 def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any = None) -> UserIntegral:
-    """A form over the region, or over the outer edges of the boundary, called `on`; `law` is the region's."""
+    """A form over the region, or over the outer edges of the boundary, called `on`; `law` is the
+    region's.
+    """
     parts = tried(space.mesh, form, on, boundary, law).parts
     points = facet_points(space, on) if boundary else points_of(space, space.mesh.cells_of(on))
     return UserIntegral(form, points, parts, SimpleNamespace(x=points.x, n=points.normal, law=law))
@@ -65,7 +68,9 @@ class _Watched(Field):
 
 
 def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None) -> Trial:
-    """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown one."""
+    """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown
+    one.
+    """
     x, n = _edge_places(mesh, on) if boundary else _cell_places(mesh, on)
     w = SimpleNamespace(x=x, n=n, law=law)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
@@ -112,7 +117,9 @@ def _few(rows: Ints) -> Ints:
 
 
 def named_edges(mesh: Mesh, name: str) -> Ints:
-    """Outer edges of a boundary; raises `InputError` for an unknown name, and for one without an edge."""
+    """Outer edges of a boundary; raises `InputError` for an unknown name, and for one without an
+    edge.
+    """
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
         raise InputError("boundary", name, allowed)
@@ -123,8 +130,9 @@ def named_edges(mesh: Mesh, name: str) -> Ints:
 
 
 def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | None = None) -> Points:
-    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets; `quadrature`
-    gives places (1, Q) in [0, 1] along an edge with their weights (Q,) instead of the element's own.
+    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets;
+    `quadrature` gives places (1, Q) in [0, 1] along an edge with their weights (Q,) instead of the
+    element's own.
     """
     import skfem
 

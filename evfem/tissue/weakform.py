@@ -1,13 +1,13 @@
 r"""The tissue: internal forces, tangent, energy and stresses of plane-strain hyperelasticity.
 
-For the energy density :math:`W(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever the law
-uses the volume change and is the measure of the element (`evfem.tissue.space`),
+For the energy density :math:`W(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever
+the law uses the volume change and is the measure of the element (`evfem.tissue.space`),
 
 .. math:: \delta\Pi = \int (S : \nabla\delta u + q\,\delta\theta)\,dX, \qquad
           S = \partial_F W,\; q = \partial_\theta W .
 
-Each region is an integral of one form: `neo_hookean` for that law, `hyperelastic` for every other, or the
-user's own. For the plane: the laws are in plane strain.
+Each region is an integral of one form: `neo_hookean` for that law, `hyperelastic` for every other,
+or the user's own. For the plane: the laws are in plane strain.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ PARTS = Parts(2, grad=True, theta=True)
 class Tissue:
     """Internal forces, tangent and stored energy of the regions' laws on a space.
 
-    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses compiled kernels
-    when numba is there.
+    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses
+    compiled kernels when numba is there.
     """
 
     def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
@@ -92,7 +92,9 @@ class Tissue:
         return total
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J (E,)."""
+        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J
+        (E,).
+        """
         sigma, J = np.empty((len(self.space.nodes), 4)), np.empty(len(self.space.nodes))
         for law, integral in self.regions:
             cells, weight = integral.points.cells, integral.points.weight

@@ -1,7 +1,8 @@
 """Scenes judged in a process of its own with a limit of its CPU time.
 
-The process is kept from scene to scene, since loading and compiling takes longer than most of them; one that
-comes to the limit or dies is replaced. CPU time does not depend on what else the machine does.
+The process is kept from scene to scene, since loading and compiling takes longer than most of
+them; one that comes to the limit or dies is replaced. CPU time does not depend on what else the
+machine does.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ class Apart:
         self._working = self._stopped = False
 
     def judge(self, tables: Tables, with_twins: bool, limit_s: float) -> Ending:
-        """How a scene ends; a `timeout` beyond so many CPU seconds, an `error` if the process dies.
+        """How a scene ends; a `timeout` beyond so many CPU seconds, an `error` if the process
+        dies.
 
         Raises `Stopped` if it is ended by `stop`.
         """
@@ -112,7 +114,9 @@ class _Watch:
 
 
 def _serve(line: Connection) -> None:
-    """Judge what comes along the line until it is closed; Ctrl-C is left to the one at the other end."""
+    """Judge what comes along the line until it is closed; Ctrl-C is left to the one at the other
+    end.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threadpool_limits(1)
     # the usual lock is one of the system, which a process that ends in the middle of its work would leave

@@ -1,9 +1,9 @@
 """Scenes drawn at random from what a scene file can say; each is valid by construction.
 
-Scene `number` of a seed is the same however many are drawn. Lengths in mm, forces in N/mm, voltages in V.
-The ranges are those of coarse fingers: any size, smooth and ridged, all surfaces, friction from 0 to 1.5,
-insulators of 5 um to 0.5 mm below 60 V/um and 3000 V. Sizes follow the finger's: `scale` is its width over
-that of Table 2.
+Scene `number` of a seed is the same however many are drawn. Lengths in mm, forces in N/mm,
+voltages in V. The ranges are those of coarse fingers: any size, smooth and ridged, all surfaces,
+friction from 0 to 1.5, insulators of 5 um to 0.5 mm below 60 V/um and 3000 V. Sizes follow the
+finger's: `scale` is its width over that of Table 2.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def _finger(random: Draw) -> Tables:
 
 
 def _bone(width: float, height: float) -> Tables:
-    """A bone that leaves half a millimetre to the dermis of the default layers, and a nail that fits."""
+    """A bone that leaves half a millimetre to the dermis of the default layers, and a nail that
+    fits.
+    """
     offset = float(f"{0.05 * (height - 6.0):.6g}")
     free = height - 2.0 * (0.38 + 0.47 + 1.0 + 0.5 + offset)
     wide = min(0.36 * width, 2.0 * free)

@@ -32,8 +32,9 @@ EXPLANATION = "there is no equilibrium"
 class Ending:
     """The class of an end, what was said, and what the run cost until then.
 
-    `kind` is what was said without numbers, for counting; `steps` of `requested` were done; `remainder` is
-    the largest one of the books in any row; `cpu_s` is that of the scene alone, without its twins.
+    `kind` is what was said without numbers, for counting; `steps` of `requested` were done;
+    `remainder` is the largest one of the books in any row; `cpu_s` is that of the scene alone,
+    without its twins.
     """
 
     outcome: str

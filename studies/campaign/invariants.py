@@ -1,8 +1,10 @@
-"""What holds in every row and frame of a result, whatever the scene; each check names what is broken.
+"""What holds in every row and frame of a result, whatever the scene; each check names what is
+broken.
 
-Signs and units are those of the history. `TOLERANCE` is relative to the largest force, traction or energy at
-hand, well above the scene's own tolerance of the residual; forces below `FORCE` and energies below `ENERGY`
-are rounding. What a check asks of a scene before it applies is said where it is made.
+Signs and units are those of the history. `TOLERANCE` is relative to the largest force, traction or
+energy at hand, well above the scene's own tolerance of the residual; forces below `FORCE` and
+energies below `ENERGY` are rounding. What a check asks of a scene before it applies is said where
+it is made.
 """
 
 from __future__ import annotations
@@ -51,7 +53,9 @@ def check(function: Check) -> Check:
 
 
 def broken(scene: Scene, result: Result) -> list[Broken]:
-    """Every invariant that a result breaks, each at its worst row; numbers that are not finite alone."""
+    """Every invariant that a result breaks, each at its worst row; numbers that are not finite
+    alone.
+    """
     if not len(result.step):
         return []
     found = finite(scene, result)
@@ -126,7 +130,9 @@ def cone(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def targets(scene: Scene, result: Result) -> Broken | None:
-    """Voltage, position, and indentation or force are exactly what the motion asks for at its last step."""
+    """Voltage, position, and indentation or force are exactly what the motion asks for at its last
+    step.
+    """
     error, force = np.zeros(len(result.step)), _largest_force(result)
     last = np.append(np.diff(result.motion_index) > 0, len(result.step) == scene.total_steps)
     allowed = max(TOLERANCE, 10.0 * scene.solver.tolerance)
@@ -158,7 +164,9 @@ def held(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def penetration(scene: Scene, result: Result) -> Broken | None:
-    """No node is below the surface by more than rounding, or than its pressure yields under a penalty."""
+    """No node is below the surface by more than rounding, or than its pressure yields under a
+    penalty.
+    """
     deepest = np.full(len(result.step), DEEPEST)
     if scene.solver.contact == "penalty":
         assert scene.solver.penalty_normal is not None
@@ -171,7 +179,9 @@ def penetration(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def signs(scene: Scene, result: Result) -> Broken | None:
-    """Normal force, attraction, energies and widths are not negative; touching is not wider than contact."""
+    """Normal force, attraction, energies and widths are not negative; touching is not wider than
+    contact.
+    """
     force, energy = _largest_force(result), largest_energy(result)
     lowest = [
         np.minimum(result.normal_force if scene.ground.is_flat else 0.0, result.electrostatic_force) / force,

@@ -1,8 +1,8 @@
 """What a campaign leaves on disk while it goes: a table of ends, and the scenes that ended badly.
 
-`campaign/ends.csv` has a row per scene; `campaign/failures/` has each failed scene as it was drawn,
-`campaign/minimal/` its shrunk one, both complete in themselves. Rows of the same scene and the same code
-count as done.
+`campaign/ends.csv` has a row per scene; `campaign/failures/` has each failed scene as it was
+drawn, `campaign/minimal/` its shrunk one, both complete in themselves. Rows of the same scene and
+the same code count as done.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Scenes made smaller as long as they end the same way: motions dropped, steps coarsened, keys simplified.
+"""Scenes made smaller as long as they end the same way: motions dropped, steps coarsened, keys
+simplified.
 
-Greedy: the first smaller scene that still ends so takes the place of the scene, until none does or the CPU
-time is used up.
+Greedy: the first smaller scene that still ends so takes the place of the scene, until none does or
+the CPU time is used up.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ Judge = Callable[[Tables, float], Ending]
 
 
 def shrunk(tables: Tables, ending: Ending, judge: Judge) -> tuple[Tables, Ending]:
-    """The smallest scene found that ends as `tables` did, and its end; `judge(tables, limit_s)` says how one
-    ends.
+    """The smallest scene found that ends as `tables` did, and its end; `judge(tables, limit_s)`
+    says how one ends.
     """
     left, limit_s = BUDGET_S, max(LEAST_S, FACTOR * ending.cpu_s)
     tables = copied(tables)

@@ -1,9 +1,11 @@
-"""Never stuck, never silently wrong: scenes that nobody chose, their invariants, their ends and times.
+"""Never stuck, never silently wrong: scenes that nobody chose, their invariants, their ends and
+times.
 
-Each scene is drawn from its seed and number, run in a process of its own with a limit of CPU time, and its
-invariants are checked in every row. Ends: equilibrium; explained, a step without any equilibrium that says
-so; not_converged; invariants_broken; timeout; refused, a mistake of the generator; error. Beside json, csv
-and picture the folder `campaign` has the table of all ends and every failure, whole and shrunk.
+Each scene is drawn from its seed and number, run in a process of its own with a limit of CPU time,
+and its invariants are checked in every row. Ends: equilibrium; explained, a step without any
+equilibrium that says so; not_converged; invariants_broken; timeout; refused, a mistake of the
+generator; error. Beside json, csv and picture the folder `campaign` has the table of all ends and
+every failure, whole and shrunk.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None, sample: Sample | None = None) -> dict[str, Any]:
-    """Run the scenes that have no end yet, in processes; numbers, table, minimal scenes and figure."""
+    """Run the scenes that have no end yet, in processes; numbers, table, minimal scenes and
+    figure.
+    """
     sample = sample or Sample()
     count = sample.scenes or (QUICK if quick else SCENES)
     keys = [(sample.seed, number) for number in range(count)]

@@ -1,4 +1,6 @@
-"""The tables of a scene file as plain values: copies, text, files beside them, and their mirror image."""
+"""The tables of a scene file as plain values: copies, text, files beside them, and their mirror
+image.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ def scene_of(tables: Tables, name: str = "scene") -> Scene:
 
 
 def with_files(tables: Tables, folder: Path) -> Tables:
-    """The same scene with its profile and its voltage in csv files in `folder`, as users have them."""
+    """The same scene with its profile and its voltage in csv files in `folder`, as users have
+    them.
+    """
     tables = copied(tables)
     surface, electrostatics = tables["surface"], tables.get("electrostatics", {})
     if "points" in surface:

@@ -1,4 +1,6 @@
-"""Scenes that must give the same as another: the mirrored one, and where no path counts, half the steps."""
+"""Scenes that must give the same as another: the mirrored one, and where no path counts, half the
+steps.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,8 @@ def smooth(result: Result) -> bool:
 def free_of_path(scene: Scene) -> bool:
     """Whether the end of a scene does not depend on the steps towards it.
 
-    Friction, time and penalties (whose nodes yield by the lengths of the step before) make it depend on
-    them, and so do attractions that lag behind by a step.
+    Friction, time and penalties (whose nodes yield by the lengths of the step before) make it
+    depend on them, and so do attractions that lag behind by a step.
     """
     return (
         not scene.ground.has_friction

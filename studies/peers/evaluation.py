@@ -1,4 +1,6 @@
-"""The runs of the study `peers` and what follows from them: errors, ratios, cost of an error, curves."""
+"""The runs of the study `peers` and what follows from them: errors, ratios, cost of an error,
+curves.
+"""
 
 from __future__ import annotations
 
@@ -78,7 +80,9 @@ def numbers(runs: list[Run], cold: Mapping[str, Mapping[str, float]]) -> dict[st
 
 
 def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
-    """Each peer's CPU seconds, memory and iterations over evfem's, and the fastest peer's CPU seconds."""
+    """Each peer's CPU seconds, memory and iterations over evfem's, and the fastest peer's CPU
+    seconds.
+    """
     found: dict[str, float] = {}
     for own in (run for run in runs if run.package == "evfem"):
         place, fastest = f"{own.scene}.L{own.level}", []
@@ -97,7 +101,9 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
 
 
 def agreement(runs: list[Run]) -> dict[str, float]:
-    """How far apart packages are that use the same element: the largest range of a force over its mean, %."""
+    """How far apart packages are that use the same element: the largest range of a force over its
+    mean, %.
+    """
     found: dict[str, float] = {}
     for scene, level, element in dict.fromkeys((run.scene, run.level, run.element) for run in runs):
         same = [r.forces for r in runs if (r.scene, r.level, r.element) == (scene, level, element)]
@@ -129,7 +135,9 @@ def at_equal_error(runs: list[Run]) -> dict[str, float]:
 
 
 def cost_of(goal: float, curve: list[tuple[float, float]]) -> float | None:
-    """CPU seconds of an error on a curve of (CPU s, error %) from coarse to fine; None if it stays above."""
+    """CPU seconds of an error on a curve of (CPU s, error %) from coarse to fine; None if it stays
+    above.
+    """
     before: tuple[float, float] | None = None
     for cpu, error in curve:
         if error <= goal:
@@ -154,7 +162,9 @@ def series(runs: list[Run]) -> list[Series]:
 
 
 def histories(runs: list[Run]) -> list[Series]:
-    """Every run's forces over its steps, so that other quantities can be read off without a new run."""
+    """Every run's forces over its steps, so that other quantities can be read off without a new
+    run.
+    """
     found = []
     for run in runs:
         forces = np.array(run.measured["history"]).T

@@ -1,7 +1,9 @@
-"""Where the packages of the study `peers` live, and one measured run of one of them in a process of its own.
+"""Where the packages of the study `peers` live, and one measured run of one of them in a process
+of its own.
 
-evfem and FElupe run in this interpreter; FEniCSx and GetFEM in the first that has them: this one, the
-system's, or another `python3` of the PATH. Distributions install those two outside virtual environments.
+evfem and FElupe run in this interpreter; FEniCSx and GetFEM in the first that has them: this one,
+the system's, or another `python3` of the PATH. Distributions install those two outside virtual
+environments.
 """
 
 from __future__ import annotations
@@ -22,7 +24,9 @@ from .problem import write
 
 @dataclass(frozen=True)
 class Package:
-    """What a package needs to take part, how it is installed, and its script if that runs without evfem."""
+    """What a package needs to take part, how it is installed, and its script if that runs without
+    evfem.
+    """
 
     needs: tuple[str, ...]
     install: str

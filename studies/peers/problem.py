@@ -1,7 +1,8 @@
-"""The press-and-slide benchmark as every package gets it: laws, motion, what is read off, reference values.
+"""The press-and-slide benchmark as every package gets it: laws, motion, what is read off,
+reference values.
 
-Scene A: frictionless, indentation 0.1 ... 1.5 mm; B: friction 0.3, then 3 mm of slide in steps of 0.1 mm;
-C: A under 1000 V with Kaczmarek's law, acting vertically on the current projected outline.
+Scene A: frictionless, indentation 0.1 ... 1.5 mm; B: friction 0.3, then 3 mm of slide in steps of
+0.1 mm; C: A under 1000 V with Kaczmarek's law, acting vertically on the current projected outline.
 """
 
 from __future__ import annotations
@@ -48,12 +49,16 @@ UNCERTAINTY = {"A": 0.04, "B": 0.2}
 
 
 def scene_mesh(element: str, level: int) -> Mesh:
-    """The nodes of a level, as linear quads for q1, as a quarter as many quadratic ones for the others."""
+    """The nodes of a level, as linear quads for q1, as a quarter as many quadratic ones for the
+    others.
+    """
     return benchmark_mesh(level, 1 if element == "q1" else 2, same_nodes=element != "q1")
 
 
 def write(target: Path, scene: str, element: str, level: int) -> None:
-    """The scene as a file of arrays for programs without evfem; `apart.Problem` says what is in it."""
+    """The scene as a file of arrays for programs without evfem; `apart.Problem` says what is in
+    it.
+    """
     mesh = scene_mesh(element, level)
     lame = np.empty((2, len(mesh.cells)))
     for name, law in MATERIALS.items():

@@ -1,8 +1,9 @@
-"""One measured run of the press-and-slide benchmark: `python -m evfem.studies.peers.run evfem q1 A 1`.
+"""One measured run of the press-and-slide benchmark:
+`python -m evfem.studies.peers.run evfem q1 A 1`.
 
-Prints a line of JSON: forces after every step, iterations, CPU and wall seconds from the mesh to the last
-step without the imports, CPU seconds of the whole process, resident memory (MB) after the imports and at its
-largest.
+Prints a line of JSON: forces after every step, iterations, CPU and wall seconds from the mesh to
+the last step without the imports, CPU seconds of the whole process, resident memory (MB) after the
+imports and at its largest.
 """
 
 from __future__ import annotations

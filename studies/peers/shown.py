@@ -86,7 +86,9 @@ def _block(title: str, numbers: Mapping[str, float], part: str, how: str, *, end
 
 
 def draw(runs: list[Run]) -> Figure:
-    """A panel for each scene with a reference; inside the grey band its uncertainty hides the error."""
+    """A panel for each scene with a reference; inside the grey band its uncertainty hides the
+    error.
+    """
     scenes = [scene for scene in JUDGED if any(run.scene == scene for run in runs)]
     figure = new_figure(4.2)
     curves = series(runs)

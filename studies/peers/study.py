@@ -1,9 +1,11 @@
-"""evfem beside FElupe, FEniCSx and GetFEM: time, iterations, memory, error in the press-and-slide benchmark.
+"""evfem beside FElupe, FEniCSx and GetFEM: time, iterations, memory, error in the press-and-slide
+benchmark.
 
-Same nodes, laws, steps and tolerance (the largest free residual over the largest force on the bone), one
-thread. Every run has a process of its own, in the interpreter that has the package; the packages alternate,
-and the least of several rounds counts. A package that is not there is named and left out. Only the ratios
-mean anything on another machine. Beside json, csv and picture the table is written as peers.md.
+Same nodes, laws, steps and tolerance (the largest free residual over the largest force on the
+bone), one thread. Every run has a process of its own, in the interpreter that has the package; the
+packages alternate, and the least of several rounds counts. A package that is not there is named
+and left out. Only the ratios mean anything on another machine. Beside json, csv and picture the
+table is written as peers.md.
 """
 
 from __future__ import annotations
@@ -87,7 +89,8 @@ def compete(
 def warm_up(
     scenes: str, level: int, present: Iterable[tuple[str, str]], compiled: Path
 ) -> dict[str, dict[str, float]]:
-    """Runs that are not timed, until files have been read and forms are compiled; what the first ones cost.
+    """Runs that are not timed, until files have been read and forms are compiled; what the first
+    ones cost.
 
     The cost is kept of packages that say what they compile, by the key of the run.
     """
@@ -107,7 +110,9 @@ def warm_up(
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """All runs, their numbers, table and figure; a package that is not installed is named and left out."""
+    """All runs, their numbers, table and figure; a package that is not installed is named and left
+    out.
+    """
     absent = missing()
     for name in absent:
         how = PACKAGES[name].install

@@ -1,9 +1,11 @@
-"""The press-and-slide benchmark with FElupe: its solids and its Newton method, and a contact written for it.
+"""The press-and-slide benchmark with FElupe: its solids and its Newton method, and a contact
+written for it.
 
-Fully integrated Q1 or Q2 elements on the nodes of `benchmark_mesh`; nodal penalty contact with Coulomb
-friction by return mapping; PARDISO by pypardiso, symmetric in scene A. FElupe 11.3 has a rigid plane with
-friction of its own: as fast in scene A, but in scene B on L1 its Newton iterations jump between two states,
-as plain return mapping does and `Plane` does not. Whoever imports this module needs FElupe.
+Fully integrated Q1 or Q2 elements on the nodes of `benchmark_mesh`; nodal penalty contact with
+Coulomb friction by return mapping; PARDISO by pypardiso, symmetric in scene A. FElupe 11.3 has a
+rigid plane with friction of its own: as fast in scene A, but in scene B on L1 its Newton
+iterations jump between two states, as plain return mapping does and `Plane` does not. Whoever
+imports this module needs FElupe.
 """
 
 from __future__ import annotations
@@ -160,8 +162,8 @@ class Peer:
         return int(result.iterations)
 
     def check(self, dx: Floats, f: Floats, ftol: float, **_: Any) -> tuple[float, float, bool]:
-        """FElupe's question whether an iteration has converged, answered as evfem does: the largest free
-        residual over the largest force on the bone.
+        """FElupe's question whether an iteration has converged, answered as evfem does: the
+        largest free residual over the largest force on the bone.
         """
         bone = f.reshape(-1, 2)[self.bone].sum(axis=0)
         residual = np.abs(f[self.dof1]).max() / max(np.abs(bone).max(), SMALLEST_FORCE)
@@ -173,7 +175,9 @@ class Peer:
 
 
 def plane_strain(points: Floats, cells: Ints) -> Any:
-    """FElupe's displacement field on linear (2 x 2 points of integration) or quadratic quads (3 x 3)."""
+    """FElupe's displacement field on linear (2 x 2 points of integration) or quadratic quads (3 x
+    3).
+    """
     region = fem.RegionQuad if cells.shape[1] == 4 else fem.RegionBiQuadraticQuad
     return fem.FieldPlaneStrain(region(fem.Mesh(points, cells, "quad")), dim=2)
 
@@ -185,7 +189,9 @@ def _mask(points: Floats, nodes: Ints, axis: int) -> Any:
 
 
 def solve(scene: str, element: str, level: int) -> dict[str, Any]:
-    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations they took."""
+    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations they
+    took.
+    """
     peer = Peer(scene, element, level)
     history, iterations = [], 0
     for position, indentation in path(scene):

@@ -1,9 +1,10 @@
 """The press-and-slide benchmark with FEniCSx (DOLFINx 0.5): `python3 with_fenicsx.py PROBLEM.npz`.
 
-Lagrange elements of the mesh's own order; Newton's method on PETSc's matrices, factorised by MUMPS, Cholesky
-where the tangent is symmetric (scene A). Contact is a penalty in the form language, integrated with the
-Gauss-Lobatto rule whose points are the nodes; which way a node slides is kept beside the form, because plain
-return mapping jumps between two states. Needs DOLFINx and numpy only.
+Lagrange elements of the mesh's own order; Newton's method on PETSc's matrices, factorised by
+MUMPS, Cholesky where the tangent is symmetric (scene A). Contact is a penalty in the form
+language, integrated with the Gauss-Lobatto rule whose points are the nodes; which way a node
+slides is kept beside the form, because plain return mapping jumps between two states. Needs
+DOLFINx and numpy only.
 """
 
 from __future__ import annotations
@@ -173,7 +174,9 @@ def pad_facets(mesh: Any, problem: Problem) -> Any:
 
 
 def solve(problem: Problem) -> dict[str, Any]:
-    """Forces after every step (N/mm), the iterations they took, CPU seconds spent on getting the forms."""
+    """Forces after every step (N/mm), the iterations they took, CPU seconds spent on getting the
+    forms.
+    """
     peer = Peer(problem)
     return followed(peer) | {"form_cpu_s": peer.form_cpu_s}
 

@@ -1,9 +1,9 @@
 """The press-and-slide benchmark with GetFEM 5.4: `python3 with_getfem.py PROBLEM.npz`.
 
-Lagrange elements of the mesh's own order, every term in GetFEM's weak form language, Newton's method on its
-tangent matrix, factorised by MUMPS. Contact is a penalty integrated with the Gauss-Lobatto rule whose points
-are the nodes; which way a node slides is kept beside the terms, because plain return mapping jumps between
-two states. Needs GetFEM and numpy only.
+Lagrange elements of the mesh's own order, every term in GetFEM's weak form language, Newton's
+method on its tangent matrix, factorised by MUMPS. Contact is a penalty integrated with the
+Gauss-Lobatto rule whose points are the nodes; which way a node slides is kept beside the terms,
+because plain return mapping jumps between two states. Needs GetFEM and numpy only.
 """
 
 from __future__ import annotations
@@ -110,9 +110,11 @@ class Peer:
                 self.model.set_variable(name, values)
 
     def residual(self) -> float:
-        """The largest free residual over the largest force on the bone, which plane and field balance.
+        """The largest free residual over the largest force on the bone, which plane and field
+        balance.
 
-        GetFEM has assembled it at the current displacement; where there is friction, its state has changed.
+        GetFEM has assembled it at the current displacement; where there is friction, its state has
+        changed.
         """
         self.update_friction()
         if self.problem.friction:

@@ -1,4 +1,5 @@
-"""The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them again.
+"""The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them
+again.
 
 Those of the gallery come from their studies, `evfem study NAME --out docs/pictures`.
 """
@@ -46,7 +47,9 @@ def draw_readme(path: Path = README) -> None:
 
 
 def draw_from_page(picture: str) -> None:
-    """Run the Python blocks of the page in a folder of their own and keep the picture that they write."""
+    """Run the Python blocks of the page in a folder of their own and keep the picture that they
+    write.
+    """
     page, written = OF_PAGES[picture]
     code = "\n".join(block for mark, block in CODE.findall((DOCS / page).read_text("utf-8")) if not mark)
     with TemporaryDirectory() as folder, chdir(folder):

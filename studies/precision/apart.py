@@ -1,7 +1,8 @@
-"""A part of the study `work_precision` in a process of its own: for memory, for clocks that nothing else has
-run on, and for runs in which the packages of evfem[fast] cannot be imported.
+"""A part of the study `work_precision` in a process of its own: for memory, for clocks that
+nothing else has run on, and for runs in which the packages of evfem[fast] cannot be imported.
 
-`python -m evfem.studies.precision.apart TASK fast|plain` reads a JSON list and prints its answers as one.
+`python -m evfem.studies.precision.apart TASK fast|plain` reads a JSON list and prints its answers
+as one.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""What follows from the runs of the study `work_precision`: references, errors, the cheapest way to an error.
+"""What follows from the runs of the study `work_precision`: references, errors, the cheapest way
+to an error.
 
-The reference of a problem is extrapolated from the finest two meshes with Q2-P1, second order in the width of
-a cell; its uncertainty is the whole difference between the two, because nodal contact makes forces jump a
-little from mesh to mesh.
+The reference of a problem is extrapolated from the finest two meshes with Q2-P1, second order in
+the width of a cell; its uncertainty is the whole difference between the two, because nodal contact
+makes forces jump a little from mesh to mesh.
 """
 
 from __future__ import annotations
@@ -104,7 +105,9 @@ def numbers(runs: Sequence[Run], models: Sequence[Model]) -> dict[str, float]:
 
 
 def compared(runs: Sequence[Run]) -> dict[str, float]:
-    """Every variant beside the recommended way on the same mesh: ratio of CPU, largest change of a force."""
+    """Every variant beside the recommended way on the same mesh: ratio of CPU, largest change of a
+    force.
+    """
     found: dict[str, float] = {}
     for run in runs:
         usual = next((r for r in runs if r.case == Case(run.case.problem, run.case.level)), None)
@@ -125,7 +128,9 @@ def step_errors(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def cheapest(runs: Sequence[Run], problem: str, goal: float) -> Run | None:
-    """The cheapest measured run, as recommended but for element and mesh, that reaches the goal (%)."""
+    """The cheapest measured run, as recommended but for element and mesh, that reaches the goal
+    (%).
+    """
     known = references(runs)
     good = [
         run
@@ -151,8 +156,8 @@ def _cheapest_numbers(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def recommended(runs: Sequence[Run]) -> list[str]:
-    """The cheapest way to every goal, as lines of a Markdown table; a star where the reference is not so
-    certain.
+    """The cheapest way to every goal, as lines of a Markdown table; a star where the reference is
+    not so certain.
     """
     head = " | ".join(f"to {goal:g} %" for goal in GOALS)
     lines = [f"| problem | {head} | reference uncertain by |", "|---" * (len(GOALS) + 2) + "|"]

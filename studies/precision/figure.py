@@ -1,4 +1,6 @@
-"""The picture of the study `work_precision`: a panel for each problem, one for growth, one for shares."""
+"""The picture of the study `work_precision`: a panel for each problem, one for growth, one for
+shares.
+"""
 
 from __future__ import annotations
 

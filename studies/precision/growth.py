@@ -1,7 +1,8 @@
-"""How time and memory of a step grow with the nodes: the benchmark's finger on finer and finer meshes.
+"""How time and memory of a step grow with the nodes: the benchmark's finger on finer and finer
+meshes.
 
-Four steps of press by 0.1 mm, then four of slide by 0.1 mm at friction 0.3, each size in a process of its
-own. The first step, which analyses the matrix, counts as set-up.
+Four steps of press by 0.1 mm, then four of slide by 0.1 mm at friction 0.3, each size in a process
+of its own. The first step, which analyses the matrix, counts as set-up.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ SMALL = 240
 
 @dataclass(frozen=True)
 class Size:
-    """A mesh: CPU seconds of set-up, of a mean press and slide step, iterations of both, and memory in MB."""
+    """A mesh: CPU seconds of set-up, of a mean press and slide step, iterations of both, and
+    memory in MB.
+    """
 
     nodes: int
     setup_s: float

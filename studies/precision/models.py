@@ -1,4 +1,5 @@
-"""The attraction of the hovering finger without a mesh: closed form and quadrature, with their cost.
+"""The attraction of the hovering finger without a mesh: closed form and quadrature, with their
+cost.
 
 What a rigid outline and a deformable pad give is among the runs of the study.
 """
@@ -29,7 +30,9 @@ class Model:
 
 
 def models() -> list[Model]:
-    """A plate as wide as the finger, equation (7), and the traction over the ellipse, equation (8b)."""
+    """A plate as wide as the finger, equation (7), and the traction over the ellipse, equation
+    (8b).
+    """
     width, height = 2.0 * OUTER[0], 2.0 * OUTER[1]
     law, pad = Kaczmarek(), EllipsoidalPad(width, height, 1.0)
     return [

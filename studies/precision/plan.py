@@ -1,8 +1,9 @@
 """A scene pays only for what it contains: what leaving a term out saves, and what it changes.
 
-Every row runs a scene as `plan` builds it and once with the term forced in where it can do nothing, or next
-to nothing: 1e-6 V, a friction coefficient of 1e-12, a relaxation time of 1e-12 s, a hovering finger that
-deforms. CPU seconds are the least of three runs that take turns, of one where it takes long.
+Every row runs a scene as `plan` builds it and once with the term forced in where it can do
+nothing, or next to nothing: 1e-6 V, a friction coefficient of 1e-12, a relaxation time of 1e-12 s,
+a hovering finger that deforms. CPU seconds are the least of three runs that take turns, of one
+where it takes long.
 """
 
 from __future__ import annotations
@@ -43,7 +44,9 @@ class Row:
 
 @dataclass(frozen=True)
 class Saving:
-    """CPU seconds without the term and with it, and the largest change of a force over the largest force."""
+    """CPU seconds without the term and with it, and the largest change of a force over the largest
+    force.
+    """
 
     name: str
     left_out: str

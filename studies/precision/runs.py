@@ -1,7 +1,7 @@
 """The runs of the study `work_precision`: which, and how each is measured.
 
-Every run counts from the mesh to the last step, without imports, in CPU seconds of one process that has run
-everything once on the coarsest mesh; cheap runs are repeated and the least counts.
+Every run counts from the mesh to the last step, without imports, in CPU seconds of one process
+that has run everything once on the coarsest mesh; cheap runs are repeated and the least counts.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ SHORT, ROUNDS = 1.2, 3
 
 @dataclass(frozen=True)
 class Run:
-    """A case and what it took: CPU seconds, outer iterations, factorisations, nodes, and what it is judged
-    by.
+    """A case and what it took: CPU seconds, outer iterations, factorisations, nodes, and what it
+    is judged by.
     """
 
     case: Case

@@ -1,8 +1,9 @@
 """The problems of the study `work_precision`, every one as a scene, and what each is judged by.
 
-A, B, C: the press-and-slide benchmark (`peers.problem`). hover: its finger 0.25 mm above the display at
-2000 V. ramp: pressed 0.5 mm, then 0 to 2000 V in ten steps. smooth, ridged: Table 2's finger pressed to
-0.05 N/mm at 1000 V in five steps and slid 0.5 mm in five, friction 0.3. Kaczmarek's law throughout.
+A, B, C: the press-and-slide benchmark (`peers.problem`). hover: its finger 0.25 mm above the
+display at 2000 V. ramp: pressed 0.5 mm, then 0 to 2000 V in ten steps. smooth, ridged: Table 2's
+finger pressed to 0.05 N/mm at 1000 V in five steps and slid 0.5 mm in five, friction 0.3.
+Kaczmarek's law throughout.
 """
 
 from __future__ import annotations
@@ -51,8 +52,9 @@ GAP, HOVER_VOLTAGE, RIGID_VOLTAGE = 0.25, 2000.0, 1.0
 class Case:
     """One way to compute one problem.
 
-    `level` of the benchmark's meshes, or the finger pad's preset; `penalty` (N/mm3) instead of exact contact;
-    `steps` of the slide; `rigid`: the hovering outline does not deform; `fast`: with evfem[fast].
+    `level` of the benchmark's meshes, or the finger pad's preset; `penalty` (N/mm3) instead of
+    exact contact; `steps` of the slide; `rigid`: the hovering outline does not deform; `fast`:
+    with evfem[fast].
     """
 
     problem: str

@@ -1,9 +1,9 @@
 """Where the time of a press step and of a slide step goes, in units of one factorisation too.
 
-Scene B at 23k nodes with the press in 20 steps, in a process of its own. The methods that do the work are
-wrapped by clocks; time in one clock is not counted in the one around it. The yardstick is one LDL^T
-factorisation (PARDISO, symmetric indefinite, float64, no Schur complement, analysis left out) of the tangent
-at the end of the run, in the same process.
+Scene B at 23k nodes with the press in 20 steps, in a process of its own. The methods that do the
+work are wrapped by clocks; time in one clock is not counted in the one around it. The yardstick is
+one LDL^T factorisation (PARDISO, symmetric indefinite, float64, no Schur complement, analysis left
+out) of the tangent at the end of the run, in the same process.
 """
 
 from __future__ import annotations
@@ -154,8 +154,8 @@ def measured(level: int) -> dict[str, float]:
 
 
 def factorisation_s(model: Any, u: Any) -> float | None:
-    """CPU seconds of one numerical LDL^T factorisation of the tangent, the least of five; None without
-    PARDISO.
+    """CPU seconds of one numerical LDL^T factorisation of the tangent, the least of five; None
+    without PARDISO.
     """
     if not find_spec("pypardiso"):
         return None

@@ -1,7 +1,8 @@
-"""Error against CPU seconds: elements, meshes, contact schemes, couplings, steps, back ends, models.
+"""Error against CPU seconds: elements, meshes, contact schemes, couplings, steps, back ends,
+models.
 
-Also what `plan` saves by leaving terms out, how time and memory of a step grow with the nodes, and where a
-step's time goes. Beside json, csv and picture the tables are written as work_precision.md.
+Also what `plan` saves by leaving terms out, how time and memory of a step grow with the nodes, and
+where a step's time goes. Beside json, csv and picture the tables are written as work_precision.md.
 """
 
 from __future__ import annotations

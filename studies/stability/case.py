@@ -1,7 +1,8 @@
 """What a case of the study of stability is, how it is run, and what is recorded of it.
 
-A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and balances,
-and returns whether the physics is as expected and a sentence with the numbers. What it raises is recorded.
+A case is a function of a `Log`: it simulates scenes through the log, which keeps their costs and
+balances, and returns whether the physics is as expected and a sentence with the numbers. What it
+raises is recorded.
 """
 
 from __future__ import annotations
@@ -81,7 +82,9 @@ class Log:
 
 
 def out_of_balance(result: Result) -> Any:
-    """Sum of all forces of every row (rows, 2), relative to its largest force (at least 1e-6 N/mm)."""
+    """Sum of all forces of every row (rows, 2), relative to its largest force (at least 1e-6
+    N/mm).
+    """
     x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
     y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
     forces = np.array([x, y])
@@ -89,7 +92,9 @@ def out_of_balance(result: Result) -> Any:
 
 
 def lost_energy(result: Result) -> float:
-    """Largest energy of any row that no column of the history has, relative to the largest of them."""
+    """Largest energy of any row that no column of the history has, relative to the largest of
+    them.
+    """
     given = np.array([result.external_work, result.electrostatic_work])
     kept = np.array(
         [

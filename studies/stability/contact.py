@@ -1,4 +1,6 @@
-"""Cases of contact and friction: reversals, jumps, texture, deep and light contact, steps too large."""
+"""Cases of contact and friction: reversals, jumps, texture, deep and light contact, steps too
+large.
+"""
 
 from __future__ import annotations
 
@@ -122,7 +124,9 @@ def _textured(surface: Any, ridges: bool, dynamics: str, distance: float = 2.0, 
 
 
 def _slides_over(log: Log, asked: Scene, mu: float, gain: float = 0.02) -> Verdict:
-    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not gained."""
+    """Mean friction at least mu (slopes only dissipate), no node below the surface, energy not
+    gained.
+    """
     result = log.simulate(asked)
     later = result.position > 0.5 * result.position[-1]
     mean = float(result.tangential_force[later].mean() / result.normal_force[later].mean())

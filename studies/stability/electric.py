@@ -119,7 +119,9 @@ def _snap(result: Result) -> tuple[float, float]:
 
 
 def _plate(log: Log, law: str) -> Verdict:
-    """Ramps around the formula: the bracket must hold it, the deviation fall with travel over thickness."""
+    """Ramps around the formula: the bracket must hold it, the deviation fall with travel over
+    thickness.
+    """
     deviations = []
     for thickness, reach, steps in ((1.0, 0.02, 40), (10.0, 0.002, 40)):
         plate = Plate(LAWS[law], thickness)
@@ -144,8 +146,9 @@ for _law in LAWS:
 class FixedCharge:
     """Strong-Troxel's law with the charge per area given instead of the voltage.
 
-    "voltage" is what this charge makes of the layers and the first gap; it then changes with the gap. Where
-    the gap is uniform, so is the charge of an electrode: the plate is charge-controlled.
+    "voltage" is what this charge makes of the layers and the first gap; it then changes with the
+    gap. Where the gap is uniform, so is the charge of an electrode: the plate is
+    charge-controlled.
     """
 
     def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
@@ -202,8 +205,9 @@ def _staggered(log: Log) -> Verdict:
 
 
 def _thin(log: Log, law: str, thickness: float) -> Verdict:
-    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width. Under
-    Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
+    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact
+    width. Under Strong-Troxel's law that is more than the shear of the pad can overcome: it
+    sticks.
     """
     display = Display(Layer(thickness, 3.35), friction=0.3)
     motion = Press(force=0.05, steps=5), Slide(3.0, steps=15)

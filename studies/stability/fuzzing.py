@@ -1,11 +1,12 @@
-"""Hostile files: every format that evfem reads, damaged at random, must be read or refused with one sentence.
+"""Hostile files: every format that evfem reads, damaged at random, must be read or refused with
+one sentence.
 
-`fuzz(count, seed)` makes `count` files per format and counts what became of them; `try_file` is one of them.
-Scenes go through `evfem plan`; profiles, voltage files and meshes through `evfem run` of one step on a small
-square; checkpoints through `evfem run --resume`; saved results through `Result.load`. A failure is
-anything but exit status 0, 2 or 3, a message of more than one line, a warning, anything left behind by a
-refused file, more than `LONGEST` CPU seconds, or a file that a pickled object would have made. The other
-half, runs that are killed, is in `killing`.
+`fuzz(count, seed)` makes `count` files per format and counts what became of them; `try_file` is
+one of them. Scenes go through `evfem plan`; profiles, voltage files and meshes through `evfem run`
+of one step on a small square; checkpoints through `evfem run --resume`; saved results through
+`Result.load`. A failure is anything but exit status 0, 2 or 3, a message of more than one line, a
+warning, anything left behind by a refused file, more than `LONGEST` CPU seconds, or a file that a
+pickled object would have made. The other half, runs that are killed, is in `killing`.
 """
 
 from __future__ import annotations
@@ -178,8 +179,8 @@ def _mesh(kind: str) -> Callable[[Path, Random], list[str]]:
 
 @cache
 def _finished_run() -> Mapping[str, bytes]:
-    """A scene and everything a run of it leaves. Made once: another run has other times in its files, whose
-    lengths differ then."""
+    """A scene and everything a run of it leaves. Made once: another run has other times in its
+    files, whose lengths differ then."""
     with tempfile.TemporaryDirectory(prefix="evfem-fuzz-") as name:
         folder = Path(name)
         meshfile.write(square(), folder / "square.vtu")
@@ -239,7 +240,9 @@ FORMATS: Mapping[str, Callable[[Path, Random], list[str]]] = {
 
 @cache
 def _compiled() -> None:
-    """Whole input first, without a limit: the loops over cells are compiled where no one has done so."""
+    """Whole input first, without a limit: the loops over cells are compiled where no one has done
+    so.
+    """
     with tempfile.TemporaryDirectory(prefix="evfem-fuzz-") as name:
         folder = Path(name)
         meshfile.write(square(), folder / "square.vtu")
@@ -279,7 +282,9 @@ class _TooLong(BaseException):
 
 
 def _called(folder: Path, words: list[str]) -> tuple[int, str, str]:
-    """Exit status and output of the command, called in this process; -1 for an exception, -2 for too long."""
+    """Exit status and output of the command, called in this process; -1 for an exception, -2 for
+    too long.
+    """
     out, error = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error), _standing_in(folder), _limit():
         try:
@@ -329,9 +334,9 @@ def _limit() -> Iterator[None]:
 
 
 def fuzz(count: int, seed: int) -> dict[str, dict[str, float]]:
-    """For each format: how many of `count` files were accepted, refused with a sentence, stopped because a
-    step did not converge, and failed; CPU seconds, the slowest file's, and the process's peak memory so far
-    in MB.
+    """For each format: how many of `count` files were accepted, refused with a sentence, stopped
+    because a step did not converge, and failed; CPU seconds, the slowest file's, and the process's
+    peak memory so far in MB.
 
     Failures are described on the terminal with the seed that makes them again.
     """

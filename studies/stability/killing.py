@@ -1,8 +1,8 @@
 """Runs that are killed: `kill -9` at random moments, again and again, must lose nothing.
 
-`kills(count, seed, out)` starts `evfem run` in processes of their own, kills each at a random moment, looks
-at what is on disk, and goes on with `--resume`. After every fifth kill the run is left to finish and its
-history is compared with that of a run nobody touched.
+`kills(count, seed, out)` starts `evfem run` in processes of their own, kills each at a random
+moment, looks at what is on disk, and goes on with `--resume`. After every fifth kill the run is
+left to finish and its history is compared with that of a run nobody touched.
 """
 
 from __future__ import annotations
@@ -31,7 +31,9 @@ from .scenes import block
 
 
 def head(mesh: str, more: str = "") -> str:
-    """The beginning of a scene: its finger from a mesh with the region `tissue`, and further keys of it."""
+    """The beginning of a scene: its finger from a mesh with the region `tissue`, and further keys
+    of it.
+    """
     return f"""version = 1
 [finger]
 mesh = "{mesh}"
@@ -93,8 +95,8 @@ def finish(folder: Path, command: list[str]) -> None:
 
 
 def kill(folder: Path, command: list[str], wait: float, watched: Path | None = None) -> bool:
-    """Start a command in `folder` and kill it `wait` seconds later, counted from when it first writes the
-    `watched` file if one is given; whether it was still running.
+    """Start a command in `folder` and kill it `wait` seconds later, counted from when it first
+    writes the `watched` file if one is given; whether it was still running.
     """
     quiet = subprocess.DEVNULL
     before = _written(watched)
@@ -145,8 +147,9 @@ def broken(out: Path) -> list[str]:
 
 
 def difference(one: Path, other: Path) -> tuple[float, bool]:
-    """Largest difference of a force between two histories over the largest force, and whether everything but
-    the time a step took is the same to the last digit; infinite if they have not the same steps.
+    """Largest difference of a force between two histories over the largest force, and whether
+    everything but the time a step took is the same to the last digit; infinite if they have not
+    the same steps.
     """
     first, second = history(one / "history.csv"), history(other / "history.csv")
     if first["step"] != second["step"]:
@@ -159,9 +162,10 @@ def difference(one: Path, other: Path) -> tuple[float, bool]:
 def kills(count: int, seed: int, out: Path) -> dict[str, float]:
     """`count` kills that hit a running process, the scenes taking turns, in folders below `out`.
 
-    Returns numbers: kills, rounds (runs left to finish), files found broken after a kill, fields missing or
-    broken at the end, rounds that are the same to the last digit, the largest difference of a force over
-    the largest force, kills before the first step was stored, and CPU seconds.
+    Returns numbers: kills, rounds (runs left to finish), files found broken after a kill, fields
+    missing or broken at the end, rounds that are the same to the last digit, the largest
+    difference of a force over the largest force, kills before the first step was stored, and CPU
+    seconds.
     """
     rng, begin = Random(seed), _cpu_seconds()
     lengths: dict[str, tuple[float, float]] = {}

@@ -1,4 +1,6 @@
-"""Nothing lost, nothing broken in: hostile files of every format, and runs that are killed at any moment."""
+"""Nothing lost, nothing broken in: hostile files of every format, and runs that are killed at any
+moment.
+"""
 
 from __future__ import annotations
 

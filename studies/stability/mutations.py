@@ -60,7 +60,9 @@ def mutated_text(text: str, rng: Random) -> bytes:
 
 
 def mutated_arrays(arrays: Mapping[str, np.ndarray], rng: Random) -> dict[str, np.ndarray]:
-    """Arrays lost, of another kind or shape, with other values, or objects that run code if unpickled."""
+    """Arrays lost, of another kind or shape, with other values, or objects that run code if
+    unpickled.
+    """
     changed = dict(arrays)
     for _ in range(rng.choice((1, 1, 2))):
         name = rng.choice(sorted(changed))

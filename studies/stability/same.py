@@ -1,4 +1,6 @@
-"""The same answer: twice, in a mirror, in other units, with other numbers of nodes, and in other steps."""
+"""The same answer: twice, in a mirror, in other units, with other numbers of nodes, and in other
+steps.
+"""
 
 from __future__ import annotations
 

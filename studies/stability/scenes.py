@@ -27,7 +27,9 @@ BENCHMARK: Mapping[str, tuple[float, float]] = {"tissue": (0.05, 0.48), "skin": 
 
 
 def scene(body: Any, surface: Any, *motion: Motion, **options: Any) -> Scene:
-    """A scene that keeps the fields of its last step; further options of `Scene` (law, voltage, ...)."""
+    """A scene that keeps the fields of its last step; further options of `Scene` (law, voltage,
+    ...).
+    """
     return Scene(body, surface, motion=motion, output=ONCE, **options)
 
 
@@ -37,7 +39,9 @@ def pad(ridges: bool = False, **parameters: Any) -> FingerPad:
 
 
 def grid(x: Floats, y: Floats) -> Mesh:
-    """Quads on points x, y of shape (rows, columns), both growing; `pad` the first row, `bone` the last."""
+    """Quads on points x, y of shape (rows, columns), both growing; `pad` the first row, `bone` the
+    last.
+    """
     rows, columns = x.shape
     node = np.arange(rows * columns).reshape(rows, columns)
     corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
@@ -90,8 +94,8 @@ def scaled(mesh: Mesh, factor: float) -> Mesh:
 
 
 def joined(first: Mesh, second: Mesh, away: Floats) -> Mesh:
-    """Two meshes in one, the second one moved by `away` (mm): separate parts, or double nodes where they
-    meet.
+    """Two meshes in one, the second one moved by `away` (mm): separate parts, or double nodes
+    where they meet.
     """
     n = len(first.points)
     sets: dict[str, Ints] = {
@@ -112,7 +116,9 @@ def finger(mesh: Mesh, E: float = 0.1, nu: float = 0.4, viscosity: float = 0.0) 
 
 
 def benchmark(level: int = 0, **materials: tuple[float, float]) -> MeshedFinger:
-    """Half a finger between two ellipses, tissue and skin; E (MPa) and nu of a region can be replaced."""
+    """Half a finger between two ellipses, tissue and skin; E (MPa) and nu of a region can be
+    replaced.
+    """
     return layered(benchmark_mesh(level), **{**BENCHMARK, **materials})
 
 

@@ -1,8 +1,8 @@
 """Hard cases: does it converge to the right physics, or say why not, and what does it cost?
 
-Every case states its expected physics and is judged by a number; one that does not converge is listed with
-its message. Outcomes: passed; refused or stopped with a sentence, where that is right; wrong; not converged;
-error. Beside json, csv and picture the table is written as stability.md.
+Every case states its expected physics and is judged by a number; one that does not converge is
+listed with its message. Outcomes: passed; refused or stopped with a sentence, where that is right;
+wrong; not converged; error. Beside json, csv and picture the table is written as stability.md.
 """
 
 from __future__ import annotations

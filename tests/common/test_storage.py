@@ -1,4 +1,6 @@
-"""A folder is locked by one process at a time, and neither the lock nor an empty folder stays behind."""
+"""A folder is locked by one process at a time, and neither the lock nor an empty folder stays
+behind.
+"""
 
 import errno
 import logging

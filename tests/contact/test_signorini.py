@@ -21,7 +21,9 @@ from evfem.contact.signorini import (
 
 
 def random_problem(seed, k, friction):
-    """A random SPD compliance with strong coupling of neighbours and of normal and tangential directions."""
+    """A random SPD compliance with strong coupling of neighbours and of normal and tangential
+    directions.
+    """
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(2 * k, 2 * k))
     compliance = np.eye(2 * k) + 0.6 * A @ A.T / k
@@ -29,7 +31,9 @@ def random_problem(seed, k, friction):
 
 
 def half_plane(k, friction, push=0.02, shift=0.01):
-    """Compliance like that of a half plane under a parabolic punch: logarithmic decay, odd coupling."""
+    """Compliance like that of a half plane under a parabolic punch: logarithmic decay, odd
+    coupling.
+    """
     x = np.linspace(-1.0, 1.0, k)
     distance = np.abs(np.subtract.outer(x, x))
     direct = np.log(4.0 / (distance + 0.6 / k))
@@ -44,7 +48,9 @@ def closed(k):
 
 
 def violation(problem, force, state, status=None):
-    """Largest violation of Signorini's and Coulomb's conditions, from forces, gaps and slips alone."""
+    """Largest violation of Signorini's and Coulomb's conditions, from forces, gaps and slips
+    alone.
+    """
     k = problem.size
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
     limit = problem.friction * normal
@@ -285,8 +291,8 @@ def test_nothing_touches_nothing_pushes():
 
 
 def lost(gap, fall=30.0, closing=12.0):
-    """A node of compliance 0.1 mm per N/mm at the gap 1 mm, drawn to `gap` by an attraction it cannot hold:
-    its fall times the compliance is 3, so what it moves returns to it threefold.
+    """A node of compliance 0.1 mm per N/mm at the gap 1 mm, drawn to `gap` by an attraction it
+    cannot hold: its fall times the compliance is 3, so what it moves returns to it threefold.
     """
     problem = ContactProblem(np.array([gap, 0.0]), 0.1 * np.eye(2), np.zeros(1))
     return problem, AttractionStiffness(np.array([fall]), np.array([1.0]), np.array([closing]))
@@ -336,8 +342,9 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
 
 
 def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
-    """Closed, node 0 holds its neighbour: feedback 30 (0.1 - 0.09^2 / 0.1) = 0.57. But it lets go, and two
-    open nodes have 30 (0.1 + 0.09) = 5.7: scaled to 0.9 they move ten times their free way of 0.02.
+    """Closed, node 0 holds its neighbour: feedback 30 (0.1 - 0.09^2 / 0.1) = 0.57. But it lets go,
+    and two open nodes have 30 (0.1 + 0.09) = 5.7: scaled to 0.9 they move ten times their free way
+    of 0.02.
     """
     compliance = np.zeros((4, 4))
     compliance[:2, :2] = [[0.1, 0.09], [0.09, 0.1]]

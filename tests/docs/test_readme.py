@@ -1,5 +1,5 @@
-"""The example of the README, run as it stands there but on a coarse mesh; with a law and a weak form of the
-user's own.
+"""The example of the README, run as it stands there but on a coarse mesh; with a law and a weak
+form of the user's own.
 """
 
 import contextlib
@@ -45,8 +45,8 @@ def block(kind):
 
 @pytest.fixture(scope="module")
 def example(tmp_path_factory):
-    """The README's Python, its simulation on a coarse mesh and with few steps: its names, what it prints, its
-    folder, and a series that was written while it ran.
+    """The README's Python, its simulation on a coarse mesh and with few steps: its names, what it
+    prints, its folder, and a series that was written while it ran.
     """
     folder, printed, simulate = tmp_path_factory.mktemp("readme"), io.StringIO(), ev.simulate
     series = export.ParaViewSeries(folder / "live.pvd")
@@ -137,7 +137,9 @@ def test_the_plan_says_what_is_in(scene):
 
 
 def test_a_law_and_a_weak_form_of_the_users_own_change_the_answer_as_they_should(scene, result):
-    """A rough gap attracts less than Strong-Troxel; springs on the nail carry part of the applied force."""
+    """A rough gap attracts less than Strong-Troxel; springs on the nail carry part of the applied
+    force.
+    """
     result, _ = result
     short = {"motion": MOTION[:1]}
     rough = ev.simulate(replace(scene, law=RoughGap(), **short))

@@ -1,5 +1,5 @@
-"""The fast model of a finger: what it remembers is exact, what it says of its error holds, and it refuses
-what it cannot do.
+"""The fast model of a finger: what it remembers is exact, what it says of its error holds, and it
+refuses what it cannot do.
 """
 
 import re

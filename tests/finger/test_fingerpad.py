@@ -43,8 +43,8 @@ def region_area(mesh, name):
 
 
 def from_ellipse(pad, points):
-    """Abscissa of the nearest point of the outer ellipse, and distance from it, below y = 0 (Newton's
-    method).
+    """Abscissa of the nearest point of the outer ellipse, and distance from it, below y = 0
+    (Newton's method).
     """
     x, y = points.T
     a, b = 0.5 * pad.width, 0.5 * pad.height
@@ -277,8 +277,8 @@ def test_meshes_pass_the_checks_of_user_meshes():
 
 
 def sampled_fingers(count, seed=20240):
-    """Fingers spread over the documented ranges; draws whose parts do not fit together are refused and
-    drawn again.
+    """Fingers spread over the documented ranges; draws whose parts do not fit together are refused
+    and drawn again.
     """
     draw, fingers = np.random.default_rng(seed), []
     while len(fingers) < count:

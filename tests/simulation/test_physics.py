@@ -1,4 +1,6 @@
-"""Simulations through the public API against closed forms of contact mechanics and of finite elasticity."""
+"""Simulations through the public API against closed forms of contact mechanics and of finite
+elasticity.
+"""
 
 import numpy as np
 import pytest
@@ -53,9 +55,9 @@ def test_hertz_line_contact(law):
 def test_bonded_layer_under_a_cylinder():
     """nu = 0.3, a = h: P'R/(E* a^2) = 1.221797, delta R/a^2 = 0.653997.
 
-    The finger is the layer, bonded to the bone, and the surface a cylinder: the crest of a long cosine,
-    1/(R k^2) (cos kx - 1), with (k a)^2/12 = 1e-5 off the parabola. The layer ends at 7 h, where the contact
-    is no longer felt; a/R = 1e-4 keeps the strain small.
+    The finger is the layer, bonded to the bone, and the surface a cylinder: the crest of a long
+    cosine, 1/(R k^2) (cos kx - 1), with (k a)^2/12 = 1e-5 off the parabola. The layer ends at 7 h,
+    where the contact is no longer felt; a/R = 1e-4 keeps the strain small.
     """
     E, nu, radius, k = 0.91, 0.3, 1e4, 0.01
     layer = BondedLayer(half_width=1.0, thickness=1.0, radius=radius, E=E, nu=nu)
@@ -72,9 +74,11 @@ def test_bonded_layer_under_a_cylinder():
 
 
 def test_cattaneo_mindlin_stick_zone():
-    """A nearly incompressible body of four hundred half widths: then pressing leaves next to no shear behind.
+    """A nearly incompressible body of four hundred half widths: then pressing leaves next to no
+    shear behind.
 
-    (The far sides widen the loaded surface by a strain of order p0/E* a/L, which sticking turns into shear.)
+    (The far sides widen the loaded surface by a strain of order p0/E* a/L, which sticking turns
+    into shear.)
     """
     half_width, radius, mu, nu = 0.1, 20.0, 0.3, 0.499
     x = both_sides(graded(1.125 * half_width, half_width / 32, 40.0, 1.5))
@@ -137,7 +141,8 @@ def follower(pressure):
 
 
 def pressurised_tube(divisions, pressure, mu=1.0):
-    """Mean inner radius of a quarter of a ring, radii 1 and 2, under a pressure on the deformed wall.
+    """Mean inner radius of a quarter of a ring, radii 1 and 2, under a pressure on the deformed
+    wall.
 
     Symmetry holds the two cut sides.
     """
@@ -162,7 +167,8 @@ def pressurised_tube(divisions, pressure, mu=1.0):
 
 
 def test_neo_hookean_tube_under_pressure():
-    """A = 1, B = 2: p/mu = 0.4282284091 widens the bore to a = 1.5; order four, as for the area of Q2 cells.
+    """A = 1, B = 2: p/mu = 0.4282284091 widens the bore to a = 1.5; order four, as for the area of
+    Q2 cells.
 
     The closed form is incompressible, nu = 0.49999 here: 1 - 2 nu = 2e-5 shows in the sixth digit.
     """
@@ -175,7 +181,9 @@ def test_neo_hookean_tube_under_pressure():
 
 
 def test_a_users_stress_law_is_the_built_in_law_in_the_same_contact():
-    """P(F) of the neo-Hookean law, written by a user; on plain quadratic elements the two are the same."""
+    """P(F) of the neo-Hookean law, written by a user; on plain quadratic elements the two are the
+    same.
+    """
 
     class Mine:
         def P(self, F):

@@ -159,8 +159,8 @@ def _holding(hold):
 def energy_error(result):
     """Energy that is put in but neither stored nor dissipated, relative to what is put in.
 
-    A voltage that is there from the start pulls the touching pad in one jump, whose energy no step resolves:
-    it is counted from the first row on.
+    A voltage that is there from the start pulls the touching pad in one jump, whose energy no step
+    resolves: it is counted from the first row on.
     """
     put_in = result.external_work + result.electrostatic_work
     kept = (
@@ -273,8 +273,8 @@ def test_a_resumed_run_ends_like_an_uninterrupted_one(at):
 
 @pytest.mark.parametrize("at", [1, 3])
 def test_a_resumed_run_goes_on_with_everything(at):
-    """Viscous tissue, a voltage, steps in parts: all that the next step depends on is back at once, and what
-    follows is the same but for rounding, with the same number of iterations.
+    """Viscous tissue, a voltage, steps in parts: all that the next step depends on is back at
+    once, and what follows is the same but for rounding, with the same number of iterations.
     """
     kept, rows = {}, []
 

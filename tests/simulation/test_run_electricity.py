@@ -69,7 +69,9 @@ def test_staggered_once_uses_the_attraction_of_the_state_before():
 
 
 def direct_force(mesh, displacement, gap_to, voltage):
-    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge by edge."""
+    """Quadrature of (8b) over the deformed outline: vertical traction per projected length, edge
+    by edge.
+    """
     s, weight = np.polynomial.legendre.leggauss(12)
     shape = np.array([0.5 * s * (s - 1.0), 0.5 * s * (s + 1.0), 1.0 - s**2])
     slope = np.array([s - 0.5, s + 0.5, -2.0 * s])

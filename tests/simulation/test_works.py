@@ -1,4 +1,6 @@
-"""Closed books: works, energies and dissipations of every row add up, each from its own definition."""
+"""Closed books: works, energies and dissipations of every row add up, each from its own
+definition.
+"""
 
 from dataclasses import replace
 
@@ -100,7 +102,9 @@ def test_full_slip_dissipates_friction_times_way():
 
 
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
-    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half the step."""
+    """Held by the bone in the air nothing gives or takes but backward Euler, and less with half
+    the step.
+    """
     lost = []
     for times in (1, 2):
         motion = (

@@ -1,4 +1,6 @@
-"""Anderson's mixing: linear contractions end after few steps, and what else a state carries follows."""
+"""Anderson's mixing: linear contractions end after few steps, and what else a state carries
+follows.
+"""
 
 from dataclasses import replace
 
@@ -14,7 +16,9 @@ NODES = 2
 
 
 def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
-    """A state of two nodes, the first of them the pad, at displacements u (4,); voltage squared in kV^2."""
+    """A state of two nodes, the first of them the pad, at displacements u (4,); voltage squared in
+    kV^2.
+    """
     zero = np.zeros((NODES, 2))
     return State(
         u=np.reshape(u, (NODES, 2)),
@@ -30,7 +34,9 @@ def state(u, force=0.0, bone=0.0, squared=0.0, status=OPEN):
 
 
 def contraction(dimension, seed=0):
-    """Fixed point x (4,) and matrix M (4, 4) of g = x + M (. - x), whose error has `dimension` directions."""
+    """Fixed point x (4,) and matrix M (4, 4) of g = x + M (. - x), whose error has `dimension`
+    directions.
+    """
     rng = np.random.default_rng(seed)
     basis = np.linalg.qr(rng.normal(size=(4, 4)))[0]
     rates = np.zeros(4)
@@ -51,8 +57,8 @@ def mixed(dimension, steps, start):
 
 @pytest.mark.parametrize("dimension", [1, 2, 3])
 def test_a_linear_contraction_ends_after_one_step_more_than_it_has_dimensions(dimension):
-    """The first image lies in the contraction's directions; with d differences the least squares are met
-    exactly, as in GMRES (Walker and Ni, doi:10.1137/10078356X)."""
+    """The first image lies in the contraction's directions; with d differences the least squares
+    are met exactly, as in GMRES (Walker and Ni, doi:10.1137/10078356X)."""
     start = np.array([3.0, -1.0, 2.0, 0.5])
     errors = mixed(dimension, dimension + 2, start)
     assert errors[dimension + 2] < 1e-9 * errors[0]

@@ -53,7 +53,9 @@ def random_problem(signs=1.0, seed=4, size=40, count=70):
 
 
 def indefinite_problem():
-    """Every fourth cell negative: the interior has eigenvalues of both signs, safely away from zero."""
+    """Every fourth cell negative: the interior has eigenvalues of both signs, safely away from
+    zero.
+    """
     problem = random_problem(np.where(np.arange(70) % 4, 1.0, -1.0))
     i = np.setdiff1d(np.arange(40), KEPT)
     values = np.linalg.eigvalsh(problem.dense[np.ix_(i, i)])
@@ -120,7 +122,9 @@ def test_indefinite_interior(back_end):
 
 @every_back_end
 def test_singular_condensed_matrix_is_no_obstacle(back_end):
-    """A bone free to move: the whole matrix is singular, its interior is not, and S has the rigid motion."""
+    """A bone free to move: the whole matrix is singular, its interior is not, and S has the rigid
+    motion.
+    """
     unknowns = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
     problem = Problem(unknowns, np.tile([[1.0, -1.0], [-1.0, 1.0]], (4, 1, 1)), 5)
     pattern, kept = Pattern(unknowns, 5), np.array([4, 0])
@@ -144,7 +148,9 @@ def test_one_analysis_many_factorisations(back_end):
 @every_back_end
 @pytest.mark.parametrize("case", ["rigid", "empty", "nan"])
 def test_singular_interior_is_reported_and_survived(back_end, case):
-    """An interior without an answer raises, and the next good matrix is factorised as if nothing had been."""
+    """An interior without an answer raises, and the next good matrix is factorised as if nothing
+    had been.
+    """
     unknowns = np.array([[0, 1, 2], [2, 3, 4]])
     cell = {
         "rigid": np.array([[1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]),

@@ -1,4 +1,6 @@
-"""Equilibrium steps: balance, tangent, cut and failed steps, force control, exact statements on profiles."""
+"""Equilibrium steps: balance, tangent, cut and failed steps, force control, exact statements on
+profiles.
+"""
 
 import re
 from dataclasses import replace
@@ -173,8 +175,8 @@ def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypa
 
 
 def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
-    """A soft pad 0.02 mm above 2 um of insulator closes; where the fall of the attraction had to be reduced
-    three times, and only there, the lost nodes are closed at once."""
+    """A soft pad 0.02 mm above 2 um of insulator closes; where the fall of the attraction had to
+    be reduced three times, and only there, the lost nodes are closed at once."""
     solve, seen, snaps = condensed.LinearContactStep.solve, [], 0
 
     def watched(step):
@@ -382,6 +384,8 @@ def test_the_travel_of_the_bone_does_not_count_as_force():
 
 @pytest.mark.parametrize("history", [[0.0, 0.04], [0.0, 0.0], [1e-3, 0.0]])
 def test_residuals_of_exactly_zero_are_numbers_like_others(history):
-    """A balanced start, contact not settled: the factorisation is renewed only if the residual grew."""
+    """A balanced start, contact not settled: the factorisation is renewed only if the residual
+    grew.
+    """
     model, _ = pressed(Display())
     assert model.equilibrium.body.linearisation._too_old(history) == (history[1] > 0.0)

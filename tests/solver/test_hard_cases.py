@@ -1,5 +1,6 @@
-"""Scenes that stopped earlier versions: steep friction, snapping pads, thin insulators, big steps. Each ends
-in a converged state whose physics is known; most are cases of the study of stability, beside its quick ones.
+"""Scenes that stopped earlier versions: steep friction, snapping pads, thin insulators, big steps.
+Each ends in a converged state whose physics is known; most are cases of the study of stability,
+beside its quick ones.
 """
 
 from dataclasses import replace
@@ -38,8 +39,9 @@ def test_a_hard_case_of_the_study_ends_as_it_should(key):
 
 
 def test_a_thin_insulator_by_strong_troxels_law():
-    """200 nm at 140 V: up to 1 MPa that falls within a fraction of a micrometre, so nodes snap one by one.
-    Touching nodes are on the surface to the last digit; the rounding of their gaps would be a force.
+    """200 nm at 140 V: up to 1 MPa that falls within a fraction of a micrometre, so nodes snap one
+    by one. Touching nodes are on the surface to the last digit; the rounding of their gaps would
+    be a force.
     """
     surface = Display(Layer(2e-4, 3.35), friction=0.3)
     voltage = {"law": StrongTroxel(), "voltage": 140.0}
@@ -52,8 +54,8 @@ def test_a_thin_insulator_by_strong_troxels_law():
 
 
 def test_penalised_friction_obeys_the_return_map():
-    """The penalty variant is a compliance of the interface; pointwise it is the return map of Coulomb's law
-    with an elastic stick (Wriggers, Computational Contact Mechanics, 2nd ed., 2006,
+    """The penalty variant is a compliance of the interface; pointwise it is the return map of
+    Coulomb's law with an elastic stick (Wriggers, Computational Contact Mechanics, 2nd ed., 2006,
     doi:10.1007/978-3-540-32609-0).
     """
     solver = Solver(contact="penalty", penalty_normal=50.0, penalty_tangential=20.0)
@@ -80,9 +82,10 @@ def test_penalised_friction_obeys_the_return_map():
 @pytest.mark.parametrize(("law", "voltage"), [(Kaczmarek(), 1500.0), (StrongTroxel(), 500.0)])
 @pytest.mark.parametrize("ridges", [False, True])
 def test_a_hovering_pad_falls_onto_the_display_under_a_small_force(law, voltage, ridges):
-    """No equilibrium with that force is near: the attraction grows faster on the way down than the finger
-    stiffens. The bone flies to the surface and a little beyond, not as far as it may, and where the linear
-    problem has no travel that settles the force, the one that lacks least is taken.
+    """No equilibrium with that force is near: the attraction grows faster on the way down than the
+    finger stiffens. The bone flies to the surface and a little beyond, not as far as it may, and
+    where the linear problem has no travel that settles the force, the one that lacks least is
+    taken.
     """
     surface = Display(Layer(0.05, 3.35), friction=0.3)
     motion = [Hover(gap=0.1, steps=1), Press(force=0.002, steps=2)]
@@ -112,8 +115,8 @@ def test_a_bone_lacks_nothing_at_the_travel_that_settles_its_force():
 
 
 def test_friction_that_falls_within_a_nodes_motion_is_passed_in_one_substep():
-    """From 1.2 to 0.2 over 0.02 mm: at the ramp friction falls faster than the tissue stiffens, so that a
-    node has no equilibrium there and snaps forward to the lower coefficient.
+    """From 1.2 to 0.2 over 0.02 mm: at the ramp friction falls faster than the tissue stiffens, so
+    that a node has no equilibrium there and snaps forward to the lower coefficient.
     """
     surface = Flat(friction=[[-5.0, 1.2], [0.5, 1.2], [0.52, 0.2], [5.0, 0.2]])
     motion = [Press(force=0.05, steps=3), Slide(2.0, steps=10, hold="force")]
@@ -127,8 +130,8 @@ def test_friction_that_falls_within_a_nodes_motion_is_passed_in_one_substep():
 
 
 def test_a_finger_at_rest_on_a_steep_texture_says_that_it_needs_time():
-    """With 0.05 mm of amplitude the contact forces of the wave push a loaded finger aside harder than its
-    tissue holds it: no equilibrium at rest is near, whatever the step.
+    """With 0.05 mm of amplitude the contact forces of the wave push a loaded finger aside harder
+    than its tissue holds it: no equilibrium at rest is near, whatever the step.
     """
     surface = Sinusoid(terms=[[0.05, 9.7, 0.4]], friction=0.1)
     motion = [Press(force=0.1, steps=2), Slide(1.0, steps=4)]
@@ -137,8 +140,8 @@ def test_a_finger_at_rest_on_a_steep_texture_says_that_it_needs_time():
 
 
 def test_friction_that_rises_within_a_nodes_motion_is_a_jump_to_it():
-    """From 0.04 to 1.34 over 1.5 micrometres, against the way: from the smooth side a node is thrown beyond
-    the ramp, from the rough side back before it. It stays at the ramp's rough end.
+    """From 0.04 to 1.34 over 1.5 micrometres, against the way: from the smooth side a node is
+    thrown beyond the ramp, from the rough side back before it. It stays at the ramp's rough end.
     """
     surface = Flat(friction=[[-9.0, 1.34], [-0.3, 1.34], [-0.2985, 0.04], [9.0, 0.04]])
     motion = [Press(force=0.02, steps=1), Slide(-1.2, steps=6)]

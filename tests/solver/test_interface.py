@@ -1,4 +1,6 @@
-"""Where pad and surface meet: touching nodes rest on the surface, forces follow its normal and tangent."""
+"""Where pad and surface meet: touching nodes rest on the surface, forces follow its normal and
+tangent.
+"""
 
 from dataclasses import replace
 
@@ -21,7 +23,9 @@ surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"]
 
 
 def interface_and_state(surface, statuses):
-    """The interface of a pad about 0.1 mm above the surface, and a state whose nodes have these statuses."""
+    """The interface of a pad about 0.1 mm above the surface, and a state whose nodes have these
+    statuses.
+    """
     model = make_model(Scene(ROUND, surface, motion=[Press(indentation=0.1)]))
     state = model.equilibrium.rest(np.zeros(2), 0.0)
     status = np.resize(statuses, state.status.size)
@@ -61,7 +65,9 @@ jumps = pytest.mark.parametrize("table", JUMPS.values(), ids=JUMPS.keys())
 
 
 def crossing(table, times):
-    """Pins of three nodes: one crosses the jump so many times, one does so in the air, one stays away."""
+    """Pins of three nodes: one crosses the jump so many times, one does so in the air, one stays
+    away.
+    """
     surface = Flat(friction=table)
     pins, touching = Pins(surface.friction_jumps, 3), np.array([True, False, True])
     pins.begin(np.array([0.2, 0.2, -1.0]))

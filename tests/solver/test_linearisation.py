@@ -1,4 +1,6 @@
-"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is renewed."""
+"""The tangent as a step uses it: candidates, the condensed body against dense algebra, when it is
+renewed.
+"""
 
 from dataclasses import replace
 
@@ -121,7 +123,9 @@ def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
 
 
 def test_a_force_on_a_candidate_arrives_whole_at_the_bone():
-    """Undeformed tissue may be translated for nothing: K_bf K_ff^-1 is minus the identity, node by node."""
+    """Undeformed tissue may be translated for nothing: K_bf K_ff^-1 is minus the identity, node by
+    node.
+    """
     linear, _, state = made()
     linear.choose_candidates(state, 0.2)
     linear.factorise(state)
@@ -211,8 +215,8 @@ def test_a_factorisation_is_too_old_after_two_steps_of_which_each_is_a_little_lo
 
 @pytest.mark.parametrize("how", ["air", "no air", "frozen"])
 def test_a_resumed_run_makes_the_same_factorisation_again(how):
-    """To the last bit, although the state it goes on from is another one; who touched then carries the
-    attraction where there is no air."""
+    """To the last bit, although the state it goes on from is another one; who touched then carries
+    the attraction where there is no air."""
     options = {"voltage": 2e5, "air_layer": how != "no air"}
     linear, model, state = made(**options)
     state = bent(model, state)
@@ -263,8 +267,8 @@ def test_fall_and_closing_are_those_of_the_law(law, surface):
 
 @pytest.mark.parametrize("direction", ["vertical", "normal"])
 def test_the_coupling_knows_lengths_but_not_the_nodes_own_gaps(direction):
-    """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a whole; its
-    weakening with a node's own gap belongs to the contact problem.
+    """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a
+    whole; its weakening with a node's own gap belongs to the contact problem.
     """
     linear, model, state = made(voltage=2e5, body=FINE, direction=direction)
     x = model.mesh.points[model.pad.nodes, 0]

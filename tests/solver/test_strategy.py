@@ -76,7 +76,9 @@ def ways(strategy, longest, takes=5):
 
 
 def test_parts_are_halved_until_they_hold_and_grow_by_the_factor():
-    """1 and 1/2 fail, 1/4 holds; then each part is 1.25 times the last one, the end is met exactly."""
+    """1 and 1/2 fail, 1/4 holds; then each part is 1.25 times the last one, the end is met
+    exactly.
+    """
     assert ways(Strategy(), 0.3) == pytest.approx([0.25, 0.15625, 0.1953125, 0.244140625, 0.154296875])
     assert ways(Strategy(growth=1.0), 0.3) == [0.25] * 4
     # no part is easy
@@ -99,9 +101,9 @@ def work(*motion, body=None, friction=0.3, **numbers):
 
 
 def test_a_step_begins_ahead_on_the_last_ones_way():
-    """A sticking block sheared in ten equal steps, a fresh tangent each time: where the guess is the last
-    state, its error is of first order in the step, along the trend of second, as after one iteration. So
-    each step but the first, which comes from a press, saves one.
+    """A sticking block sheared in ten equal steps, a fresh tangent each time: where the guess is
+    the last state, its error is of first order in the step, along the trend of second, as after
+    one iteration. So each step but the first, which comes from a press, saves one.
     """
     motion, body = [Press(indentation=0.4, steps=2), Slide(0.5, steps=10)], finger(block(8, 3))
     ahead, _, force = work(*motion, body=body, friction=10.0, patience=0.0)

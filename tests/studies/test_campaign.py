@@ -1,4 +1,6 @@
-"""The campaign: scenes nobody chose end in equilibria, and nothing that is broken passes its checks."""
+"""The campaign: scenes nobody chose end in equilibria, and nothing that is broken passes its
+checks.
+"""
 
 import csv
 import importlib

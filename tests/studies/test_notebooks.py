@@ -1,4 +1,6 @@
-"""The notebooks, run as scripts in a folder of their own: what they find, and what they leave behind."""
+"""The notebooks, run as scripts in a folder of their own: what they find, and what they leave
+behind.
+"""
 
 import json
 import re

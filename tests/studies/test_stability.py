@@ -1,4 +1,6 @@
-"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass unseen."""
+"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass
+unseen.
+"""
 
 import importlib
 import importlib.util

@@ -1,4 +1,6 @@
-"""The two studies that are sweeps: participants by finite elements, and what Fig. 5's inputs do to it."""
+"""The two studies that are sweeps: participants by finite elements, and what Fig. 5's inputs do to
+it.
+"""
 
 import importlib
 import importlib.util
@@ -43,7 +45,9 @@ def test_every_participant_law_and_case_is_a_scene(participants):
 
 
 def test_a_participants_force_is_that_of_a_single_run(participants):
-    """Force per depth of one scene, times the width over which the rigid ellipsoid has its own force."""
+    """Force per depth of one scene, times the width over which the rigid ellipsoid has its own
+    force.
+    """
     names = common.participants()["participant"][:3]
     (point,) = [
         p
@@ -66,7 +70,9 @@ def test_a_participants_force_is_that_of_a_single_run(participants):
 
 
 def test_ridges_take_away_more_than_deformation_adds(participants):
-    """Gaps in the grooves are up to 0.15 mm wider; the paper's Fig. 5 has the same two per mm of width."""
+    """Gaps in the grooves are up to 0.15 mm wider; the paper's Fig. 5 has the same two per mm of
+    width.
+    """
     for law in common.LAWS:
         for case in common.CASES:
             key = f"verdict.change_from_closed_form_{{}}.{law}.{case}"
@@ -88,7 +94,9 @@ def test_samples_without_spread_are_fig05():
 
 
 def test_spread_follows_the_derivatives(spread):
-    """To first order the variance is the sum of squared slopes times input variances (delta method)."""
+    """To first order the variance is the sum of squared slopes times input variances (delta
+    method).
+    """
     numbers = spread["numbers"]
     middle = {
         name: np.array([float(one.quantile(np.array([0.5]))[0])]) for name, one in uncertainty.INPUTS.items()

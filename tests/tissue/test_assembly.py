@@ -1,4 +1,6 @@
-"""The engine of all weak forms: fluxes, derivatives and theta against formulae and against the fast ways."""
+"""The engine of all weak forms: fluxes, derivatives and theta against formulae and against the
+fast ways.
+"""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -67,7 +69,9 @@ def test_moduli_written_by_hand_are_the_complex_steps_of_the_form(element, law):
 
 @every_element
 def test_default_tissue_is_the_form_of_its_law(element):
-    """mu F : grad v + (lambda theta - mu) dtheta(v) is S : grad v + q dtheta(v) of the neo-Hookean law."""
+    """mu F : grad v + (lambda theta - mu) dtheta(v) is S : grad v + q dtheta(v) of the neo-Hookean
+    law.
+    """
     _, integral, u = region(element, NEO_HOOKEAN)
     assert integral.form is forms.neo_hookean
     general = replace(integral, form=forms.hyperelastic)
@@ -141,7 +145,9 @@ def tissue_by_theta(u, v, w):
 
 @every_element
 def test_default_tissue_as_a_users_form_over_regions(element):
-    """theta is the element's own measure, w.law the region's law: forces and tangents of two tissues."""
+    """theta is the element's own measure, w.law the region's law: forces and tangents of two
+    tissues.
+    """
     space = rectangle(element, (4, 4), warp=bend, split=lambda x, y: x + y > 1.0)
     laws = {"lower": NEO_HOOKEAN, "upper": NeoHookean(E=3.0, nu=0.49)}
     u = wavy(space.mesh.points)
@@ -250,8 +256,9 @@ def test_volume_change_keeps_its_digits(dim):
 
 @pytest.mark.parametrize("samples", ["points", "mean"])
 def test_engine_in_three_dimensions(samples):
-    """Two distorted hexahedra of neo-Hookean tissue: forces are the complex step of the energy written out,
-    tangents central differences of the forces. theta is ln J of the point, or the cell's mean of it."""
+    """Two distorted hexahedra of neo-Hookean tissue: forces are the complex step of the energy
+    written out, tangents central differences of the forces. theta is ln J of the point, or the
+    cell's mean of it."""
     mesh = skfem.MeshHex.init_tensor(np.array([0.0, 1.0, 2.0]), *[np.array([0.0, 1.0])] * 2)
     mesh = type(mesh)(mesh.p + rng.uniform(-0.1, 0.1, mesh.p.shape), mesh.t)
     basis = skfem.Basis(mesh, skfem.ElementHex1(), intorder=2)

@@ -1,4 +1,6 @@
-"""Every element converges at its order, and those made for it do not lock as Poisson's ratio nears 1/2."""
+"""Every element converges at its order, and those made for it do not lock as Poisson's ratio nears
+1/2.
+"""
 
 from functools import cache
 
@@ -42,7 +44,8 @@ def isochoric(x, y):
 
 
 def manufactured_error(element, field, nu, n, users=False):
-    """L2 error on n x n cells for the load int P(F) : grad v of `field` and its values on the outline.
+    """L2 error on n x n cells for the load int P(F) : grad v of `field` and its values on the
+    outline.
 
     With the built-in law, or with the `users`, which elements split in another way.
     """
@@ -68,10 +71,11 @@ def errors_of(element, field, nu, users=False):
 
 @every_element
 def test_order_of_convergence(element):
-    """2 for linear, 3 for quadratic shape functions, on cells that are no parallelograms, with finite strain.
+    """2 for linear, 3 for quadratic shape functions, on cells that are no parallelograms, with
+    finite strain.
 
-    A quadrature too weak for the element, a wrong mid-node or a projection that is not exact for planes
-    lowers the order; a wrong law or volume term leaves an error that no refinement removes.
+    A quadrature too weak for the element, a wrong mid-node or a projection that is not exact for
+    planes lowers the order; a wrong law or volume term leaves an error that no refinement removes.
     """
     errors = errors_of(element, swell, 0.3)
     assert RATES[element] <= order(errors[:2]) <= RATES[element] + 0.4
@@ -80,7 +84,9 @@ def test_order_of_convergence(element):
 
 @pytest.mark.parametrize("element", ["q1_fbar", "q2p1"])
 def test_no_locking_of_the_projected_elements(element):
-    """At nu = 0.4999 the same order, and errors within 5 % of those at nu = 0.3 (measured: 0 to 4 % less)."""
+    """At nu = 0.4999 the same order, and errors within 5 % of those at nu = 0.3 (measured: 0 to 4
+    % less).
+    """
     soft, stiff = (errors_of(element, isochoric, nu) for nu in (0.3, 0.4999))
     assert order(stiff) >= RATES[element]
     np.testing.assert_allclose(stiff, soft, rtol=0.05)
@@ -109,7 +115,9 @@ def test_plain_elements_lock():
 
 
 def tube(element, nu, divisions):
-    """Pressure (MPa) inside and radii of all nodes, the inner nodes moved radially from 1 to 1.5 mm."""
+    """Pressure (MPa) inside and radii of all nodes, the inner nodes moved radially from 1 to 1.5
+    mm.
+    """
     law = NeoHookean(E=2.0 * (1.0 + nu), nu=nu)  # mu = 1 MPa
     space = rectangle(element, divisions, warp=quarter_ring(1.0, 2.0))
     X, sets = space.mesh.points, space.mesh.node_sets
@@ -127,7 +135,9 @@ def tube(element, nu, divisions):
 
 @cache
 def tube_by_shooting(nu):
-    """The same tube from its radial equilibrium dP_R/dR + (P_R - P_T)/R = 0, and r(R); scipy's integrator."""
+    """The same tube from its radial equilibrium dP_R/dR + (P_R - P_T)/R = 0, and r(R); scipy's
+    integrator.
+    """
     lmbda = 2.0 * nu / (1.0 - 2.0 * nu)
 
     def stresses(R, r, s):
@@ -166,7 +176,9 @@ def test_shooting_meets_the_closed_form():
 @every_element
 @pytest.mark.parametrize("nu", [0.3, 0.4999])
 def test_tube_under_pressure(element, nu):
-    """Pressure to second or fourth order, radii within 1e-4 mm; at nu = 0.4999 only without locking."""
+    """Pressure to second or fourth order, radii within 1e-4 mm; at nu = 0.4999 only without
+    locking.
+    """
     if nu > 0.4 and element not in ("q1_fbar", "q2p1"):
         n = 8 if element == "q1" else 4
         locked = tube(element, nu, (n, n))[0]
@@ -193,7 +205,9 @@ def test_tube_meets_the_closed_form(element, n, most):
 
 
 def cook_tip(element, nu, n):
-    """Rise (mm) of the free end's upper corner; 48 x 44/16 mm, mu = 80.1938 MPa, 20 N/mm on the free end."""
+    """Rise (mm) of the free end's upper corner; 48 x 44/16 mm, mu = 80.1938 MPa, 20 N/mm on the
+    free end.
+    """
 
     def panel(s, t):
         return 48.0 * s, 44.0 * s + t * (44.0 - 28.0 * s)
@@ -215,7 +229,9 @@ def cook_tip(element, nu, n):
 
 @cache
 def cook_limit(nu):
-    """The tip's rise on infinitely fine meshes: Q2-P1, first order (the clamped corner is singular)."""
+    """The tip's rise on infinitely fine meshes: Q2-P1, first order (the clamped corner is
+    singular).
+    """
     coarse, fine = cook_tip("q2p1", nu, 8), cook_tip("q2p1", nu, 16)
     return 2.0 * fine - coarse
 
@@ -223,8 +239,8 @@ def cook_limit(nu):
 def test_cooks_membrane_bends_as_well_when_incompressible():
     """Share of the full rise on 8 x 8 linear or 4 x 4 quadratic cells, at nu = 0.3 and at 0.4999.
 
-    Measured 0.95 (F-bar) and 0.98 (Q2-P1) at both; plain q1 falls from 0.90 to 0.28. F-bar tends to the limit
-    of Q2-P1, which is another formulation.
+    Measured 0.95 (F-bar) and 0.98 (Q2-P1) at both; plain q1 falls from 0.90 to 0.28. F-bar tends
+    to the limit of Q2-P1, which is another formulation.
     """
     share = {
         (element, nu): cook_tip(element, nu, n) / cook_limit(nu)

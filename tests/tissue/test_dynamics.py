@@ -1,4 +1,6 @@
-"""Viscous and inertial forces: objectivity, tangents, what they dissipate and carry, and motions in time."""
+"""Viscous and inertial forces: objectivity, tangents, what they dissipate and carry, and motions
+in time.
+"""
 
 import numpy as np
 import pytest
@@ -59,8 +61,8 @@ class Sum:
 @every_element
 @pytest.mark.parametrize("compiled", [True, False])
 def test_rotation_is_not_resisted(element, compiled):
-    """A deformed body turned by 40 degrees within the step feels nothing; a straining one turned with its
-    frame feels the turned forces (objectivity)."""
+    """A deformed body turned by 40 degrees within the step feels nothing; a straining one turned
+    with its frame feels the turned forces (objectivity)."""
     space = rectangle(element, (2, 2), warp=bend)
     X = space.mesh.points
     term = dynamics_on(space, compiled=compiled)
@@ -104,8 +106,8 @@ def test_tangent_is_the_derivative_of_the_forces(element, kind):
 
 
 def test_simple_shear_by_hand():
-    """F = [[1, g], [0, 1]]: dE = [[0, g], [g, g^2]]/2, so P_v12 = eta g (1 + g^2)/dt on the lid, and
-    dissipated is eta (g^2 + g^4/2)/dt times the area."""
+    """F = [[1, g], [0, 1]]: dE = [[0, g], [g, g^2]]/2, so P_v12 = eta g (1 + g^2)/dt on the lid,
+    and dissipated is eta (g^2 + g^4/2)/dt times the area."""
     space = rectangle("q2", (2, 2), size=(3.0, 2.0))
     eta, g = 0.2, 0.25
     term = Dynamics(space, np.full(4, eta), None)
@@ -118,7 +120,9 @@ def test_simple_shear_by_hand():
 
 @every_element
 def test_dissipation_is_the_work_of_the_viscous_forces(element):
-    """Never negative, whichever way the step goes; equal to f_v . du up to a share that is linear in du."""
+    """Never negative, whichever way the step goes; equal to f_v . du up to a share that is linear
+    in du.
+    """
     space = rectangle(element, (2, 2), warp=bend)
     X = space.mesh.points
     term = dynamics_on(space, inertial=True)
@@ -143,7 +147,9 @@ def test_dissipation_is_the_work_of_the_viscous_forces(element):
 
 @every_element
 def test_mass_holds_area_momentum_and_energy(element):
-    """Total mass = density times area; a translation carries m v; turning at w has w^2/2 of int r^2."""
+    """Total mass = density times area; a translation carries m v; turning at w has w^2/2 of int
+    r^2.
+    """
     space = rectangle(element, (3, 2), size=(3.0, 2.0), jitter=0.2)
     density = 1.7e-9
     term = Dynamics(space, None, np.full(len(space.nodes), density))
@@ -172,7 +178,9 @@ def test_mass_matrices_equal_finer_quadrature(element):
 
 
 def test_free_fall():
-    """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere, unstrained."""
+    """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere,
+    unstrained.
+    """
     space = rectangle("q1_fbar", (2, 2), jitter=0.2)
     law, gravity, dt = NeoHookean(E=0.05, nu=0.48), -9810.0, 1e-3
     term = make_dynamics(space, {"lower": law}, viscosity=1e-3, inertia=True)
@@ -211,8 +219,8 @@ def shear_oscillation(steps, viscosity=0.0):
 
 
 def test_free_oscillation_converges_in_time():
-    """omega = pi/(2 h) sqrt(mu/rho), u(T/8) = cos(pi/4): error of first order in dt, and backward Euler's own
-    recurrence (1 + (omega dt)^2) u_{n+1} = 2 u_n - u_{n-1} to 1e-5 at every dt."""
+    """omega = pi/(2 h) sqrt(mu/rho), u(T/8) = cos(pi/4): error of first order in dt, and backward
+    Euler's own recurrence (1 + (omega dt)^2) u_{n+1} = 2 u_n - u_{n-1} to 1e-5 at every dt."""
     errors = []
     for steps in (16, 32, 64):
         found, phase = shear_oscillation(steps)
@@ -226,8 +234,8 @@ def test_free_oscillation_converges_in_time():
 
 
 def test_creep_takes_the_relaxation_time():
-    """A constant shear sigma: g = sigma/mu (1 - exp(-t/tau)), and backward Euler's (g + r g_end)/(1 + r),
-    r = dt/tau, step by step; the law's own time wins over the finger's."""
+    """A constant shear sigma: g = sigma/mu (1 - exp(-t/tau)), and backward Euler's (g + r
+    g_end)/(1 + r), r = dt/tau, step by step; the law's own time wins over the finger's."""
     space = rectangle("q1", (1, 1))
     X, sets = space.mesh.points, space.mesh.node_sets
     sigma, dt = 1e-7, 0.25  # so small that g^2 does not count
@@ -253,7 +261,9 @@ def test_creep_takes_the_relaxation_time():
 
 
 def test_only_what_is_asked_for():
-    """No time, no forces; no relaxation time, no viscosity; neither viscosity nor inertia, no term at all."""
+    """No time, no forces; no relaxation time, no viscosity; neither viscosity nor inertia, no term
+    at all.
+    """
     space = rectangle("q1", (2, 2), split=lambda x, y: y > 0.5)
     laws = {
         "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),

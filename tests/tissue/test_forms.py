@@ -61,8 +61,8 @@ def wavy(points, size=0.08):
 
 @every_kind
 def test_nail_bed_by_hand(element):
-    """A bed of 0.02 MPa/mm moved by (0.3, -0.1) mm: every edge of 0.5 mm shares 0.01 (0.3, -0.1) N/mm among
-    its nodes, by halves or 1/6, 4/6, 1/6, and no other node feels it."""
+    """A bed of 0.02 MPa/mm moved by (0.3, -0.1) mm: every edge of 0.5 mm shares 0.01 (0.3, -0.1)
+    N/mm among its nodes, by halves or 1/6, 4/6, 1/6, and no other node feels it."""
     space = rectangle(element, (4, 3), size=(2.0, 1.0))
     term = make_term(space, nail_bed, "top", boundary=True)
     u = np.tile([0.3, -0.1], (space.size, 1))
@@ -86,7 +86,9 @@ def test_bed_on_a_curved_edge(element, error):
 
 @every_kind
 def test_forms_know_place_and_outward_normal(element):
-    """A pressure p(x) on the lid pushes down on it with the integral of p; all around it sums to nothing."""
+    """A pressure p(x) on the lid pushes down on it with the integral of p; all around it sums to
+    nothing.
+    """
     space = rectangle(element, (4, 3), size=(2.0, 1.0))
     zero = np.zeros((space.size, 2))
 
@@ -103,7 +105,9 @@ def test_forms_know_place_and_outward_normal(element):
 
 @every_kind
 def test_region_form_acts_on_its_region_only(element):
-    """Weight of the upper half of 2 x 1 mm: f = rho g times its area, spread over its cells' nodes."""
+    """Weight of the upper half of 2 x 1 mm: f = rho g times its area, spread over its cells'
+    nodes.
+    """
     space = rectangle(element, (2, 4), size=(2.0, 1.0), split=lambda x, y: y > 0.5)
     weight = ev.form(lambda u, v, w: 9.81e-3 * v[1])
     forces = make_term(space, weight, "upper", boundary=False).forces(np.zeros((space.size, 2)))
@@ -113,7 +117,9 @@ def test_region_form_acts_on_its_region_only(element):
 
 @pytest.mark.parametrize("element", ["q1", "q2", "p2"])
 def test_tissue_written_as_a_form_is_the_tissue(element):
-    """The neo-Hookean residual as the user's own form: same forces and tangents as the built-in element."""
+    """The neo-Hookean residual as the user's own form: same forces and tangents as the built-in
+    element.
+    """
     space = rectangle(element, (3, 3), warp=bend, split=lambda x, y: y > 0.5)
     u = wavy(space.mesh.points)
     tissue = Tissue(space, {"lower": NEO_HOOKEAN, "upper": NEO_HOOKEAN})
@@ -129,8 +135,9 @@ def test_tissue_written_as_a_form_is_the_tissue(element):
 @every_kind
 @pytest.mark.parametrize(("on", "boundary"), [("upper", False), ("left", True), ("outline", True)])
 def test_tangent_is_the_derivative_of_the_forces(element, on, boundary):
-    """Complex step against central differences for a form that is neither linear nor symmetric; the solver's
-    matrix gets the symmetric part, also where a cell has two edges on the boundary."""
+    """Complex step against central differences for a form that is neither linear nor symmetric;
+    the solver's matrix gets the symmetric part, also where a cell has two edges on the
+    boundary."""
     space = rectangle(element, (2, 2), warp=bend, split=lambda x, y: y > 0.5)
     term = make_term(space, crooked, on, boundary)
     u = wavy(space.mesh.points)
@@ -165,7 +172,9 @@ def test_unknown_places_are_refused():
 
 
 def block_scene(law=NEO_HOOKEAN, element="q2", friction=0.0, **motion):
-    """A block of 2 x 1 mm of one law, pressed onto a plane (by 0.1 mm, unless `motion` says otherwise)."""
+    """A block of 2 x 1 mm of one law, pressed onto a plane (by 0.1 mm, unless `motion` says
+    otherwise).
+    """
     base = rectangle("q1", (6, 3), size=(2.0, 1.0)).mesh
     sets = {"pad": base.node_sets["bottom"], "bone": base.node_sets["top"], "side": base.node_sets["left"]}
     mesh = Mesh(base.points, base.cells, "quad", base.region, {"tissue": 0}, sets)
@@ -206,7 +215,9 @@ def test_weight_of_the_tissue_reaches_the_plane():
 
 
 def test_springs_on_a_side_carry_their_share():
-    """Applied force = contact + k int u_y over the side, from the displacements; more than without."""
+    """Applied force = contact + k int u_y over the side, from the displacements; more than
+    without.
+    """
     plain = block_scene()
     held = plain.with_term(ev.form(lambda u, v, w: 0.2 * u[1] * v[1]), on=ev.Boundary("side"))
     free, result = ev.simulate(plain), ev.simulate(held)
@@ -240,7 +251,9 @@ def material(u, v, w):
 
 @pytest.mark.parametrize("element", ["q1", "q1_fbar", "q2p1"])
 def test_form_as_a_material_is_the_tissue(element):
-    """Forces, energies and stresses in the plane of a press and slide; the stress out of it is unknown."""
+    """Forces, energies and stresses in the plane of a press and slide; the stress out of it is
+    unknown.
+    """
     ours, theirs = (ev.simulate(block_scene(law, element, friction=0.2)) for law in (NEO_HOOKEAN, material))
     np.testing.assert_allclose(theirs.applied_force, ours.applied_force, rtol=1e-10)
     np.testing.assert_allclose(theirs.stored_energy, ours.stored_energy, rtol=1e-10)
@@ -251,7 +264,9 @@ def test_form_as_a_material_is_the_tissue(element):
 
 
 def test_form_as_a_material_knows_the_place_and_nothing_but_gradients():
-    """Stiffness that grows along x carries the mean; a material cannot depend on the displacement itself."""
+    """Stiffness that grows along x carries the mean; a material cannot depend on the displacement
+    itself.
+    """
 
     def graded(u, v, w):
         return (0.5 + 0.5 * w.x[0]) * material(u, v, w)

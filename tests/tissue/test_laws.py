@@ -1,4 +1,6 @@
-"""Laws against their definitions, each other and linear elasticity; derivatives against differences."""
+"""Laws against their definitions, each other and linear elasticity; derivatives against
+differences.
+"""
 
 import numpy as np
 import pytest
@@ -32,8 +34,9 @@ class ViscousEnergy(EnergyOnly):
 class BarredNeoHookean:
     """The same energy written for the wrapper's split, psi(e^((theta - ln det F)/2) F), by hand.
 
-    Fbar : Fbar = e^theta I / J in the plane, I = F : F, so W = mu/2 (e^theta I / J - 2 - 2 theta) + lambda/2
-    theta^2; dW/dF = mu e^theta (F/J - I F^-T / (2 J)), dW/dtheta = mu/2 e^theta I/J - mu + lambda theta.
+    Fbar : Fbar = e^theta I / J in the plane, I = F : F, so W = mu/2 (e^theta I / J - 2 - 2 theta)
+    + lambda/2 theta^2; dW/dF = mu e^theta (F/J - I F^-T / (2 J)), dW/dtheta = mu/2 e^theta I/J -
+    mu + lambda theta.
     """
 
     mu, lmbda = 1.3, 2.1

@@ -1,4 +1,6 @@
-"""Internal forces and tangents of every element: patch test, derivatives, independent twins, geometry."""
+"""Internal forces and tangents of every element: patch test, derivatives, independent twins,
+geometry.
+"""
 
 from dataclasses import replace
 
@@ -25,7 +27,9 @@ POISSON = LMBDA / (2 * (LMBDA + MU))
 
 
 class EnergyOnly:
-    """A user's law, energy only: neo-Hookean with lambda/8 (J^2 - 1/J^2)^2 / 2 instead of (ln J)^2."""
+    """A user's law, energy only: neo-Hookean with lambda/8 (J^2 - 1/J^2)^2 / 2 instead of (ln
+    J)^2.
+    """
 
     def psi(self, F):
         J = det(F)
@@ -78,8 +82,9 @@ def full_stress(law, F):
 def test_patch(element, law, shape):
     """Affine displacements give the law's own stress in every cell and no force on an inner node.
 
-    Origin: P(F) of the law at the constant F; a forgotten Jacobian, wrong node order or a theta other than
-    the one the law means breaks it. Curved edges map affine fields exactly too (isoparametric).
+    Origin: P(F) of the law at the constant F; a forgotten Jacobian, wrong node order or a theta
+    other than the one the law means breaks it. Curved edges map affine fields exactly too
+    (isoparametric).
     """
     distortion = {"jitter": 0.25} if shape == "distorted" else {"warp": bend}
     space = rectangle(element, (3, 3), **distortion)
@@ -118,7 +123,9 @@ def test_patch_is_found_by_newton(element):
 @every_law
 @every_element
 def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(element, law):
-    """Central differences in a random direction and along single unknowns; two regions, so groups mix."""
+    """Central differences in a random direction and along single unknowns; two regions, so groups
+    mix.
+    """
     space = rectangle(element, (2, 2), jitter=0.2, split=lambda x, y: y > 0.5)
     tissue = Tissue(space, {"lower": LAWS[law], "upper": Yeoh(c1=0.3, c2=0.2, nu=0.3)})
     u = wavy(space.mesh.points)
@@ -150,7 +157,9 @@ def test_tangent_of_built_in_laws_is_symmetric_to_rounding(element):
 
 @every_element
 def test_linear_elastic_tissue_is_linear(element):
-    """Half the displacements, half the forces, and the tangent is the same everywhere: theta is tr e here."""
+    """Half the displacements, half the forces, and the tangent is the same everywhere: theta is tr
+    e here.
+    """
     space = rectangle(element, (2, 2), jitter=0.2)
     tissue = Tissue(space, {"lower": LAWS["linear_elastic"]})
     u = wavy(space.mesh.points)
@@ -163,7 +172,9 @@ def test_linear_elastic_tissue_is_linear(element):
 
 @every_element
 def test_rigid_motion_costs_nothing(element):
-    """A rotation by 50 degrees and a shift: no energy, no forces; the tangent knows them (objectivity)."""
+    """A rotation by 50 degrees and a shift: no energy, no forces; the tangent knows them
+    (objectivity).
+    """
     space = rectangle(element, (2, 2), warp=bend)
     for law in ("neo_hookean", "yeoh", "ogden", "psi_only", "P_only"):
         tissue = Tissue(space, {"lower": LAWS[law]})
@@ -179,7 +190,8 @@ def test_rigid_motion_costs_nothing(element):
 def twin_energy(space, u):
     """Neo-Hookean energy of the element, safe for complex u, on scikit-fem's own shapes.
 
-    theta: ln J pointwise, at the centroid, or its weighted least-squares plane over the points of the cell.
+    theta: ln J pointwise, at the centroid, or its weighted least-squares plane over the points of
+    the cell.
     """
     kind, intorder, sampling = ELEMENTS[space.element]
     x, dx, _, gradient, nodes = fine_points(space, intorder)
@@ -244,7 +256,9 @@ def test_compiled_kernels_are_used_where_numba_is_installed():
 
 @pytest.mark.parametrize("element", ["q1", "q2", "p2"])
 def test_plain_elements_equal_scikit_fem_forms(element):
-    """The residual and its linearisation as readable scikit-fem forms, on scikit-fem's own vector element."""
+    """The residual and its linearisation as readable scikit-fem forms, on scikit-fem's own vector
+    element.
+    """
     space = rectangle(element, (3, 2), warp=bend)
     tissue = Tissue(space, {"lower": LAWS["neo_hookean"]})
     u = wavy(space.mesh.points)
@@ -294,8 +308,9 @@ def _dof_names(basis):
 def test_fbar_is_de_souza_netos():
     """int (J/J0)^(1/2) P(Fbar) : grad v with Fbar = (J0/J)^(1/2) F in the plane, from P alone.
 
-    Pull-back of int sigma(Fbar) : grad_x v dv (10.1016/0020-7683(95)00259-6). Equal to the potential form for
-    the neo-Hookean law because the cofactor of a bilinear cell integrates to its value at the centroid.
+    Pull-back of int sigma(Fbar) : grad_x v dv (10.1016/0020-7683(95)00259-6). Equal to the
+    potential form for the neo-Hookean law because the cofactor of a bilinear cell integrates to
+    its value at the centroid.
     """
     space = rectangle("q1_fbar", (3, 3), jitter=0.25)
     u = wavy(space.mesh.points)
@@ -344,7 +359,9 @@ def test_tangled_cells_are_refused(element):
 @every_element
 @pytest.mark.parametrize("compiled", [True, False])
 def test_inverted_states_are_seen(element, compiled):
-    """A state turned inside out has negative J and forces that are not numbers, never a finite answer."""
+    """A state turned inside out has negative J and forces that are not numbers, never a finite
+    answer.
+    """
     space = rectangle(element, (2, 2))
     tissue = Tissue(space, {"lower": LAWS["neo_hookean"]})
     if not compiled:

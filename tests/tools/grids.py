@@ -1,4 +1,6 @@
-"""Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or steps."""
+"""Small meshes and a plain Newton solver for tests of the tissue: nothing here knows contact or
+steps.
+"""
 
 import numpy as np
 import scipy.sparse as sparse
@@ -20,9 +22,10 @@ SHAPES = {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": 
 def rectangle(element, divisions, size=(1.0, 1.0), warp=None, jitter=0.0, split=None):
     """The space of `element` on [0, w] x [0, h] in nx x ny cells.
 
-    `jitter` moves inner corners at random by that share of a cell and keeps edges straight; `warp` maps all
-    nodes, mid-nodes too, so that edges become curves; `split(x, y)` at the centre of a cell is True in region
-    `upper`, the rest is `lower`. Node sets: left, right, bottom, top and outline.
+    `jitter` moves inner corners at random by that share of a cell and keeps edges straight; `warp`
+    maps all nodes, mid-nodes too, so that edges become curves; `split(x, y)` at the centre of a
+    cell is True in region `upper`, the rest is `lower`. Node sets: left, right, bottom, top and
+    outline.
     """
     nx, ny = divisions
     base = between(*np.meshgrid(np.linspace(0, size[0], nx + 1), np.linspace(0, size[1], ny + 1)))
@@ -73,7 +76,9 @@ def assembled(space, cells):
 
 
 def solve(tissue, u, free, load=0.0, iterations=14):
-    """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all else stays."""
+    """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all
+    else stays.
+    """
     u, free = u.copy(), free.ravel()
     for _ in range(iterations):
         K = assembled(tissue.space, tissue.tangent(u))[free][:, free]
@@ -90,8 +95,9 @@ def solve(tissue, u, free, load=0.0, iterations=14):
 
 
 def fine_points(space, intorder=8):
-    """Points (2, E, Q), weights, values (n, E, Q) and gradients (n, 2, E, Q) of the shape functions, and the
-    nodes (E, n), all taken from scikit-fem on its own mesh: an oracle for the space, of higher order."""
+    """Points (2, E, Q), weights, values (n, E, Q) and gradients (n, 2, E, Q) of the shape
+    functions, and the nodes (E, n), all taken from scikit-fem on its own mesh: an oracle for the
+    space, of higher order."""
     mesh = space.mesh
     basis = skfem.Basis(grid_of(mesh), SHAPES[mesh.kind](), intorder=intorder)
     value = np.stack([np.broadcast_to(basis.basis[a][0], basis.dx.shape) for a in range(basis.Nbfun)])

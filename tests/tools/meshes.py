@@ -1,4 +1,6 @@
-"""Meshes of the tests: cells between rows of points, blocks, half a finger, what is fine near a contact."""
+"""Meshes of the tests: cells between rows of points, blocks, half a finger, what is fine near a
+contact.
+"""
 
 import numpy as np
 
@@ -27,7 +29,9 @@ def cells_between(node, kind="quad"):
 
 
 def between(x, y, kind="quad"):
-    """Cells on points x, y (rows, columns), both growing; sets bottom, top, left and right, one region 0."""
+    """Cells on points x, y (rows, columns), both growing; sets bottom, top, left and right, one
+    region 0.
+    """
     node = np.arange(x.size).reshape(x.shape)
     cells = cells_between(node, kind)
     sets = {"bottom": node[0], "top": node[-1], "left": node[:, 0], "right": node[:, -1]}
@@ -36,7 +40,9 @@ def between(x, y, kind="quad"):
 
 
 def held(mesh, pad=None, bone=None, region=None, names=None):
-    """The mesh with the sets `pad` (the bottom) and `bone` (the top) alone, and perhaps regions by name."""
+    """The mesh with the sets `pad` (the bottom) and `bone` (the top) alone, and perhaps regions by
+    name.
+    """
     sets = {
         "pad": mesh.node_sets["bottom"] if pad is None else pad,
         "bone": mesh.node_sets["top"] if bone is None else bone,
@@ -54,7 +60,9 @@ def block(columns=8, rows=4, width=4.0, height=2.0, sag=0.0):
 
 
 def square_mesh(kind="quad"):
-    """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side `bone`."""
+    """[-1, 1] x [0, 2] in cells of one kind, two regions, the lower side `pad`, the upper side
+    `bone`.
+    """
     n = 5 if kind in ("quad9", "triangle6") else 3
     mesh = between(*np.meshgrid(np.linspace(-1, 1, n), np.linspace(0, 2, n)), kind)
     upper = np.arange(len(mesh.cells)) >= len(mesh.cells) // 2
@@ -62,9 +70,11 @@ def square_mesh(kind="quad"):
 
 
 def half_finger(around=60, tissue=10, skin=2, *, free_ends=False):
-    """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to the skin.
+    """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to
+    the skin.
 
-    `tissue` and `skin` are numbers of cells across them; `free_ends`: the cut edges do not belong to `bone`.
+    `tissue` and `skin` are numbers of cells across them; `free_ends`: the cut edges do not belong
+    to `bone`.
     """
     theta = np.pi * (1.0 + np.arange(around + 1) / around)
     circle = np.stack([np.cos(theta), np.sin(theta)])

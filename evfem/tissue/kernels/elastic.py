@@ -1,7 +1,8 @@
-"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: twins of the form `neo_hookean`.
+"""Compiled element loops for neo-Hookean tissue, part of `evfem[fast]`: twins of the form
+`neo_hookean`.
 
-psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only moduli are
-mu (per gradient component) and lmbda (for theta). Cells come in blocks
+psi = mu/2 (F:F - 2 - 2 theta) + lmbda/2 theta^2, so S = mu F, q = lmbda theta - mu, and the only
+moduli are mu (per gradient component) and lmbda (for theta). Cells come in blocks
 (`evfem.tissue.kernels.lanes`), moduli as (B, L). For the plane alone.
 """
 
@@ -97,8 +98,9 @@ def _stresses(H: Any, mu: Any, weight: Any) -> None:
 
 @inlined
 def _volume_states(ue: Any, moduli: Any, block: Any, states: Any, pull: Any) -> None:
-    """Everything of a block that depends on the displacements: the `states` H (Q, 4, L), F^-T (S, 4, L), ln J
-    (S, L) and theta (Q, L), and the weighted volume force gathered at the samples, pull (S, L).
+    """Everything of a block that depends on the displacements: the `states` H (Q, 4, L), F^-T (S,
+    4, L), ln J (S, L) and theta (Q, L), and the weighted volume force gathered at the samples,
+    pull (S, L).
     """
     mu, lmbda = moduli
     gradient, weight, sample, projection = block
@@ -141,7 +143,9 @@ def forces(u: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> Floats:
 
 @inlined
 def _pushed(inverse: Any, sample: Any, push: Any) -> None:
-    """F^-T times the shape gradients (S, n, 2, L): the change of ln J by nodal displacements (S, n, 2, L)."""
+    """F^-T times the shape gradients (S, n, 2, L): the change of ln J by nodal displacements (S,
+    n, 2, L).
+    """
     for s in range(sample.shape[0]):
         for k in range(sample.shape[1]):
             for i in range(LANES):
@@ -167,8 +171,8 @@ def _theta_rows(push: Any, projection: Any, rows: Any) -> None:
 
 @inlined
 def _pair(k: int, m: int, stiff: Any, rows: Any, pull: Any, push: Any, K: Any) -> None:
-    """Stiffness (4, L) between nodes k and m of what acts through theta: its modulus `stiff` (Q, L), and the
-    curvature of ln J.
+    """Stiffness (4, L) between nodes k and m of what acts through theta: its modulus `stiff` (Q,
+    L), and the curvature of ln J.
     """
     K[:] = 0.0
     for q in range(rows.shape[0]):
@@ -200,7 +204,9 @@ def _shear(k: int, m: int, gradient: Any, weight: Any, mu: Any, K: Any) -> None:
 
 @inlined
 def _store(K: Any, k: int, m: int, first: int, out: Any) -> None:
-    """Write the stiffness (4, L) of nodes k and m and its transpose into the matrices of a block's cells."""
+    """Write the stiffness (4, L) of nodes k and m and its transpose into the matrices of a block's
+    cells.
+    """
     for i in range(min(LANES, out.shape[0] - first)):
         cell = out[first + i]
         cell[2 * k, 2 * m] = cell[2 * m, 2 * k] = K[0, i]

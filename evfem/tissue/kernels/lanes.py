@@ -1,8 +1,9 @@
-"""Cells in blocks of `LANES`, the last axis of every array: loops over it become vector instructions.
+"""Cells in blocks of `LANES`, the last axis of every array: loops over it become vector
+instructions.
 
-Part of `evfem[fast]`: `Cells` is what the compiled loops of `elastic` and `viscous` read, and the few lines
-that they share. With H = grad u the volume change is e = J - 1 = tr H + det H, and ln J = ln(1 + e)
-keeps its digits where tissue is nearly incompressible.
+Part of `evfem[fast]`: `Cells` is what the compiled loops of `elastic` and `viscous` read, and the
+few lines that they share. With H = grad u the volume change is e = J - 1 = tr H + det H, and ln J
+= ln(1 + e) keeps its digits where tissue is nearly incompressible.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ FAR = 0.028
 
 
 class _Compiling(event.Listener):
-    """Says that loops of this package are being compiled: the first run of an installation waits for it."""
+    """Says that loops of this package are being compiled: the first run of an installation waits
+    for it.
+    """
 
     said = False
 
@@ -44,9 +47,9 @@ inlined = njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="a
 
 
 class Cells(NamedTuple):
-    """A space in blocks: `nodes` (B, n, L), `gradient` (B, Q, n, 2, L), `weight` (B, Q, L); `sample` (B, S,
-    n, 2, L), with S = 0 if ln J is sampled where it is integrated; `projection` (B, Q, S, L), (B, 0, 0, L) if
-    theta = ln J pointwise. What fills the last block weighs nothing.
+    """A space in blocks: `nodes` (B, n, L), `gradient` (B, Q, n, 2, L), `weight` (B, Q, L);
+    `sample` (B, S, n, 2, L), with S = 0 if ln J is sampled where it is integrated; `projection`
+    (B, Q, S, L), (B, 0, 0, L) if theta = ln J pointwise. What fills the last block weighs nothing.
     """
 
     nodes: Ints

@@ -1,8 +1,9 @@
-"""Compiled element loops for the Kelvin-Voigt stress, part of `evfem[fast]`: twins of `kelvin_voigt`.
+"""Compiled element loops for the Kelvin-Voigt stress, part of `evfem[fast]`: twins of
+`kelvin_voigt`.
 
-S = 2 r (E - E0), r = eta / time step, E = (H + H^T + H^T H)/2 with H = grad u. Cells come in blocks
-(`evfem.tissue.kernels.lanes`), strains as (B, Q, 3, L) for 11, 22, 12, rates r as (B, L); blocks without
-viscosity are skipped. For the plane alone.
+S = 2 r (E - E0), r = eta / time step, E = (H + H^T + H^T H)/2 with H = grad u. Cells come in
+blocks (`evfem.tissue.kernels.lanes`), strains as (B, Q, 3, L) for 11, 22, 12, rates r as (B, L);
+blocks without viscosity are skipped. For the plane alone.
 """
 
 from __future__ import annotations
@@ -78,8 +79,8 @@ def forces(u: Floats, rate: Floats, cells: Cells, strain0: Floats) -> Floats:
 
 @inlined
 def _add_pair(k: int, m: int, gradient: Any, weighted: Any, B: Any, S: Any, push: Any, K: Any) -> None:
-    """Add one point's stiffness between nodes k and m to K (4, L); B = F F^T (3, L), push = F grad (n, 2,
-    L).
+    """Add one point's stiffness between nodes k and m to K (4, L); B = F F^T (3, L), push = F grad
+    (n, 2, L).
     """
     for i in range(LANES):
         gx, gy, hx, hy = gradient[k, 0, i], gradient[k, 1, i], gradient[m, 0, i], gradient[m, 1, i]
@@ -131,7 +132,9 @@ def add_tangent(u: Floats, rate: Floats, cells: Cells, strain0: Floats, out: Flo
 
 @inlined
 def _add(K: Any, k: int, m: int, first: int, out: Any) -> None:
-    """Add the stiffness (4, L) of nodes k and m, and its transpose, to the matrices of a block's cells."""
+    """Add the stiffness (4, L) of nodes k and m, and its transpose, to the matrices of a block's
+    cells.
+    """
     for i in range(min(LANES, out.shape[0] - first)):
         cell = out[first + i]
         for j in range(4):

@@ -1,4 +1,6 @@
-"""Cells in blocks: the layout against plain loops, volumes and gradients against formulae of another kind."""
+"""Cells in blocks: the layout against plain loops, volumes and gradients against formulae of
+another kind.
+"""
 
 from decimal import Decimal, localcontext
 from fractions import Fraction

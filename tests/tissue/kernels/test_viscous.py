@@ -1,7 +1,8 @@
-"""The compiled Kelvin-Voigt loops against derivatives of their potential, written from the formula.
+"""The compiled Kelvin-Voigt loops against derivatives of their potential, written from the
+formula.
 
-With E0 given, F S = dPhi/dF of Phi = sum of r (E - E0):(E - E0): forces are the potential's complex-step
-derivative, tangents central differences of them.
+With E0 given, F S = dPhi/dF of Phi = sum of r (E - E0):(E - E0): forces are the potential's
+complex-step derivative, tangents central differences of them.
 """
 
 import numpy as np
@@ -92,8 +93,8 @@ def test_tangents_are_central_differences_and_are_added(element):
 
 
 def test_blocks_without_viscosity_have_no_part():
-    """18 cells, the last two alone in a block: rates there move only their nodes, rates elsewhere only the
-    others'."""
+    """18 cells, the last two alone in a block: rates there move only their nodes, rates elsewhere
+    only the others'."""
     space, u, _, before = problem("q1", (6, 3))
     strain0 = viscous.strains(before, space.cells)
     for chosen in (np.arange(18) < LANES, np.arange(18) >= LANES):
