@@ -277,4 +277,5 @@ def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
     layers = Layers.of(scene.ground.insulator)
     traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
     softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
-    return traction * float(np.ptp(mesh.points[:, 1])) / softest * 2.0 / gap
+    depth = float(np.ptp(mesh.points[:, 1]))
+    return traction * depth / softest * 2.0 / gap
