@@ -259,6 +259,23 @@ def test_friction_dissipates_on_the_way_along_the_profile():
     np.testing.assert_allclose(found, np.cumsum(each), atol=1e-3 * found.max())
 
 
+def test_what_is_given_is_stored_or_dissipated():
+    """With the columns of integrator and snaps, each of which has something in it here."""
+    result = run()[0]
+    given = result.external_work + result.electrostatic_work
+    kept = (
+        result.stored_energy
+        + result.kinetic_energy
+        + result.friction_dissipation
+        + result.viscous_dissipation
+        + result.integrator_dissipation
+        + result.snap_dissipation
+    )
+    np.testing.assert_allclose(given, kept, atol=1e-6 * np.abs(kept).max())
+    for name in ("integrator_dissipation", "snap_dissipation"):
+        assert np.abs(getattr(result, name)).max() > 1e-4 * np.abs(kept).max(), name
+
+
 def shares(state):
     """Left and right end of every pad node's share of the outline: 1/6, 4/6, 1/6 of each edge."""
     result, model, _ = run()

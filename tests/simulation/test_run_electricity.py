@@ -105,6 +105,7 @@ def test_a_stiff_hovering_pad_carries_the_force_of_the_rigid_outline():
     raised = np.broadcast_to([0.0, 0.25], result.mesh.points.shape)
     rigid = direct_force(result.mesh, raised, 0.0, 1000.0)
     assert result.electrostatic_force[0] == pytest.approx(rigid, rel=1e-3)
+    assert result.applied_force[0] == pytest.approx(-rigid, rel=1e-3)
 
 
 def test_without_air_layer_only_the_contact_attracts():
