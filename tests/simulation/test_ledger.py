@@ -259,7 +259,7 @@ def test_friction_dissipates_on_the_way_along_the_profile():
 
 
 def test_what_is_given_is_stored_or_dissipated():
-    """With the columns of this scene's integrator and snaps, each of which has something in it."""
+    """With the columns of integrator and snaps, each of which has something in it here."""
     result = run()[0]
     given = result.external_work + result.electrostatic_work
     kept = (
