@@ -159,6 +159,8 @@ class FactorisedBody:
             # an older tangent may ask for what no contact can give
             if not self.linearisation.made_at(state):
                 self.linearisation.factorise(state)
+            elif not target.height.free:
+                raise
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance, search=True)
         mixed = self._anderson.next_iterate(state, after)

@@ -17,8 +17,7 @@ BLOCK = block(40, 2, sag=1.0)
 
 def share_of(scene):
     """How much a rigid outline errs, as the plan has it."""
-    softest = min(law.shear_modulus for law in scene.finger.materials.values())
-    return rigid_share(scene, scene_mesh(scene)[0], softest)
+    return rigid_share(scene, scene_mesh(scene)[0])
 
 
 def hovering(E=0.05, gap=0.25, voltage=1000.0, law=None, motion=()):
