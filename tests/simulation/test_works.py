@@ -10,6 +10,7 @@ from tools.builders import INSULATOR, SKIN, finger
 from tools.meshes import block
 
 import evfem as ev
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layers, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
@@ -17,7 +18,9 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.reference import pull_in_strong_troxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
+from evfem.simulation.works import Part
 from evfem.tissue.laws import LinearElastic
 
 ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)
@@ -149,3 +152,38 @@ def test_the_energy_of_a_snap_does_not_depend_on_the_steps():
     few, many = (simulate(in_parts(SCENES["snap"], times)) for times in (32, 64))
     assert few.snap_dissipation[-1] == pytest.approx(many.snap_dissipation[-1], rel=0.05)
     assert abs(many.integrator_dissipation[-1]) < 0.2 * many.snap_dissipation[-1]
+
+
+#: status before and after, way in mm, and the share of mu times normal force times way that is dissipated
+SLIPS = [
+    (FORWARD, FORWARD, 0.1, 1.0),
+    (BACKWARD, BACKWARD, -0.1, 1.0),
+    (STICK, FORWARD, 0.1, 1.0),
+    (OPEN, BACKWARD, -0.1, 0.5),
+    (FORWARD, OPEN, 0.1, 0.5),
+    (BACKWARD, OPEN, -0.1, 0.5),
+    (FORWARD, OPEN, -0.1, 0.0),
+    (STICK, OPEN, 0.1, 0.0),
+    (FORWARD, FORWARD, -0.1, 0.0),
+    (BACKWARD, BACKWARD, 0.1, 0.0),
+    (STICK, STICK, 1e-12, 0.0),
+    (OPEN, OPEN, 0.1, 0.0),
+]
+
+
+@pytest.mark.parametrize(("before", "after", "way", "share"), SLIPS)
+def test_who_dissipates_by_friction(before, after, way, share):
+    """One node of a level pad goes its way and presses with 2 N/mm where it touches: a node that lands
+    or leaves does so with half of that in the mean, a node that stuck and let go slides in the air.
+    """
+    model = make_model(SCENES["friction"])
+    rest = model.equilibrium.rest(np.zeros(2), 0.0)
+    node, states = 3, []
+    for status, moved in ((before, 0.0), (after, way)):
+        state = replace(rest, u=rest.u.copy(), status=rest.status.copy(), contact_force=0.0 * rest.attraction)
+        state.u[model.pad.nodes[node], 0] += moved
+        state.status[node] = status
+        state.contact_force[node, 0] = 2.0 * (status != OPEN)
+        states.append(state)
+    expected = share * 0.5 * 2.0 * 0.1
+    assert Part(model, *states).friction() == pytest.approx(expected, rel=1e-12, abs=1e-15)

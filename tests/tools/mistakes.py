@@ -100,7 +100,7 @@ class Copy:
             return None
         failed = re.search(r"^(?:FAILED|ERROR) tests/(.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
         if failed is None or done.returncode != 1:
-            raise SystemExit(f"{' '.join(tests)} could not run\n{done.stdout}\n{done.stderr}")
+            raise SystemExit(f"status {done.returncode} of {tests}\n{done.stdout}\n{done.stderr}")
         return failed[1]
 
     def test_with(self, mistake: Mistake) -> str | None:
