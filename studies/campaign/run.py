@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from dataclasses import replace
 from queue import SimpleQueue
 from typing import Any
 
@@ -14,7 +15,7 @@ from .drawing import draw
 from .ending import Ending
 from .records import Key, Records
 from .shrinking import shrunk
-from .tables import Tables
+from .tables import Tables, steps_of
 
 #: CPU seconds after which a scene is given up
 LIMIT_S = 60.0
@@ -31,7 +32,10 @@ def run(keys: Sequence[Key], records: Records, workers: int) -> None:
 
     def end(one: Apart, key: Key) -> None:
         tables = draw(*key)
-        records.add(key, tables, one.judge(tables, _with_twins(key), LIMIT_S))
+        ending = one.judge(tables, _with_twins(key), LIMIT_S)
+        # a process that came to its limit could not say how large its scene is
+        requested = sum(map(steps_of, tables["motion"]))
+        records.add(key, tables, replace(ending, requested=requested))
 
     def shrink(one: Apart, key: Key) -> None:
         def judge(tables: Tables, limit_s: float) -> Ending:

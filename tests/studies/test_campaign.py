@@ -366,6 +366,8 @@ def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
     with open(tmp_path / "campaign" / "ends.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["scene"] for row in rows] == [str(n) for n in range(10)]
+    drawn = [tables.scene_of(drawing.draw(0, n)).total_steps for n in range(10)]
+    assert [int(row["requested"]) for row in rows] == drawn
     for folder in ("failures", "minimal"):
         names = sorted(p.name for p in (tmp_path / "campaign" / folder).iterdir())
         assert names == ["seed0-scene0000.toml", "seed0-scene0005.toml"]
