@@ -66,7 +66,10 @@ class Pins:
 
     def release(self, normal: Floats, shear: Floats, weak: float) -> bool:
         """Let go of nodes whose shear force is below the lower limit; says whether there were any."""
-        loose = self.held & (np.abs(shear) < self.lower * normal - weak)
+        return self.let_go(self.held & (np.abs(shear) < self.lower * normal - weak))
+
+    def let_go(self, loose: Any) -> bool:
+        """Let go of these nodes (P,) bool for the rest of the step; says whether there were any."""
         self.x[loose] = np.nan
         if loose.any():
             self._released |= loose
@@ -164,6 +167,12 @@ class Interface:
         sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[sunk].max()) if sunk.any() else None
 
+    def _strayed(self, old: State, state: State, x: Floats) -> Any:
+        """Pinned nodes (P,) that have slipped away to where the coefficient is another one."""
+        nodes = np.arange(x.size)
+        pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
+        return self.pins.held & (state.status >= FORWARD) & (pinned != self.friction(old, nodes, x))
+
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
         position = self.positions(state.u)
@@ -172,6 +181,8 @@ class Interface:
         active = state.status != OPEN
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
         if self.pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
+            return False
+        if self.pins.let_go(self._strayed(old, state, position[:, 0])):
             return False
         normal, shear = state.contact_force[active].T
         slip = (surface.stretch * (position[:, 0] - self._origin(old)))[active]

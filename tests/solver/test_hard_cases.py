@@ -148,3 +148,22 @@ def test_friction_that_rises_within_a_nodes_motion_is_a_jump_to_it():
     result = simulate(Scene(coarse_pad(), surface, motion=motion))
     assert result.substeps.tolist() == [1] * 7
     assert (np.diff(result.friction_dissipation) >= 0.0).all()
+
+
+def test_a_node_that_slips_away_from_its_pin_has_the_coefficient_of_its_own_place():
+    """Found by the campaign: pinned to the jump from 0.2 to 0.9 at 1.01 mm, a node slipped back by
+    0.05 mm and kept 0.9.
+    """
+    surface = Display(Layer(0.09, 3.35), friction=[[1.01, 0.2], [1.01, 0.9]])
+    motion = [Press(indentation=0.6, steps=2), Slide(2.0, steps=4)]
+    solver = Solver(element="q1")
+    scene = Scene(coarse_pad(), surface, Kaczmarek(), 800.0, motion, solver=solver)
+    slipped = 0
+    result = simulate(scene)
+    for frame in result.frames:
+        x = result.mesh.points[:, 0] + frame.displacement[:, 0]
+        slips = (frame.contact_status == 2) & (frame.contact_pressure > 1e-3 * frame.contact_pressure.max())
+        ratio = np.abs(frame.shear_traction[slips]) / frame.contact_pressure[slips]
+        np.testing.assert_allclose(ratio, surface.friction_coefficient(x[slips]), rtol=1e-6)
+        slipped += int(slips.sum())
+    assert slipped > 50
