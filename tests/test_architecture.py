@@ -54,6 +54,8 @@ GROUND, MIDDLE, EDGES = (
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
 STRANGERS = {"fast", "sweeps"}
+#: packages beside the rooms; an installed evfem has studies and meshes in its folder
+NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load, and the modules that are themselves loaded only when they are there
 LATE = {"skfem", "meshio", "matplotlib", "numba", "pypardiso", "tqdm", "distributed", "pyarrow"}
 COMPILED = {"tissue.kernels.lanes", "tissue.kernels.elastic", "tissue.kernels.viscous"}
@@ -80,7 +82,7 @@ def modules():
     """Every module but the packages' own files and the data."""
     found = (path.relative_to(PACKAGE).with_suffix("") for path in PACKAGE.rglob("*.py"))
     return sorted(
-        ".".join(path.parts) for path in found if path.name != "__init__" and path.parts[0] != "data"
+        ".".join(path.parts) for path in found if path.name != "__init__" and path.parts[0] not in NO_ROOMS
     )
 
 
