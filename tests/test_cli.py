@@ -171,7 +171,9 @@ def test_a_run_whose_folder_is_in_use_ends_with_a_sentence_and_touches_nothing(p
     before = contents(place / "square-out")
     status, out, err = called(place, "run", "square.toml")
     assert (status, out) == (2, "")
-    assert f"where {done} of 3002 steps of this scene are done; allowed: --resume to go on there" in err
+    # the checkpoint is written first: a kill may leave the history a row behind it
+    told = [f"where {n} of 3002 steps of this scene are done; allowed: --resume" for n in (done, done + 1)]
+    assert any(sentence in err for sentence in told)
     assert contents(place / "square-out") == before
     assert not [name for name in before if "lock" in name]
     (place / "square.toml").write_text(SCENE)
