@@ -20,6 +20,7 @@ import tomli_w
 from evfem.common.checks import MOST_STEPS
 from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signalfile import read_signal
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
@@ -52,6 +53,7 @@ VERSION = 1
 #: largest files in bytes, and most steps of all motions together
 LARGEST_SCENE = 4 * 2**20
 LARGEST_TABLE = 64 * 2**20
+TEXTURES: Mapping[str, type] = {"grating": Grating, "self_affine": SelfAffine}
 FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
@@ -171,6 +173,8 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
             return Flat(**common) if insulator is None else Display(**common)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
+        if kind in TEXTURES:
+            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
             given = "nothing" if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
@@ -321,8 +325,9 @@ def _law_table(region: str, law: Any) -> dict[str, Any]:
 
 
 def _surface_table(surface: Any) -> dict[str, Any]:
-    if type(surface) not in (Flat, Display, Sinusoid, Profile):
-        raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
+    if type(surface) not in (Flat, Display, Sinusoid, Profile, *TEXTURES.values()):
+        allowed = "Flat, Display, Sinusoid, Profile, Grating or SelfAffine, for a file"
+        raise InputError("surface", type(surface).__name__, allowed)
     friction = (
         surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
     )
@@ -331,6 +336,10 @@ def _surface_table(surface: Any) -> dict[str, Any]:
         return {"kind": "flat", **table}
     if type(surface) is Sinusoid:
         return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
+    for kind, cls in TEXTURES.items():
+        if type(surface) is cls:
+            own = {name: value for name, value in _changed(surface).items() if name != "insulator"}
+            return {"kind": kind, **own, **table}
     rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
     return {"kind": "profile", **table, "points": [list(row) for row in rows]}
 

@@ -53,7 +53,9 @@ class SceneTable(Table):
 
     version: int
     finger: dict[str, Any] = _optional("a table [finger]", {})
-    surface: dict[str, Any] = _required("a table [surface] with a kind: flat | sinusoid | profile")
+    surface: dict[str, Any] = _required(
+        "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"
+    )
     electrostatics: dict[str, Any] | None = _optional("a table [electrostatics]")
     solver: dict[str, Any] = _optional("a table [solver]", {})
     output: dict[str, Any] = _optional("a table [output]", {})
@@ -103,6 +105,29 @@ class ProfileTable(FlatTable):
     points: list[list[float]] | None = _optional("rows [[x, height], ...] in mm")
 
 
+class GratingTable(FlatTable):
+    """[surface] of the kind grating."""
+
+    kind: Literal["grating"]  # type: ignore[assignment]
+    period: float = _required("a length in mm, larger than 0")
+    groove_depth: float = _required("a depth in mm, larger than 0")
+    groove_width: float | None = _optional("a width in mm at half depth, below the period")
+    wall_width: float | None = _optional("a width in mm up to that of ridge and groove")
+    phase: float = _optional("a part of the period, -1 to 1", 0.0)
+
+
+class SelfAffineTable(FlatTable):
+    """[surface] of the kind self_affine."""
+
+    kind: Literal["self_affine"]  # type: ignore[assignment]
+    hurst: float = _required("a Hurst exponent from 0 to 1")
+    rms: float = _required("a root mean square height in mm, larger than 0")
+    period: float = _optional("a length in mm after which it repeats", 10.0)
+    shortest: float = _optional("a wavelength in mm up to the longest", 0.2)
+    longest: float | None = _optional("a wavelength in mm up to the period")
+    seed: int = _optional("a whole number, not negative", 0)
+
+
 class ElectrostaticsTable(Table):
     """[electrostatics]."""
 
@@ -126,6 +151,8 @@ SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
     "sinusoid": SinusoidTable,
     "profile": ProfileTable,
+    "grating": GratingTable,
+    "self_affine": SelfAffineTable,
 }
 MOTIONS: Mapping[str, tuple[type[Table], type]] = {
     cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp)

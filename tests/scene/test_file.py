@@ -5,6 +5,7 @@ import pytest
 from tools.meshes import square_mesh
 
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -199,9 +200,13 @@ def scenes(folder):
         solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
         output=Output(3),
     )
+    grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
+    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press])
+    rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
+    yield Scene(FingerPad(), rough, motion=[press])
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("number", range(7))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
@@ -256,6 +261,21 @@ WRONG = [
     (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", "given 'flat'"),
     (SHORT, "kind = 'flat'", "", "surface.kind", "flat | sinusoid | profile"),
     (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", "given round"),
+    (SHORT, "kind = 'flat'", "kind = 'grating'", "surface.period", "given nothing; allowed: a length in mm"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
+        "surface.hurst",
+        "given 2.0; allowed: a Hurst exponent from 0 to 1",
+    ),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 0.5\nrms = 0.01\nseed = 0.5",
+        "surface.seed",
+        "given 0.5",
+    ),
     (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
