@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -25,7 +26,8 @@ from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signalfile import read_signal
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError, StorageError
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
+from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
@@ -225,12 +227,14 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     skin = _build(Electrical, parsed, "finger.electrical")
     if "mesh" in parts:
         return _meshed_finger(parts, skin, folder)
-    known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
+    known = [spec.name for spec in fields(FingerPad) if spec.init]
     for name in parts:
-        if name not in known:
-            raise unknown(f"finger.{name}", name, [*known, "mesh"])
+        if name not in (*known, "participant"):
+            raise unknown(f"finger.{name}", name, [*known, "participant", "mesh"])
+    if "participant" in parts:
+        parts = participant_sizes(parts.pop("participant")) | parts
     if "materials" in parts:
-        parts["materials"] = _materials(parts["materials"])
+        parts["materials"] = _materials(parts["materials"], TABLE_2)
     if electrical:
         parts["electrical"] = skin
     with at("finger"):
@@ -250,7 +254,10 @@ def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) 
         return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)
 
 
-def _materials(tables: object) -> dict[str, Any]:
+def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({})) -> dict[str, Any]:
+    """The laws of the regions; one of `usual` whose table names no law is neo-Hookean, and keeps
+    the moduli that its table does not name.
+    """
     if not isinstance(tables, dict):
         raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
     laws = {}
@@ -258,6 +265,8 @@ def _materials(tables: object) -> dict[str, Any]:
         key = f"finger.materials.{name}"
         if not isinstance(table, dict):
             raise InputError(key, shown(table), "a table with a law and its parameters")
+        if name in usual and "law" not in table:
+            table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
         with at("finger"):
             laws[name] = from_table(table, key)
     return laws

@@ -1,5 +1,7 @@
 """Scene files: three examples load, what is written is read back, mistakes get one sentence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.meshes import square_mesh
@@ -177,6 +179,21 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
     assert scene.air_layer is False
 
 
+def test_a_participant_of_table_1_may_stand_in_a_file():
+    """Other keys say what is different from it."""
+    text = SHORT + "[finger]\nparticipant = 'iii'\nresolution = 'coarse'\nbone_offset = 0.5\n"
+    assert loads(text).finger == replace(FingerPad.participant("iii", "coarse"), bone_offset=0.5)
+
+
+def test_a_material_of_table_2_may_be_changed_in_one_of_its_moduli():
+    text = SHORT + "[finger.materials]\ndermis.E = 0.06\nnail.nu = 0.2\nhypodermis.viscosity = 0.1\n"
+    laws = loads(text).finger.materials
+    assert laws["dermis"] == NeoHookean(E=0.06, nu=0.48)
+    assert laws["nail"] == NeoHookean(E=17.0, nu=0.2)
+    assert laws["hypodermis"] == NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
+    assert laws["epidermis"] == FingerPad().materials["epidermis"]
+
+
 def scenes(folder):
     """Scenes that use everything a file can hold."""
     laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
@@ -330,6 +347,7 @@ WRONG = [
         "finger.materials.dermis",
         "given 3",
     ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nparticipant = 'xx'", "finger.participant", "i | ii |"),
     (
         SHORT,
         "force = 0.05",
