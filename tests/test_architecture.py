@@ -44,6 +44,7 @@ ROOMS = {
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file folder pools run",
     ),
+    "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
