@@ -231,6 +231,23 @@ def test_what_is_written_is_read_back(folder, number):
     assert dump(loads(text)) == text
 
 
+@pytest.mark.parametrize(("name", "layer"), [("film", (0.09, 3.35)), ("touchscreen", (0.001, 3.9))])
+def test_insulators_have_names(name, layer):
+    own = "insulator_thickness = 0.09\ninsulator_eps_r = 3.35\n"
+    assert own in DISPLAY
+    scene = loads(DISPLAY.replace(own, f'insulator = "{name}"\n'))
+    assert scene.surface.insulator == Layer(*layer)
+    assert loads(dump(scene)).digest() == scene.digest()
+    with pytest.raises(
+        InputError, match=f"electrostatics.insulator_eps_r: given 3 beside insulator = {name}"
+    ):
+        loads(DISPLAY.replace(own, f'insulator = "{name}"\ninsulator_eps_r = 3.0\n'))
+    with pytest.raises(
+        InputError, match=r"electrostatics.insulator: given 'glass'; allowed: film \| touchscreen"
+    ):
+        loads(DISPLAY.replace(own, 'insulator = "glass"\n'))
+
+
 @form
 def spring(u, v, w):
     return u * v
