@@ -388,7 +388,7 @@ def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path
 def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
     status, out, err = called(tmp_path, "study", "section321", "fig99", "--out", "here")
     assert (status, out) == (2, "")
-    assert err.startswith("evfem: study: given fig99; allowed: section321, ")
+    assert err.startswith('evfem: study: given "fig99"; allowed: section321, ')
     assert files(tmp_path) == []
 
 

@@ -24,7 +24,7 @@ from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS
 from evfem.electrostatics import hjif
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
-from evfem.errors import InputError, readable
+from evfem.errors import ABSENT, InputError, quoted, readable
 
 WAV_FORM, MAP_FORM = "evfem-voltage-1", "evfem-friction-map-1"
 WAV_KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
@@ -109,7 +109,7 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     True
     """
     if not isinstance(profile, VoltageProfile):
-        raise InputError("profile", profile, "a VoltageProfile")
+        raise InputError("profile", quoted(profile), "a VoltageProfile")
     ending = Path(path).suffix.lower()
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
@@ -159,7 +159,7 @@ def _too_much(given: str, playback: Playback) -> InputError:
 
 
 def _missing(key: str, what: str, ending: str) -> InputError:
-    return InputError(key, "nothing", f"{what}, needed for {ending}")
+    return InputError(key, ABSENT, f"{what}, needed for {ending}")
 
 
 def _hjif(profile: VoltageProfile, playback: Playback) -> str:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 
 class CellKind(NamedTuple):
@@ -156,14 +156,14 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     such region or interface.
     """
     if region not in mesh.region_names:
-        raise InputError("region", region, " | ".join(mesh.region_names))
+        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
     inside = mesh.region == mesh.region_names[region]
     edges, of_cell = mesh.edges
     own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(edges)) for cells in (inside, ~inside))
     shared = (own > 0) & (other > 0)
     interface = mesh.cell_edges[inside][shared[of_cell[inside]]]
     if not len(interface):
-        raise InputError("region", region, "a region that has another one below it")
+        raise InputError("region", quoted(region), "a region that has another one below it")
     curves = _parabolas(mesh.points[interface])
     points = mesh.points[nodes]
     chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)
