@@ -67,7 +67,8 @@ def parser() -> argparse.ArgumentParser:
         epilog=f"`evfem run` alone computes a built-in scene; `evfem COMMAND --help` says more. {STATUS}",
     )
     top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
+    top.set_defaults(function=_help)
     for name, does, options, function in (
         ("run", "run a scene and write history, fields, summary and picture", _run_options, _run),
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument, _plan),
@@ -258,6 +259,11 @@ def _scene(path: Path | None) -> Scene:
     from evfem.scene.file import load
 
     return load(path)
+
+
+def _help(given: argparse.Namespace) -> int:
+    parser().print_help()
+    return DONE
 
 
 def _run(given: argparse.Namespace) -> int:

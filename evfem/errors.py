@@ -122,6 +122,24 @@ class InputErrors(InputError):
         return type(self), (self._mistakes,)
 
 
+def unknown(key: str, name: str, known: Sequence[str], what: str = "an unknown key") -> InputError:
+    """The error for a name that does not exist, with the one that may have been meant.
+
+    >>> raise unknown("surface.frictoin", "frictoin", ["kind", "friction"])
+    Traceback (most recent call last):
+    evfem.errors.InputError: surface.frictoin: given an unknown key; allowed: friction? (kind, friction)
+    """
+    close = near(name, known)
+    return InputError(key, what, f"{close[0]}? ({', '.join(known)})" if close else ", ".join(known))
+
+
+def near(name: str, known: Sequence[str]) -> list[str]:
+    """The name that may have been meant, if there is one."""
+    from difflib import get_close_matches
+
+    return get_close_matches(name[:40], known, n=1)
+
+
 def together(mistakes: Sequence[InputError]) -> InputError:
     """One error for one mistake or several."""
     return InputErrors(mistakes) if len(mistakes) > 1 else mistakes[0]

@@ -64,6 +64,11 @@ class Mesh:
     region_names: Mapping[str, int]
     node_sets: Mapping[str, Ints] = field(default_factory=dict)
 
+    def __repr__(self) -> str:
+        """Its size, regions and sets."""
+        names = f"regions {', '.join(self.region_names)}; sets {', '.join(self.node_sets) or 'none'}"
+        return f"Mesh of {len(self.points)} nodes, {len(self.cells)} cells ({self.kind}); {names}"
+
     @property
     def dim(self) -> int:
         """Number of coordinates of a point: 2 in the plane."""

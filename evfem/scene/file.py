@@ -12,6 +12,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,7 @@ from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signalfile import read_signal
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.errors import ABSENT, InputError, Mistakes, StorageError
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
@@ -41,7 +42,6 @@ from evfem.scene.keys import (
     at,
     parse,
     shown,
-    unknown,
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
@@ -62,6 +62,13 @@ def load(path: str | Path) -> Scene:
     """
     path = Path(path)
     return loads(read_text("scene", path), path.parent, path.stem)
+
+
+def scene_at(path: object) -> Scene:
+    """The scene in the file at a path, where a scene or a path was asked for."""
+    if not isinstance(path, (str, PathLike)):
+        raise InputError("scene", path, "a Scene, or the path of a scene file")
+    return load(Path(path))
 
 
 def read_text(key: str, path: Path) -> str:

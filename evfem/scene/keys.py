@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -12,7 +11,7 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
-from evfem.errors import ABSENT, InputError, readable, together
+from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
 from evfem.solver.strategy import Strategy
@@ -150,23 +149,12 @@ def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
         key = _join(prefix, name) + "".join(f"[{part}]" for part in deeper if part.isdecimal())
         if one["type"] == "extra_forbidden":
             mistakes[name] = unknown(key, name, known)
-            meant |= {*_close(name, known)}
+            meant |= {*near(name, known)}
         elif name not in mistakes and not (one["type"] == "missing" and name in meant):
             given = ABSENT if one["type"] == "missing" else shown(one["input"])
             allowed = model.model_fields[name].description or "another value"
             mistakes[name] = InputError(key, given, allowed)
     raise together(list(mistakes.values()))
-
-
-def unknown(key: str, name: str, known: list[str]) -> InputError:
-    """The error for a key that does not exist, with the one that may have been meant."""
-    close = _close(name, known)
-    hint = f"{close[0]}? (" if close else ""
-    return InputError(key, "an unknown key", hint + ", ".join(known) + (")" if close else ""))
-
-
-def _close(name: str, known: list[str]) -> list[str]:
-    return difflib.get_close_matches(name[:40], known, n=1)
 
 
 def _join(prefix: str, name: str) -> str:
