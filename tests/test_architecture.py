@@ -19,7 +19,7 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl"},
+        {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
@@ -39,7 +39,7 @@ ROOMS = {
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
     "simulation": (
-        {"numpy", "threadpoolctl", "pandas"},
+        {"numpy", "threadpoolctl"},
         "provenance result spectrum model works ledger checkpoint run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),

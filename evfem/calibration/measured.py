@@ -21,8 +21,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_table
-from evfem.errors import InputError
-from evfem.scene.keys import shown, unknown
+from evfem.errors import InputError, unknown
+from evfem.scene.keys import shown
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output

@@ -15,6 +15,7 @@ from evfem.calibration.parameters import Parameter
 from evfem.common.arrays import Floats
 from evfem.common.checks import real
 from evfem.common.storage import write_text
+from evfem.common.tables import frame
 from evfem.common.views import table
 from evfem.errors import InputError
 from evfem.scene.file import loads
@@ -87,23 +88,22 @@ class FitResult:
         ends = zip(self.parameters.items(), self.unknowns - reach, self.unknowns + reach, strict=True)
         return {key: (float(one.value(low)), float(one.value(high))) for (key, one), low, high in ends}
 
-    def table(self) -> list[dict[str, Any]]:
-        """A row for each parameter: key, value, ends of the 95 % interval, bounds, and what it
-        does to its key.
+    def table(self) -> Any:
+        """A row for each parameter, with its value, the ends of its 95 % interval, its bounds and
+        what it does to its key: a `pandas.DataFrame`, or a numpy record array.
         """
-        intervals = self.intervals()
-        return [
+        ends, free = list(self.intervals().values()), self.parameters.values()
+        return frame(
             {
-                "parameter": key,
-                "value": self.values[key],
-                "from": intervals[key][0],
-                "to": intervals[key][1],
-                "low": one.low,
-                "high": one.high,
-                "apply": one.apply,
+                "parameter": list(self.parameters),
+                "value": list(self.values.values()),
+                "lowest": [low for low, _ in ends],
+                "highest": [high for _, high in ends],
+                "low": [one.low for one in free],
+                "high": [one.high for one in free],
+                "apply": [one.apply for one in free],
             }
-            for key, one in self.parameters.items()
-        ]
+        )
 
     def __repr__(self) -> str:
         """Values with intervals, how well they explain the data, and what is doubtful."""
@@ -125,13 +125,12 @@ class FitResult:
     @property
     def _rows(self) -> list[tuple[str, str]]:
         rows = []
-        for row in self.table():
-            reach = f"{row['from']:.3g} to {row['to']:.3g} with 95 % confidence"
-            known = math.isfinite(row["to"])
-            kind = "" if row["apply"] == "value" else f" as {row['apply']}"
-            rows.append(
-                (row["parameter"], f"{row['value']:.4g}{kind} ({reach if known else 'not determined'})")
+        for (key, one), (low, high) in zip(self.parameters.items(), self.intervals().values(), strict=True):
+            kind = "" if one.apply == "value" else f" as {one.apply}"
+            known = (
+                f"{low:.3g} to {high:.3g} with 95 % confidence" if math.isfinite(high) else "not determined"
             )
+            rows.append((key, f"{self.values[key]:.4g}{kind} ({known})"))
         return rows
 
     def save(self, path: str | Path) -> None:

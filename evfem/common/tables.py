@@ -6,7 +6,8 @@ import csv
 import io
 import math
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,22 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
         place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(key, f"a value that is not finite, number {place}", allowed)
     return array.astype(float)
+
+
+def frame(columns: Mapping[str, Any]) -> Any:
+    """Columns of equal length as a `pandas.DataFrame`, or where pandas is not installed as a numpy
+    record array.
+    """
+    if find_spec("pandas") is not None:
+        from pandas import DataFrame
+
+        return DataFrame(columns)
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    length = len(next(iter(arrays.values())))
+    records = np.recarray(length, [(name, values.dtype) for name, values in arrays.items()])
+    for name, values in arrays.items():
+        records[name] = values
+    return records
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:

@@ -11,7 +11,6 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays, write_text
-from evfem.common.tables import csv_text
+from evfem.common.tables import csv_text, frame
 from evfem.common.views import curves, plus, table
 from evfem.errors import InputError, readable, unknown
 from evfem.mesh.archive import mesh_arrays, mesh_of
@@ -165,15 +164,7 @@ class Result:
         """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
         installed a numpy record array of the same columns; `table["normal_force"]` is one.
         """
-        columns = {name: np.asarray(self[name]) for name in COLUMNS}
-        if find_spec("pandas") is not None:
-            from pandas import DataFrame
-
-            return DataFrame(columns)
-        records = np.recarray(len(self.step), [(name, column.dtype) for name, column in columns.items()])
-        for name, values in columns.items():
-            records[name] = values
-        return records
+        return frame({name: np.asarray(self[name]) for name in COLUMNS})
 
     def to_csv(self, path: str | Path) -> None:
         """Write the history as `evfem run` does (`history.csv`), whole or not at all."""

@@ -172,12 +172,13 @@ def test_residuals_beyond_their_sd_are_said(path):
 def test_a_result_is_written_and_read_back(path, tmp_path):
     found = ev.fit(path, measured(path, noise=0.01), BOUNDS, workers=1)
     found.save(tmp_path / "fit.json")
-    read = load(tmp_path / "fit.json")
+    read = ev.load(tmp_path / "fit.json")
     assert repr(read) == repr(found)
-    assert read.table() == found.table()
+    assert list(read.table()["lowest"]) == list(found.table()["lowest"])
     assert read.scene.digest() == found.scene.digest()
     np.testing.assert_array_equal(read.residuals, found.residuals)
-    assert [row["parameter"] for row in found.table()] == [E, MU]
+    assert list(found.table()["parameter"]) == [E, MU]
+    assert list(found.table()["value"]) == [found[E], found[MU]]
     assert found.provenance["versions"]["evfem"] == ev.__version__
     with pytest.raises(InputError, match="parameter: given nu"):
         found["nu"]
@@ -238,20 +239,20 @@ def test_progress_is_a_line_for_each_step(path, capsys):
 
 
 def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
-    """Above a modulus of 0.07005 nothing converges: the fit comes to 0.07 from below, and makes
-    its last differences on the other side.
+    """Above a modulus of 0.09 nothing converges: a fit that starts there makes its first
+    differences on the other side.
     """
     work, failed = runs.work, []
 
     def fragile(job):
         modulus = scenefile.loads(job[0], job[1]).finger.materials["tissue"].E
-        if modulus > 0.07005:
+        if modulus > 0.09001:
             failed.append(modulus)
             return Answer("not_converged", 0.0, "step 1 did not converge", {})
         return work(job)
 
     monkeypatch.setattr(runs, "work", fragile)
-    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.03)}, workers=1)
+    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
     assert found[E] == pytest.approx(0.07, rel=1e-3)
     assert failed
     monkeypatch.setattr(runs, "work", lambda job: Answer("not_converged", 0.0, "none", {}))
@@ -286,7 +287,7 @@ def test_data_that_do_not_fit_the_scene_are_refused(path):
     curve = ev.MeasuredCurve("normal_force", "indentation", [0.1, 0.2], [0.1, 0.2], motion=2)
     with pytest.raises(InputError, match=r"data\.motion: given 2; allowed: motions from 0 to 1"):
         ev.fit(path, curve, {E: (0.1, 0.2)}, workers=1)
-    with pytest.raises(InputError, match="outputs: given 'normal_force'"):
+    with pytest.raises(InputError, match='outputs: given "normal_force"'):
         ev.fit(path, ev.MeasuredValues("normal_force", [1, 2], {MU: [0.1, 0.2]}), {E: (0.1, 0.2)}, workers=1)
     with pytest.raises(InputError, match="data: given 3; allowed: MeasuredCurve"):
         ev.fit(path, [3], {E: (0.1, 0.2)}, workers=1)
