@@ -288,7 +288,7 @@ def _json(value: Any) -> Any:
 def versions() -> dict[str, str]:
     """Versions of evfem, Python and the packages that compute, as far as they are installed."""
     found = {"evfem": evfem.__version__, "python": python_version()}
-    for package in ("numpy", "scipy", "scikit-fem", "meshio", "numba", "pypardiso"):
+    for package in ("numpy", "scipy", "scikit-fem", "meshio", "pypardiso"):
         try:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,6 +26,8 @@ from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, points_of
 from evfem.tissue.fields import Field, Parts
 from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
+from evfem.tissue.kernels.blocks import loops, moduli
+from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
 
 #: what the tissue's forms use: F, S by the gradient, and the volume measure
@@ -36,8 +37,8 @@ PARTS = Parts(2, grad=True, theta=True)
 class Tissue:
     """Internal forces, tangent and stored energy of the regions' laws on a space.
 
-    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses
-    compiled kernels when numba is there.
+    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses the
+    compiled loops where they were built.
     """
 
     def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
@@ -48,7 +49,7 @@ class Tissue:
             (split(law), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.kernels = compiled_kernels("elastic") if self.mu is not None else None
+        self.loops = loops() if self.mu is not None else None
 
     @cached_property
     def regions(self) -> list[tuple[Any, Integral]]:
@@ -57,33 +58,32 @@ class Tissue:
 
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
-        if self.kernels is not None:
-            return self.kernels.smallest_J(u, self.space.cells)
+        if self.loops is not None:
+            return float(self.loops.smallest_J(self.space.cells, np.ascontiguousarray(u)))
         return min(integral.smallest_J(u) for _, integral in self.regions)
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
-        if self.kernels is not None:
-            return self.kernels.forces(u, *self._blocks)
+        if self.loops is not None:
+            return self._looped(self.loops, u)[0]
         fe = np.empty((*self.space.nodes.shape, self.space.dim))
         for _, integral in self.regions:
             fe[integral.points.cells] = integral.cell_forces(u)
         return scatter(self.space.nodes, fe, self.space.size)
 
-    def tangent(self, u: Floats) -> Floats:
-        """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
-        if self.kernels is not None:
-            return self.kernels.tangent(u, *self._blocks, len(self.space.nodes))
-        E, n = self.space.nodes.shape
-        K = np.empty((E, self.space.dim * n, self.space.dim * n))
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangents of all cells to the `data` of a pattern."""
+        if self.loops is not None:
+            data += self._shear.data(pattern)
+            self.loops.add_tangent(*self._request(u), pattern.blocks, data)
+            return
         for _, integral in self.regions:
-            K[integral.points.cells] = integral.cell_tangents(u)
-        return K
+            integral.add_tangent(u, pattern, data)
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
-        if self.kernels is not None:
-            return self.kernels.energy(u, *self._blocks)
+        if self.loops is not None:
+            return self._looped(self.loops, u)[1]
         total = 0.0
         for law, integral in self.regions:
             field = integral.field(u)
@@ -105,12 +105,26 @@ class Tissue:
             J[cells] = np.einsum("dq,dq->d", det(deformation_gradient(field)), mean)
         return sigma, J
 
-    @cached_property
-    def _blocks(self) -> tuple[Any, ...]:
-        """What the compiled loops read: Lame moduli (B, L) and the space's cells."""
-        from evfem.tissue.kernels.lanes import blocked
+    def _request(self, u: Floats) -> tuple[Any, ...]:
+        """What the compiled loops read: the cells, u and the Lame moduli (B, L)."""
+        return self.space.cells, np.ascontiguousarray(u), *self._moduli
 
-        return blocked(self.mu), blocked(self.lmbda), self.space.cells
+    @cached_property
+    def _moduli(self) -> tuple[Floats, Floats]:
+        return moduli(self.mu), moduli(self.lmbda)
+
+    def _looped(self, loops: Any, u: Floats) -> tuple[Floats, float]:
+        """Nodal forces (N, 2) and stored energy by the compiled loops."""
+        out = np.zeros_like(u)
+        energy, _ = loops.forces(*self._request(u), out)
+        return out, energy
+
+    @cached_property
+    def _shear(self) -> Componentwise:
+        """mu grad v : grad w, the share of the neo-Hookean tangent that does not change."""
+        weighted = (self.space.weight * self.mu[:, None])[..., None, None] * self.space.gradient
+        rows = np.swapaxes(self.space.gradient, 2, 3).reshape(len(weighted), -1, weighted.shape[2])
+        return Componentwise(np.matmul(np.swapaxes(weighted, 2, 3).reshape(rows.shape).swapaxes(1, 2), rows))
 
 
 def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
@@ -164,14 +178,6 @@ def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any
         cells = space.mesh.cells_of(name)
         mu[cells], lmbda[cells] = law.mu, law.lmbda
     return mu, lmbda
-
-
-def compiled_kernels(name: str) -> Any:
-    """A module of compiled loops of evfem[fast], or None where numba is not installed."""
-    try:
-        return import_module(f"evfem.tissue.kernels.{name}")
-    except ImportError:
-        return None
 
 
 def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
