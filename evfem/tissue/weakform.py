@@ -75,7 +75,7 @@ class Tissue:
         """Add the tangents of all cells to the `data` of a pattern."""
         if self.loops is not None:
             data += self._shear.data(pattern)
-            self.loops.add_tangent(*self._request(u), pattern.blocks, data)
+            self.loops.add_tangent(*self._request(u), None, pattern.blocks, data)
             return
         for _, integral in self.regions:
             integral.add_tangent(u, pattern, data)

@@ -215,9 +215,10 @@ INLINE void scatter(tensor K, const int32_t *place, double *data) {
 }
 
 /* What changes of the tangent, added to the matrix: pairs k <= l of nodes, places (B, pairs, 4,
-   LANES). */
+   LANES). The curvature of ln J is weighted with the law's own pull, or with a given one (B, S). */
 INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored *mu,
-                            const stored *lmbda, const int32_t *places, double *data) {
+                            const stored *lmbda, const stored *given, const int32_t *places,
+                            double *data) {
     const points *sample = m->modes ? &m->sample : &m->at;
     int S = sample->count, rank = m->modes ? m->modes : S;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
@@ -233,6 +234,7 @@ INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored 
             memset(push[s], 0, sizeof(lanes) * 2 * n);
             add_forces(inverse[s], sample->reference + 2 * n * s, sample->inverse + 4 * (b * S + s), n,
                        push[s]);
+            if (given) pull[s] = given[b * S + s];
             for (int k = 0; k < 2 * n; k++) pulled[s][k] = pull[s] * push[s][k];
         }
         for (int j = 0; j < rank; j++) {
@@ -262,6 +264,46 @@ INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored 
                 }
                 scatter(K, place, data);
             }
+    }
+}
+
+/* ln J at the samples (B, S), or with du its change along du, F^-T : grad du. */
+INLINE void log_volumes(const mesh *m, int n, const double *u, const double *du, stored *out) {
+    const points *sample = m->modes ? &m->sample : &m->at;
+    for (Py_ssize_t b = 0; b < m->blocks; b++) {
+        lanes ue[2 * MOST_NODES], change[2 * MOST_NODES];
+        gather(u, m->nodes + b * n * LANES, n, ue);
+        if (du) gather(du, m->nodes + b * n * LANES, n, change);
+        for (int s = 0; s < sample->count; s++) {
+            Py_ssize_t point = b * sample->count + s;
+            const double *g = sample->reference + 2 * n * s;
+            tensor H = displacement_gradient(ue, g, sample->inverse + 4 * point, n);
+            lanes e = volume_change(H);
+            if (!du) {
+                out[point] = log_of_volume(e);
+                continue;
+            }
+            tensor G = inverse_transposed(H, e);
+            tensor D = displacement_gradient(change, g, sample->inverse + 4 * point, n);
+            out[point] = G.xx * D.xx + G.xy * D.xy + G.yx * D.yx + G.yy * D.yy;
+        }
+    }
+}
+
+/* Nodal forces pull F^-T : grad v of a given pull (B, S), added to out (N, 2). */
+INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *pull, double *out) {
+    const points *sample = m->modes ? &m->sample : &m->at;
+    for (Py_ssize_t b = 0; b < m->blocks; b++) {
+        lanes ue[2 * MOST_NODES], fe[2 * MOST_NODES] = {{0}};
+        gather(u, m->nodes + b * n * LANES, n, ue);
+        for (int s = 0; s < sample->count; s++) {
+            Py_ssize_t point = b * sample->count + s;
+            const double *g = sample->reference + 2 * n * s;
+            const stored *A = sample->inverse + 4 * point;
+            tensor H = displacement_gradient(ue, g, A, n);
+            add_forces(scaled(pull[point], inverse_transposed(H, volume_change(H))), g, A, n, fe);
+        }
+        spread(fe, m->nodes + b * n * LANES, n, out);
     }
 }
 
@@ -403,36 +445,48 @@ INLINE void viscous_tangent(const mesh *m, int n, const double *u, const stored 
     }
 
 #define VERSION(SUFFIX, ISA)                                                                             \
-    ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu, const stored *la,  \
-                                      double *out, double *smallest) {                                   \
-        SIZED(elastic_forces, u, mu, la, out, smallest)                                                  \
+    ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
+                                      const stored *lmbda, double *out, double *smallest) {              \
+        SIZED(elastic_forces, u, mu, lmbda, out, smallest)                                               \
     }                                                                                                    \
-    ISA static void tangent_##SUFFIX(const mesh *m, const double *u, const stored *mu, const stored *la,   \
-                                     const int32_t *places, double *data) {                              \
-        SIZED(elastic_tangent, u, mu, la, places, data)                                                  \
+    ISA static void tangent_##SUFFIX(const mesh *m, const double *u, const stored *mu,                   \
+                                     const stored *lmbda, const stored *given, const int32_t *places,    \
+                                     double *data) {                                                     \
+        SIZED(elastic_tangent, u, mu, lmbda, given, places, data)                                        \
+    }                                                                                                    \
+    ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) {\
+        SIZED(log_volumes, u, du, out)                                                                   \
+    }                                                                                                    \
+    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pull,           \
+                                           double *out) {                                                \
+        SIZED(volume_forces, u, pull, out)                                                               \
     }                                                                                                    \
     ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
-    ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                       \
+    ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                      \
         SIZED(viscous_strains, u, out)                                                                   \
     }                                                                                                    \
-    ISA static double damping_##SUFFIX(const mesh *m, const double *u, const stored *rate,                \
-                                       const stored *strain0, double *out) {                              \
+    ISA static double viscous_##SUFFIX(const mesh *m, const double *u, const stored *rate,               \
+                                       const stored *strain0, double *out) {                             \
         SIZED(viscous_forces, u, rate, strain0, out)                                                     \
     }                                                                                                    \
-    ISA static void damping_tangent_##SUFFIX(const mesh *m, const double *u, const stored *rate,          \
-                                             const stored *strain0, const int32_t *places, double *data) {\
+    ISA static void viscous_tangent_##SUFFIX(const mesh *m, const double *u, const stored *rate,         \
+                                             const stored *strain0, const int32_t *places, double *data) { \
         SIZED(viscous_tangent, u, rate, strain0, places, data)                                           \
     }                                                                                                    \
-    static const versions version_##SUFFIX = {forces_##SUFFIX,  tangent_##SUFFIX, smallest_##SUFFIX,     \
-                                              strains_##SUFFIX, damping_##SUFFIX, damping_tangent_##SUFFIX};
+    static const versions version_##SUFFIX = {                                                           \
+        forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
+        smallest_##SUFFIX, strains_##SUFFIX, viscous_##SUFFIX,     viscous_tangent_##SUFFIX};
 
 typedef struct {
     double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
-    void (*tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *, double *);
+    void (*tangent)(const mesh *, const double *, const stored *, const stored *, const stored *,
+                    const int32_t *, double *);
+    void (*log_volumes)(const mesh *, const double *, const double *, stored *);
+    void (*volume_forces)(const mesh *, const double *, const stored *, double *);
     double (*smallest)(const mesh *, const double *);
     void (*strains)(const mesh *, const double *, stored *);
-    double (*damping)(const mesh *, const double *, const stored *, const stored *, double *);
-    void (*damping_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
+    double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
+    void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
                             double *);
 } versions;
 
@@ -530,7 +584,7 @@ static PyObject *finish(request *r, PyObject *result) {
     return result;
 }
 
-static PyObject *forces(PyObject *self, PyObject *args) {
+static PyObject *call_forces(PyObject *self, PyObject *args) {
     PyObject *cells, *u, *mu, *lmbda, *out;
     request r;
     if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &mu, &lmbda, &out)) return NULL;
@@ -543,21 +597,56 @@ static PyObject *forces(PyObject *self, PyObject *args) {
     return finish(&r, Py_BuildValue("dd", energy, smallest));
 }
 
-static PyObject *add_tangent(PyObject *self, PyObject *args) {
-    PyObject *cells, *u, *mu, *lmbda, *places, *data;
+/* An array (B, S, LANES) of what acts or is found where ln J is sampled. */
+static void *hold_samples(request *r, PyObject *array, int writable) {
+    int samples = r->m.modes ? r->m.sample.count : r->m.at.count;
+    return hold(&r->all, array, 'd', r->m.blocks * samples * LANES, writable);
+}
+
+static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *lmbda, *pull, *places, *data;
     request r;
-    if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &mu, &lmbda, &places, &data)) return NULL;
+    if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pull, &places, &data)) return NULL;
     read_request(&r, cells, u, mu, lmbda, 0);
+    const stored *given = pull == Py_None ? NULL : hold_samples(&r, pull, 0);
     const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * 4 * LANES, 0);
     double *values = hold(&r.all, data, 'd', -1, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
-    version->tangent(&r.m, r.u, r.first, r.second, place, values);
+    version->tangent(&r.m, r.u, r.first, r.second, given, place, values);
     Py_END_ALLOW_THREADS
     return finish(&r, Py_NewRef(Py_None));
 }
 
-static PyObject *smallest_J(PyObject *self, PyObject *args) {
+static PyObject *call_log_volumes(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *du, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &du, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const double *along = du == Py_None ? NULL : hold(&r.all, du, 'd', 2 * size, 0);
+    stored *found = hold_samples(&r, out, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->log_volumes(&r.m, r.u, along, found);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_volume_forces(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *pull, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &pull, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *given = hold_samples(&r, pull, 0);
+    double *force = hold(&r.all, out, 'd', 2 * size, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->volume_forces(&r.m, r.u, given, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_smallest_J(PyObject *self, PyObject *args) {
     PyObject *cells, *u;
     request r;
     if (!PyArg_ParseTuple(args, "OO", &cells, &u)) return NULL;
@@ -570,7 +659,7 @@ static PyObject *smallest_J(PyObject *self, PyObject *args) {
     return finish(&r, PyFloat_FromDouble(smallest));
 }
 
-static PyObject *strains(PyObject *self, PyObject *args) {
+static PyObject *call_strains(PyObject *self, PyObject *args) {
     PyObject *cells, *u, *out;
     request r;
     if (!PyArg_ParseTuple(args, "OOO", &cells, &u, &out)) return NULL;
@@ -583,7 +672,7 @@ static PyObject *strains(PyObject *self, PyObject *args) {
     return finish(&r, Py_NewRef(Py_None));
 }
 
-static PyObject *viscous(PyObject *self, PyObject *args) {
+static PyObject *call_viscous(PyObject *self, PyObject *args) {
     PyObject *cells, *u, *rate, *strain0, *out;
     request r;
     if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &rate, &strain0, &out)) return NULL;
@@ -591,12 +680,12 @@ static PyObject *viscous(PyObject *self, PyObject *args) {
     double *force = hold(&r.all, out, 'd', 2 * size, 1), dissipation;
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
-    dissipation = version->damping(&r.m, r.u, r.first, r.second, force);
+    dissipation = version->viscous(&r.m, r.u, r.first, r.second, force);
     Py_END_ALLOW_THREADS
     return finish(&r, PyFloat_FromDouble(dissipation));
 }
 
-static PyObject *add_viscous(PyObject *self, PyObject *args) {
+static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
     PyObject *cells, *u, *rate, *strain0, *places, *data;
     request r;
     if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &rate, &strain0, &places, &data)) return NULL;
@@ -605,21 +694,26 @@ static PyObject *add_viscous(PyObject *self, PyObject *args) {
     double *values = hold(&r.all, data, 'd', -1, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
-    version->damping_tangent(&r.m, r.u, r.first, r.second, place, values);
+    version->viscous_tangent(&r.m, r.u, r.first, r.second, place, values);
     Py_END_ALLOW_THREADS
     return finish(&r, Py_NewRef(Py_None));
 }
 
 static PyMethodDef methods[] = {
-    {"forces", forces, METH_VARARGS,
+    {"forces", call_forces, METH_VARARGS,
      "forces(cells, u, mu, lmbda, out): add the nodal forces (N, 2); stored energy and smallest J."},
-    {"add_tangent", add_tangent, METH_VARARGS,
-     "add_tangent(cells, u, mu, lmbda, places, data): add what changes of the tangent."},
-    {"smallest_J", smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
-    {"strains", strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, 3, LANES)."},
-    {"viscous", viscous, METH_VARARGS,
+    {"add_tangent", call_add_tangent, METH_VARARGS,
+     "add_tangent(cells, u, mu, lmbda, pull, places, data): add what changes of the tangent; its\n"
+     "curvature of ln J is weighted with pull (B, S, LANES), or with the law's own if that is None."},
+    {"log_volumes", call_log_volumes, METH_VARARGS,
+     "log_volumes(cells, u, du, out): ln J (B, S, LANES), or its change along du if that is not None."},
+    {"volume_forces", call_volume_forces, METH_VARARGS,
+     "volume_forces(cells, u, pull, out): add the nodal forces (N, 2) of pull (B, S, LANES)."},
+    {"smallest_J", call_smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
+    {"strains", call_strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, 3, LANES)."},
+    {"viscous", call_viscous, METH_VARARGS,
      "viscous(cells, u, rate, strain0, out): add the nodal forces (N, 2); dissipated energy."},
-    {"add_viscous", add_viscous, METH_VARARGS,
+    {"add_viscous", call_add_viscous, METH_VARARGS,
      "add_viscous(cells, u, rate, strain0, places, data): add the tangent of `viscous`."},
     {NULL, NULL, 0, NULL}};
 
