@@ -50,7 +50,7 @@ class Mistake:
     @property
     def possible(self) -> bool:
         """Loops can be compiled only by a compiler."""
-        return not self.file.endswith(".c") or shutil.which("cc") is not None
+        return not self.file.endswith(".h") or shutil.which("cc") is not None
 
 
 def mistakes() -> list[Mistake]:
@@ -116,10 +116,10 @@ class Copy:
     def _write(self, file: Path, text: str) -> None:
         """New text, and nothing left of what was compiled from the old one."""
         file.write_text(text, encoding="utf-8")
-        if file.suffix == ".c":
-            compiled = file.with_suffix(".abi3.so")
-            include = sysconfig.get_paths()["include"]
-            words = ["cc", "-O1", "-shared", "-fPIC", f"-I{include}", str(file), "-o", str(compiled)]
+        if file.suffix == ".h":
+            source, include = file.with_name("loops.c"), sysconfig.get_paths()["include"]
+            compiled = source.with_suffix(".abi3.so")
+            words = ["cc", "-O1", "-shared", "-fPIC", f"-I{include}", str(source), "-o", str(compiled)]
             subprocess.run(words, check=True, capture_output=True)
         shutil.rmtree(file.parent / "__pycache__", ignore_errors=True)
 

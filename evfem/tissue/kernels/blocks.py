@@ -23,7 +23,7 @@ class Cells(NamedTuple):
     `reference` (Q, n, 2) gradients of the shape functions in the reference cell and `inverse` (B,
     Q, 4, L) dxi/dX at the points; the same where ln J is sampled, `sample_reference` (S, n, 2) and
     `sample_inverse` (B, S, 4, L); `psi` (B, M, S, L) and `mean` (B, M, L) of the modes of theta,
-    see `loops.c`. S = M = 0 where theta is ln J of the quadrature point.
+    see `elastic.h`. S = M = 0 where theta is ln J of the quadrature point.
     """
 
     sizes: tuple[int, ...]
