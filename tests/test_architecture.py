@@ -29,15 +29,15 @@ ROOMS = {
         "space pattern assembly weakform userforms dynamics body",
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
+    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
-    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint run rendering"),
+    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
+    "simulation": ({"numpy", "threadpoolctl"}, "result spectrum model works ledger checkpoint run rendering"),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
