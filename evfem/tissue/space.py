@@ -27,8 +27,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
-
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
@@ -71,11 +69,21 @@ def nodes_at(points: Floats, places: Floats) -> Ints:
     """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its
     unknowns.
 
-    Raises `RuntimeError` where none lies within 1e-9 of the mesh's size: then the two meshes
-    differ.
+    Equally many are paired in their order along an oblique line, which is theirs unless two lie
+    at one place of it; a search tree finds the others. Raises `RuntimeError` where no point lies
+    within 1e-9 of the mesh's size: then the two meshes differ.
     """
+    allowed = 1e-9 * float(np.ptp(points, axis=0).max())
+    if len(points) == len(places):
+        oblique = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
+        number = np.empty(len(points), dtype=np.int64)
+        number[np.argsort(places @ oblique)] = np.argsort(points @ oblique)
+        if np.abs(points[number] - places).max() <= allowed:
+            return number
+    from scipy.spatial import cKDTree
+
     distance, number = cKDTree(points).query(places)
-    farthest, allowed = float(np.max(distance)), 1e-9 * float(np.ptp(points, axis=0).max())
+    farthest = float(np.max(distance))
     if not farthest <= allowed:
         raise RuntimeError(f"a node of scikit-fem's mesh is {farthest:g} mm away from the nearest of ours")
     return number
