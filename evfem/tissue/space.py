@@ -27,6 +27,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
