@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -30,14 +30,17 @@ ROOMS = {
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini condensed"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result spectrum model works ledger checkpoint run rendering"),
+    "simulation": (
+        {"numpy", "threadpoolctl", "pandas"},
+        "provenance result spectrum model works ledger checkpoint run rendering",
+    ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
@@ -48,7 +51,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "plotting", "runfolder", "cli"),
+    ("export", "plotting", "loading", "runfolder", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
@@ -56,7 +59,7 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {"skfem", "meshio", "matplotlib", "pypardiso", "tqdm", "distributed", "pyarrow"}
+LATE = {"skfem", "meshio", "matplotlib", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
