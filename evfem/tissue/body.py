@@ -100,11 +100,12 @@ class Body:
             total += term.forces(u)
         return total
 
-    def tangent(self, u: Floats) -> Floats:
+    def tangent(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the
-        built-in terms are symmetric, a user's form gives its symmetric part).
+        built-in terms are symmetric, a user's form gives its symmetric part); `pressure` (E, Q)
+        takes the place of the tissue's own in its curvature.
         """
-        cells = self.tissue.tangent(u)
+        cells = self.tissue.tangent(u, pressure)
         for term in self.terms:
             term.add_tangent(u, cells)
         return self.pattern.upper(cells)

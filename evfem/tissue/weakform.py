@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import INCOMPRESSIBLE
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
@@ -55,6 +56,13 @@ class Tissue:
         """Law and form of each group."""
         return [make_region(self.space, law, cells) for law, cells in self.groups]
 
+    @cached_property
+    def nearly_incompressible(self) -> bool:
+        """Whether a region resists a change of volume so much more than shear that its pressure is
+        worth an unknown of its own.
+        """
+        return any(volume_stiffness(law) > INCOMPRESSIBLE for law, _ in self.groups)
+
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
         if self.kernels is not None:
@@ -70,15 +78,51 @@ class Tissue:
             fe[integral.points.cells] = integral.cell_forces(u)
         return scatter(self.space.nodes, fe, self.space.size)
 
-    def tangent(self, u: Floats) -> Floats:
-        """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
+    def tangent(self, u: Floats, pressure: Floats | None = None) -> Floats:
+        """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component); with the
+        curvature of ln J weighted by a `pressure` (E, Q) of the iterations if one is given.
+        """
         if self.kernels is not None:
-            return self.kernels.tangent(u, *self._blocks, len(self.space.nodes))
+            from evfem.tissue.kernels.lanes import blocked
+
+            given = np.zeros((0, self.space.weight.shape[1])) if pressure is None else pressure
+            return self.kernels.tangent(u, blocked(given), *self._blocks, len(self.space.nodes))
         E, n = self.space.nodes.shape
         K = np.empty((E, self.space.dim * n, self.space.dim * n))
         for _, integral in self.regions:
-            K[integral.points.cells] = integral.cell_tangents(u)
+            cells = integral.points.cells
+            K[cells] = integral.cell_tangents(u, None if pressure is None else pressure[cells])
         return K
+
+    def pressure(self, u: Floats) -> Floats:
+        """q = dW/dtheta (E, Q) in MPa of the regions' laws, positive in tension."""
+        if self.kernels is not None:
+            return self._unblocked(self.kernels.pressure(u, *self._blocks))
+        q = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            q[integral.points.cells] = integral.pressure(u)
+        return q
+
+    def pressure_change(self, u: Floats, du: Floats) -> Floats:
+        """Derivative (E, Q) of `pressure` at u along du (N, 2)."""
+        if self.kernels is not None:
+            return self._unblocked(self.kernels.pressure_change(u, du, *self._blocks))
+        change = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            change[integral.points.cells] = integral.pressure_change(u, du)
+        return change
+
+    def pressure_forces(self, u: Floats, q: Floats) -> Floats:
+        """Nodal forces (N, 2) of q (E, Q) alone: the integral of q dtheta(v) at u."""
+        if self.kernels is not None:
+            from evfem.tissue.kernels.lanes import blocked
+
+            return self.kernels.pressure_forces(u, blocked(q), self.space.cells)
+        fe = np.empty((*self.space.nodes.shape, self.space.dim))
+        for _, integral in self.regions:
+            cells = integral.points.cells
+            fe[cells] = integral.cell_pressure_forces(u, q[cells])
+        return scatter(self.space.nodes, fe, self.space.size)
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
@@ -105,6 +149,11 @@ class Tissue:
             J[cells] = np.einsum("dq,dq->d", det(deformation_gradient(field)), mean)
         return sigma, J
 
+    def _unblocked(self, blocks: Floats) -> Floats:
+        """Blocks (B, Q, L) as (E, Q)."""
+        Q = blocks.shape[1]
+        return np.ascontiguousarray(np.swapaxes(blocks, 1, 2).reshape(-1, Q)[: len(self.space.nodes)])
+
     @cached_property
     def _blocks(self) -> tuple[Any, ...]:
         """What the compiled loops read: Lame moduli (B, L) and the space's cells."""
@@ -127,6 +176,16 @@ def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
         return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
     w = SimpleNamespace(law=law)
     return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
+
+
+def volume_stiffness(law: Any) -> float:
+    """How much stiffer a law is at rest against theta than in shear, d2W/dtheta2 / mu: 2 nu / (1 -
+    2 nu) for a neo-Hookean law. Zero for laws of small strain, whose theta is linear in u.
+    """
+    if law.volume_measure == "trace":
+        return 0.0
+    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
+    return float(np.mean(k)) / law.shear_modulus
 
 
 def law_moduli(u: Field, w: Any) -> Floats:

@@ -216,8 +216,10 @@ def _store(K: Any, k: int, m: int, first: int, out: Any) -> None:
 
 
 @compiled
-def tangent(u: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> Floats:
-    """Cell tangents (E, 2 n, 2 n) of E = `count` cells."""
+def tangent(u: Floats, pressure: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> Floats:
+    """Cell tangents (E, 2 n, 2 n) of E = `count` cells, with the curvature of ln J weighted by
+    `pressure` (B, Q, L), or by the law's own if there are no blocks of it.
+    """
     nodes, gradient, weight, sample, projection = cells
     B, Q, n = gradient.shape[:3]
     S = sample.shape[1] or Q
@@ -230,6 +232,8 @@ def tangent(u: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> F
         gather(u, nodes[b], ue)
         block = (gradient[b], weight[b], sample[b], projection[b])
         _volume_states(ue, (mu[b], lmbda[b]), block, (H, inverse, log_J, theta), pull)
+        if len(pressure):
+            _to_samples(pressure[b] * weight[b], projection[b], pull)
         _pushed(inverse, sample[b] if sample.shape[1] else gradient[b], push)
         _theta_rows(push, projection[b], rows)
         for q in range(Q):
@@ -240,6 +244,75 @@ def tangent(u: Floats, mu: Floats, lmbda: Floats, cells: Cells, count: int) -> F
                 _pair(k, m, stiff, rows, pull, push, K)
                 _shear(k, m, gradient[b], weight[b], mu[b], K)
                 _store(K, k, m, b * LANES, out)
+    return out
+
+
+@compiled
+def pressure(u: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> Floats:
+    """q = lmbda theta - mu at the points (B, Q, L)."""
+    nodes, gradient, _, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    S = sample.shape[1] or Q
+    out = np.empty((B, Q, LANES))
+    ue, H = np.empty((n, 2, LANES)), np.empty((Q, 4, LANES))
+    inverse, log_J = np.empty((S, 4, LANES)), np.empty((S, LANES))
+    for b in range(B):
+        gather(u, nodes[b], ue)
+        _states(ue, gradient[b], sample[b], H, inverse, log_J)
+        _theta(log_J, projection[b], out[b])
+        for q in range(Q):
+            for i in range(LANES):
+                out[b, q, i] = lmbda[b, i] * out[b, q, i] - mu[b, i]
+    return out
+
+
+@compiled
+def pressure_change(u: Floats, du: Floats, mu: Floats, lmbda: Floats, cells: Cells) -> Floats:
+    """Derivative of `pressure` at u along du, lmbda Pi (F^-T : grad du), (B, Q, L)."""
+    nodes, gradient, _, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    points = sample if sample.shape[1] else gradient
+    S = points.shape[1]
+    out = np.empty((B, Q, LANES))
+    ue, H, inverse = np.empty((n, 2, LANES)), np.empty((4, LANES)), np.empty((4, LANES))
+    log_J, change = np.empty(LANES), np.empty((S, LANES))
+    for b in range(B):
+        for s in range(S):
+            gather(u, nodes[b], ue)
+            displacement_gradient(ue, points[b, s], H)
+            volume(H, inverse, log_J)
+            gather(du, nodes[b], ue)
+            displacement_gradient(ue, points[b, s], H)
+            for i in range(LANES):
+                change[s, i] = inverse[0, i] * H[0, i] + inverse[1, i] * H[1, i]
+                change[s, i] += inverse[2, i] * H[2, i] + inverse[3, i] * H[3, i]
+        _theta(change, projection[b], out[b])
+        for q in range(Q):
+            for i in range(LANES):
+                out[b, q, i] *= lmbda[b, i]
+    return out
+
+
+@compiled
+def pressure_forces(u: Floats, q: Floats, cells: Cells) -> Floats:
+    """Nodal forces (N, 2) of q dtheta(v) at u, with q (B, Q, L)."""
+    nodes, gradient, weight, sample, projection = cells
+    B, Q, n = gradient.shape[:3]
+    points = sample if sample.shape[1] else gradient
+    S = points.shape[1]
+    out = np.zeros_like(u)
+    ue, fe, H = np.empty((n, 2, LANES)), np.empty((n, 2, LANES)), np.empty((4, LANES))
+    stress, log_J, pull = np.empty((4, LANES)), np.empty(LANES), np.empty((S, LANES))
+    for b in range(B):
+        gather(u, nodes[b], ue)
+        _to_samples(q[b] * weight[b], projection[b], pull)
+        fe[:] = 0.0
+        for s in range(S):
+            displacement_gradient(ue, points[b, s], H)
+            volume(H, stress, log_J)
+            stress *= pull[s]
+            _add_forces(stress, points[b, s], fe)
+        spread(fe, nodes[b], out)
     return out
 
 
