@@ -34,8 +34,8 @@ ROOMS = {
     "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface linearisation anderson findings equilibrium "
-        "factorised stepping",
+        "strategy state control condensation interface linearisation pressure anderson findings "
+        "equilibrium factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
     "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint run rendering"),

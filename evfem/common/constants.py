@@ -69,7 +69,7 @@ NAMED                   so many of the largest out-of-balance forces are named i
 
 SMALLEST_FORCE = 1e-6
 KILOVOLT = 1000.0
-INCOMPRESSIBLE = 200.0
+INCOMPRESSIBLE = 100.0
 SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05

@@ -194,10 +194,7 @@ class FactorisedBody:
         for.
         """
         factor = self.linearisation.factor
-        # along the volume of an older tangent, the pressure's misfit acts in another way
-        old_tangent = balance.mixed is not None and not self.linearisation.made_at(state)
-        forces = balance.mixed.forces if balance.mixed and old_tangent else balance.forces
-        saved, residual = factor.forward(-forces)
+        saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
         try:
             driven = self._driven(step, state, target)
@@ -368,7 +365,8 @@ class FactorisedBody:
     def resume(self, state: State, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
         self.linearisation.candidates = carried.candidates
-        if carried.tangent_point is not None:
-            self.linearisation.restore(state, carried.tangent_point)
+        if (at := carried.tangent_point) is not None:
+            self.pressure.check(at.pressure)
+            self.linearisation.restore(state, at)
         if self.body.dynamics is not None:
             self.body.dynamics.step = carried.duration

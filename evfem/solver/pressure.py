@@ -36,9 +36,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from evfem.common.arrays import Floats
+from evfem.errors import InputError
 from evfem.solver.linearisation import Linearisation
 from evfem.solver.state import NO_PRESSURE, State
 from evfem.tissue.weakform import Tissue
@@ -58,10 +57,11 @@ class Pressure:
         """Whether the pressure is an unknown."""
         return self.tissue.nearly_incompressible
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of its values: (E, Q), or (0, 0) where it is no unknown."""
-        return self.tissue.space.weight.shape if self.active else NO_PRESSURE.shape
+    def check(self, q: Floats) -> None:
+        """Refuse a pressure from a checkpoint that has not one value for each point."""
+        expected = self.tissue.space.weight.shape if self.active else NO_PRESSURE.shape
+        if q.shape != expected:
+            raise InputError("checkpoint", "no usable factor_pressure", f"numbers of the shape {expected}")
 
     def begin(self, u: Floats) -> Floats:
         """Where the iterations of a step begin that comes from an equilibrium at u (N, 2)."""

@@ -11,7 +11,6 @@ from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
 
-
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
 
@@ -130,3 +129,7 @@ class Balance:
     def remaining(self) -> float:
         """The residual of the unknowns that are iterated."""
         return self.residual if self.mixed is None else self.mixed.residual
+
+    def seen(self, here: bool) -> Floats:
+        """The forces (n,) that a tangent has to remove which was made `here`, or elsewhere."""
+        return self.forces if here or self.mixed is None else self.mixed.forces

@@ -297,9 +297,8 @@ def pressure_change(u: Floats, du: Floats, mu: Floats, lmbda: Floats, cells: Cel
 def pressure_forces(u: Floats, q: Floats, cells: Cells) -> Floats:
     """Nodal forces (N, 2) of q dtheta(v) at u, with q (B, Q, L)."""
     nodes, gradient, weight, sample, projection = cells
-    B, Q, n = gradient.shape[:3]
     points = sample if sample.shape[1] else gradient
-    S = points.shape[1]
+    B, S, n = points.shape[:3]
     out = np.zeros_like(u)
     ue, fe, H = np.empty((n, 2, LANES)), np.empty((n, 2, LANES)), np.empty((4, LANES))
     stress, log_J, pull = np.empty((4, LANES)), np.empty(LANES), np.empty((S, LANES))
