@@ -33,8 +33,8 @@ ROOMS = {
     "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface linearisation anderson findings equilibrium "
-        "factorised stepping",
+        "strategy state control condensation interface linearisation pressure anderson findings "
+        "equilibrium factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
     "simulation": (

@@ -67,12 +67,14 @@ class Body:
             total += term.forces(u)
         return total
 
-    def tangent(self, u: Floats) -> Floats:
+    def tangent(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the
-        built-in terms are symmetric, a user's form gives its symmetric part).
+        built-in terms are symmetric, a user's form gives its symmetric part); `pressure` (E, Q)
+        takes the place of the tissue's own in its curvature.
         """
         data = self.pattern.zeros()
-        for term in (self.tissue, *self.terms):
+        self.tissue.add_tangent(u, self.pattern, data, pressure)
+        for term in self.terms:
             term.add_tangent(u, self.pattern, data)
         return self.pattern.finish(data)
 

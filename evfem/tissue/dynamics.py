@@ -26,7 +26,7 @@ from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.fields import Parts
 from evfem.tissue.forms import deformation_gradient, green_strain, kelvin_voigt, mass
-from evfem.tissue.kernels.blocks import LANES, loops, moduli
+from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space
@@ -137,7 +137,7 @@ class Dynamics:
         the step.
         """
         assert self.viscosity is not None
-        rate = moduli(self.viscosity / self.step)
+        rate = padded(self.viscosity / self.step)
         return self.space.cells, np.ascontiguousarray(u), rate, self._strain0
 
 

@@ -138,6 +138,11 @@ class Space:
         return self.mesh.points.shape[1]
 
     @property
+    def samples(self) -> int:
+        """Number of points in a cell where ln J is sampled."""
+        return len(self.sampled.reference)
+
+    @property
     def gradient(self) -> Floats:
         """Shape gradients at the quadrature points (E, Q, n, dim)."""
         return self.at.of_mesh

@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import INCOMPRESSIBLE
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, points_of
 from evfem.tissue.fields import Field, Parts
 from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
-from evfem.tissue.kernels.blocks import loops, moduli
+from evfem.tissue.kernels.blocks import LANES, loops, padded, unblocked
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
 
@@ -56,6 +57,13 @@ class Tissue:
         """Law and form of each group."""
         return [make_region(self.space, law, cells) for law, cells in self.groups]
 
+    @cached_property
+    def nearly_incompressible(self) -> bool:
+        """Whether a region resists a change of volume so much more than shear that its pressure is
+        worth an unknown of its own.
+        """
+        return any(volume_stiffness(law) > INCOMPRESSIBLE for law, _ in self.groups)
+
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
         if self.loops is not None:
@@ -71,14 +79,49 @@ class Tissue:
             fe[integral.points.cells] = integral.cell_forces(u)
         return scatter(self.space.nodes, fe, self.space.size)
 
-    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
-        """Add the tangents of all cells to the `data` of a pattern."""
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats, pressure: Floats | None = None) -> None:
+        """Add the tangents of all cells to the `data` of a pattern; with the curvature of ln J
+        weighted by a `pressure` (E, Q) of the iterations if one is given.
+        """
         if self.loops is not None:
+            pull = None if pressure is None else self._pull(pressure)
             data += self._shear.data(pattern)
-            self.loops.add_tangent(*self._request(u), None, pattern.blocks, data)
+            self.loops.add_tangent(*self._request(u), pull, pattern.blocks, data)
             return
         for _, integral in self.regions:
-            integral.add_tangent(u, pattern, data)
+            cells = integral.points.cells
+            tangents = integral.cell_tangents(u, None if pressure is None else pressure[cells])
+            pattern.add(tangents, cells, data)
+
+    def pressure(self, u: Floats) -> Floats:
+        """q = dW/dtheta (E, Q) in MPa of the regions' laws, positive in tension."""
+        if self.loops is not None:
+            return self.lmbda[:, None] * self._theta(self.loops, u, None) - self.mu[:, None]
+        q = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            q[integral.points.cells] = integral.pressure(u)
+        return q
+
+    def pressure_change(self, u: Floats, du: Floats) -> Floats:
+        """Derivative (E, Q) of `pressure` at u along du (N, 2)."""
+        if self.loops is not None:
+            return self.lmbda[:, None] * self._theta(self.loops, u, np.ascontiguousarray(du))
+        change = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            change[integral.points.cells] = integral.pressure_change(u, du)
+        return change
+
+    def pressure_forces(self, u: Floats, q: Floats) -> Floats:
+        """Nodal forces (N, 2) of q (E, Q) alone: the integral of q dtheta(v) at u."""
+        if self.loops is not None:
+            out = np.zeros_like(u)
+            self.loops.volume_forces(self.space.cells, np.ascontiguousarray(u), self._pull(q), out)
+            return out
+        fe = np.empty((*self.space.nodes.shape, self.space.dim))
+        for _, integral in self.regions:
+            cells = integral.points.cells
+            fe[cells] = integral.cell_pressure_forces(u, q[cells])
+        return scatter(self.space.nodes, fe, self.space.size)
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
@@ -111,13 +154,26 @@ class Tissue:
 
     @cached_property
     def _moduli(self) -> tuple[Floats, Floats]:
-        return moduli(self.mu), moduli(self.lmbda)
+        return padded(self.mu), padded(self.lmbda)
 
     def _looped(self, loops: Any, u: Floats) -> tuple[Floats, float]:
         """Nodal forces (N, 2) and stored energy by the compiled loops."""
         out = np.zeros_like(u)
         energy, _ = loops.forces(*self._request(u), out)
         return out, energy
+
+    def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
+        """theta (E, Q) at u by the compiled loops, or its change along du (N, 2)."""
+        cells, projection = self.space.cells, self.space.projection
+        sampled = np.empty((len(cells.nodes), self.space.samples, LANES))
+        loops.log_volumes(cells, np.ascontiguousarray(u), du, sampled)
+        values = unblocked(sampled, len(self.space.nodes))
+        return values if projection is None else (projection @ values[..., None])[..., 0]
+
+    def _pull(self, q: Floats) -> Floats:
+        """What a pressure q (E, Q) is at the samples of ln J, in blocks (B, S, L)."""
+        weighted, projection = q * self.space.weight, self.space.projection
+        return padded(weighted if projection is None else (weighted[:, None] @ projection)[:, 0])
 
     @cached_property
     def _shear(self) -> Componentwise:
@@ -141,6 +197,16 @@ def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
         return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
     w = SimpleNamespace(law=law)
     return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
+
+
+def volume_stiffness(law: Any) -> float:
+    """How much stiffer a law is at rest against theta than in shear, d2W/dtheta2 / mu: 2 nu / (1 -
+    2 nu) for a neo-Hookean law. Zero for laws of small strain, whose theta is linear in u.
+    """
+    if law.volume_measure == "trace":
+        return 0.0
+    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
+    return float(np.mean(k)) / law.shear_modulus
 
 
 def law_moduli(u: Field, w: Any) -> Floats:

@@ -53,9 +53,13 @@ def blocked(values: Any) -> Any:
     return np.ascontiguousarray(np.moveaxis(filled.reshape(blocks, LANES, *values.shape[1:]), 1, -1))
 
 
-def moduli(values: Floats) -> Floats:
-    """One number per cell (E,) as (B, L); what fills the last block up is 0, so that it has no
-    force.
-    """
-    missing = -len(values) % LANES
-    return np.concatenate([values, np.zeros(missing)]).reshape(-1, LANES)
+def padded(values: Floats) -> Floats:
+    """(E, ...) as (B, ..., L); what fills the last block up is 0, so that it has no force."""
+    missing = np.zeros((-len(values) % LANES, *values.shape[1:]))
+    return blocked(np.concatenate([values, missing]))
+
+
+def unblocked(blocks: Floats, count: int) -> Floats:
+    """(B, ..., L) as (E, ...) of E = `count` cells."""
+    values = np.moveaxis(blocks, -1, 1)
+    return np.ascontiguousarray(values.reshape(-1, *values.shape[2:])[:count])

@@ -16,7 +16,7 @@ from tools.grids import SHAPES, grid_of, rectangle, tangent_of
 
 from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.kernels.blocks import LANES, blocked, loops, moduli
+from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.weakform import Tissue
 
@@ -35,7 +35,7 @@ def bend(x, y):
 @pytest.mark.parametrize("count", [1, LANES, LANES + 5])
 def test_blocks_hold_every_cell_and_the_last_again(count):
     values = 1.0 + RANDOM.random((count, 3, 2))
-    blocks, numbers = blocked(values), moduli(values[:, 0, 0])
+    blocks, numbers = blocked(values), padded(values[:, 0, 0])
     assert blocks.shape == (-(-count // LANES), 3, 2, LANES)
     for cell in range(len(blocks) * LANES):
         block, lane = divmod(cell, LANES)
@@ -86,7 +86,7 @@ def volume_energies(H, lmbda=2.0):
     """lmbda (ln J)^2 / 2 of one unit cell of F = 1 + H with mu = 0, found by the loops."""
     space = rectangle("q1", (1, 1))
     u = space.mesh.points @ np.reshape(H, (2, 2)).T
-    energy, J = loops().forces(space.cells, u, moduli(np.zeros(1)), moduli(np.array([lmbda])), 0.0 * u)
+    energy, J = loops().forces(space.cells, u, padded(np.zeros(1)), padded(np.array([lmbda])), 0.0 * u)
     return energy, J
 
 
