@@ -37,7 +37,10 @@ ROOMS = {
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
-    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
+    "scene": (
+        {"numpy", "pydantic", "tomli_w"},
+        "motion terms scene keys meanings schema file resolution sense plan",
+    ),
     "simulation": (
         {"numpy", "threadpoolctl", "pandas"},
         "provenance result model works ledger checkpoint run rendering",
@@ -45,14 +48,14 @@ ROOMS = {
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file folder pools run",
+        "samples file schema folder pools run",
     ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "plotting", "loading", "runfolder", "cli", "__main__"),
+    ("export", "plotting", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
