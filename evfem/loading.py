@@ -9,7 +9,7 @@ from typing import Any
 from evfem.common.storage import format_of
 from evfem.errors import InputError
 
-Found = Any  # Result, FastModel, VoltageProfile, Scene, Sweep or Mesh
+Found = Any  # Result, FastModel, VoltageProfile, Sampled, Scene, Sweep or Mesh
 ALLOWED = (
     "a result or a fast model (.npz), a signal (.csv, .wav), a scene or a sweep (.toml), a mesh (.vtu, .msh)"
 )
@@ -17,7 +17,8 @@ ALLOWED = (
 
 def load(path: str | Path) -> Found:
     """What is in a file: a `Result` or a `FastModel` (as their `save` wrote them, under any name),
-    a `VoltageProfile` (.csv, .wav), a `Scene` or a `Sweep` (.toml), a `Mesh` (.vtu, .msh).
+    a `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a
+    `Mesh` (.vtu, .msh).
 
     Raises InputError for any other or a damaged file, StorageError when the disk refuses.
 
@@ -53,9 +54,9 @@ def _archive(path: Path) -> Found:
 
 
 def _signal(path: Path) -> Found:
-    from evfem.electrostatics.signalfile import read_signal
+    from evfem.electrostatics.signalfile import read_voltage
 
-    return read_signal(path)
+    return read_voltage(path)
 
 
 def _tables(path: Path) -> Found:

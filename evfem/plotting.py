@@ -44,11 +44,12 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
     `over` is step, position, time, indentation or voltage; None takes the position if it changes
-    in every step, else the step, with the motions marked. A force that is 0 throughout is left
-    out.
+    in every step, the time if the finger waits, else the step, with the motions marked. A force
+    that is 0 throughout is left out.
     """
     if over is None:
-        over = "position" if _advances(result.position) else "step"
+        over = "time" if "wait" in result.motion else "step"
+        over = "position" if _advances(result.position) else over
     if over not in ABSCISSAE:
         raise InputError("over", over, " | ".join(ABSCISSAE))
     ax = _axes(ax)

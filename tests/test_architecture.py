@@ -30,8 +30,8 @@ ROOMS = {
         "assembly weakform userforms dynamics body",
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
+    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
@@ -39,11 +39,11 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys meanings schema file resolution sense plan",
+        "motion terms scene keys voltage meanings schema file resolution sense plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl", "pandas"},
-        "provenance result model works ledger checkpoint run rendering",
+        "provenance result spectrum model works ledger checkpoint run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (

@@ -34,6 +34,8 @@ def test_each_file_is_known_by_what_is_in_it(place):
     assert repr(ev.load("ramp.csv")) == repr(signal)
     assert ev.load("ramp.wav")(0.5) == pytest.approx(150.0, abs=0.1)
     np.testing.assert_array_equal(ev.load("no.ending").normal_force, result.normal_force)
+    ev.Sampled([1.0, 2.0], rate=10.0).to_csv("recorded.csv")
+    assert ev.load("recorded.csv")(0.05) == pytest.approx(1.5)
     assert ev.load("square.toml") == ev.scenefile.load("square.toml")
     assert isinstance(ev.load(place / "two.toml"), ev.Sweep)
     assert ev.load("square.vtu").kind == "quad9"

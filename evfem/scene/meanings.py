@@ -37,6 +37,7 @@ SCENE = {
     "motion": Text("", "what happens, one table [[motion]] after the other"),
 }
 FINGER = {
+    "participant": Text("", "sizes of one of Table 1's fingers; other keys go before", "i to xi"),
     "width": Text("mm", "full width of the cross-section"),
     "height": Text("mm", "full height of the cross-section"),
     "ridges": Text("", "whether there are fingerprint ridges", "true | false"),
@@ -92,18 +93,44 @@ SURFACE = {
     "terms": Text("", "sum of a sin(k x + phase); without it eq. (25) of the paper"),
     "file": Text("", "heights over x"),
     "points": Text("mm", "the same in the scene file"),
+    "period": Text("mm", "after which the surface repeats"),
+    "groove_depth": Text("mm", "of the grooves below the ridges"),
+    "groove_width": Text("mm", "at half depth; without it half the period"),
+    "wall_width": Text("mm", "part of x that a wall takes; without it half of ridge or groove"),
+    "phase": Text("periods", "place of a ridge's middle", "", Within(-1.0, 1.0)),
+    "hurst": Text("", "Hurst exponent", "", Within(0.0, 1.0)),
+    "rms": Text("mm", "root mean square height", "", POSITIVE),
+    "shortest": Text("mm", "shortest wave"),
+    "longest": Text("mm", "longest wave; without it the period"),
+    "seed": Text("", "the same seed gives the same surface", "", NOT_NEGATIVE),
 }
 ELECTROSTATICS = {
     "law": Text("", "force law of the paper, eqs (2) to (5)"),
     "voltage": Text("V", "effective, across skin and insulator", "", Within(-1e6, 1e6)),
     "voltage_file": Text("", "voltage over the position, instead of a number"),
     "voltage_profile": Text("mm, V", "the same in the scene file"),
+    "signal": Text("", "voltage over time, instead of a number"),
+    "insulator": Text("", "a usual insulator by its name"),
     "insulator_thickness": Text("mm", "of the display's insulator", "", NOT_NEGATIVE),
     "insulator_eps_r": Text("", "its relative permittivity", "", RELATIVE),
     "gap_eps_r": Text("", "relative permittivity of what fills the gap", "", RELATIVE),
     "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
+}
+SIGNAL = {
+    "frequency": Text("Hz", "of the sine, or of the carrier"),
+    "amplitude": Text("V", "of the sine"),
+    "bias": Text("V", "mean voltage"),
+    "phase": Text("rad", "at time 0"),
+    "envelope": Text("V", "height of the carrier: a number, or a signal that modulates it"),
+    "resolved": Text("", "false: the root mean square over its cycles", "true | false"),
+    "file": Text("", "the samples"),
+    "full_scale": Text("V", "of a .wav"),
+    "voltage": Text("V", "the samples in the scene file"),
+    "rate": Text("Hz", "of the samples in the scene file", "", POSITIVE),
+    "start": Text("s", "time of the first sample"),
+    "repeat": Text("", "whether it begins anew at its end"),
 }
 SOLVER = {
     "element": Text("", "without it q2p1 on quads, p2 on triangles"),
@@ -140,6 +167,7 @@ MOTION = {
     },
     "hover": {"gap": Text("mm", "of the undeformed outline to the surface"), "steps": _STEPS},
     "voltage": {"voltage": Text("V", "at the end, from the present one"), "steps": _STEPS, "hold": _HOLD},
+    "wait": {"duration": Text("s", "how long it stays"), "steps": _STEPS, "hold": _HOLD},
 }
 MOTION_KIND = Text("", "the kind of motion", "its name")
 Meanings = Mapping[str, Text]

@@ -18,16 +18,20 @@ from pydantic import Field as Default
 from pydantic import create_model
 
 from evfem.common.checks import Within
+from evfem.electrostatics.timesignals import Carrier, Sine
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, FingerPad
 from evfem.scene import keys, meanings
 from evfem.scene.keys import Table
 from evfem.scene.meanings import Meanings, Text
+from evfem.scene.voltage import SIGNALS
 from evfem.tissue.laws import LAWS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 #: how types of JSON are called in a table to read
 SPOKEN = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
 SPOKEN |= {"object": "table", "array": "list"}
+#: signals whose fields know their limits
+CLASSES: Mapping[str, type | None] = {"sine": Sine, "carrier": Carrier, "sampled": None}
 Schema = dict[str, Any]
 
 
@@ -78,7 +82,7 @@ def section(name: str, model: type[Table], texts: Meanings, kind: str = "", orig
         name,
         kind,
         tuple(
-            _key(key, spec, properties[key], texts[key], rules.get(key, {}))
+            _key(key, spec, properties[key], texts.get(key, Text("", "")), rules.get(key, {}))
             for key, spec in model.model_fields.items()
             if key != "kind" or not kind
         ),
@@ -159,7 +163,8 @@ def _finger() -> Section:
     }
     texts = meanings.FINGER | ranges
     texts["resolution"] = texts["resolution"]._replace(allowed=" | ".join(RESOLUTIONS))
-    found = section("finger", _from_fields(FingerPad, materials=table, electrical=table), texts, "parametric")
+    own = {"participant": (str | None, Default(default=None)), "materials": table, "electrical": table}
+    found = section("finger", _from_fields(FingerPad, **own), texts, "parametric")
     for key in found.keys:
         if key.name == "resolution":
             key.schema["enum"] = list(RESOLUTIONS)
@@ -200,6 +205,10 @@ def sections() -> list[Section]:
         _of_kind("motion", kind, model, meanings.MOTION[kind], cls)
         for kind, (model, cls) in keys.MOTIONS.items()
     ]
+    signals = [
+        _of_kind("electrostatics.signal", kind, model, meanings.SIGNAL, CLASSES[kind])
+        for kind, model in SIGNALS.items()
+    ]
     return [
         section("", keys.SceneTable, meanings.SCENE),
         _finger(),
@@ -208,6 +217,7 @@ def sections() -> list[Section]:
         section("finger.electrical", keys.ElectricalTable, meanings.ELECTRICAL),
         *surfaces,
         section("electrostatics", keys.ElectrostaticsTable, meanings.ELECTROSTATICS),
+        *signals,
         section("solver", keys.SolverTable, meanings.SOLVER, origin=keys.Solver),
         section("solver.strategy", keys.StrategyTable, meanings.STRATEGY, origin=keys.Strategy),
         section("output", keys.OutputTable, meanings.OUTPUT, origin=keys.Output),
@@ -226,15 +236,18 @@ def schema() -> Schema:
     for one in sections():
         tables.setdefault(one.name, []).append(one)
     one_of = {name: {"oneOf": [one.schema() for one in found]} for name, found in tables.items()}
-    material = {"type": "object", "additionalProperties": {"$ref": "#/definitions/material"}}
     electrical = tables["finger.electrical"][0].schema()
-    fingers = [one.schema(materials=material, electrical=electrical) for one in tables["finger"]]
+    pad, mesh = tables["finger"]
+    fingers = [
+        pad.schema(materials=_by_region("layer"), electrical=electrical),
+        mesh.schema(materials=_by_region("material"), electrical=electrical),
+    ]
     strategy = tables["solver.strategy"][0].schema()
     top = tables[""][0].schema(
         version={"const": 1, "description": meanings.SCENE["version"].meaning},
         finger={"anyOf": fingers},
         surface=one_of["surface"],
-        electrostatics=tables["electrostatics"][0].schema(),
+        electrostatics=tables["electrostatics"][0].schema(signal={"$ref": "#/definitions/signal"}),
         solver=tables["solver"][0].schema(strategy=strategy),
         output=tables["output"][0].schema(),
         motion={"type": "array", "minItems": 1, "items": one_of["motion"]},
@@ -242,9 +255,31 @@ def schema() -> Schema:
     described = {name: {"description": text.meaning} for name, text in meanings.SCENE.items()}
     for name, table in top["properties"].items():
         table |= described[name]
-    return {
-        "$schema": DRAFT,
-        "title": "evfem scene",
-        **top,
-        "definitions": {"material": one_of["finger.materials.NAME"]},
+    laws = tables["finger.materials.NAME"]
+    definitions = {
+        "material": one_of["finger.materials.NAME"],
+        "layer": {"anyOf": [_without_law(laws[0]), {"$ref": "#/definitions/material"}]},
+        "signal": {"oneOf": [_modulated(one) for one in tables["electrostatics.signal"]]},
     }
+    return {"$schema": DRAFT, "title": "evfem scene", **top, "definitions": definitions}
+
+
+def _by_region(definition: str) -> Schema:
+    return {"type": "object", "additionalProperties": {"$ref": f"#/definitions/{definition}"}}
+
+
+def _without_law(neo_hookean: Section) -> Schema:
+    """A layer of the parametric finger keeps the law and the moduli that its table does not name."""
+    found = neo_hookean.schema()
+    found["properties"].pop("law")
+    return found | {"title": "moduli", "required": []}
+
+
+def _modulated(signal: Section) -> Schema:
+    """The envelope of a carrier is a signal too."""
+    found = signal.schema()
+    if "envelope" in found["properties"]:
+        text = found["properties"]["envelope"]["description"]
+        options = [{"type": "number"}, {"$ref": "#/definitions/signal"}]
+        found["properties"]["envelope"] = {"anyOf": options, "description": text}
+    return found

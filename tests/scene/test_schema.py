@@ -19,6 +19,7 @@ from evfem.scene import keys, meanings
 from evfem.scene import schema as scenes
 from evfem.scene.file import dump, load, loads
 from evfem.scene.scene import default_scene
+from evfem.scene.voltage import SIGNALS
 from evfem.sweeps import file as sweepfile
 from evfem.sweeps import schema as sweeps
 from evfem.tissue.laws import LAWS
@@ -53,8 +54,13 @@ gap = 0.1
 [[motion]]
 kind = "voltage"
 voltage = 10.0
+[[motion]]
+kind = "wait"
+duration = 1.0
 """
-PLACES = {"press": 0, "slide": 1, "hover": 2, "voltage": 3}
+PLACES = {"press": 0, "slide": 1, "hover": 2, "voltage": 3, "wait": 4}
+#: tables that `SLIDE` does not have
+ELSEWHERE = ("finger.materials", "surface", "electrostatics.signal")
 
 
 def judged(schema, text):
@@ -80,10 +86,13 @@ def test_every_key_of_the_models_has_its_row():
         ("output", ""): keys.OutputTable,
     }
     models |= {("surface", kind): model for kind, model in keys.SURFACES.items()}
+    models |= {("electrostatics.signal", kind): model for kind, model in SIGNALS.items()}
     models |= {("motion", kind): model for kind, (model, _) in keys.MOTIONS.items()}
     for place, model in models.items():
         assert found.pop(place) == set(model.model_fields), place
-    assert found.pop(("finger", "parametric")) == {spec.name for spec in fields(FingerPad) if spec.init}
+    assert found.pop(("finger", "parametric")) == {"participant"} | {
+        spec.name for spec in fields(FingerPad) if spec.init
+    }
     for name, law in LAWS.items():
         parameters = {spec.name for spec in fields(law) if spec.init}
         assert found.pop(("finger.materials.NAME", name)) == parameters | {"law"}
@@ -105,7 +114,7 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
         meanings.MATERIAL,
     ]
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
-    written += [*meanings.MOTION.values(), sweeps.SWEEP, sweeps.SAMPLES, sweeps.DISTRIBUTION]
+    written += [*meanings.MOTION.values(), meanings.SIGNAL, sweeps.SWEEP, sweeps.SAMPLES, sweeps.DISTRIBUTION]
     for table in [*written, {name: t for name, t in meanings.SURFACE.items() if name != "kind"}]:
         for name, text in table.items():
             assert text.meaning in used, name
@@ -116,7 +125,7 @@ def test_the_defaults_are_those_of_a_scene(scene_schema):
     exact = SLIDE.replace('contact = "penalty"\npenalty_normal = 1.0\npenalty_tangential = 1.0\n', "")
     bare, tried = loads(exact), 0
     for one in scenes.sections():
-        elsewhere = one.name.startswith(("finger.materials", "surface")) or one.kind == "mesh"
+        elsewhere = one.name.startswith(ELSEWHERE) or one.kind == "mesh"
         for key in () if elsewhere else one.keys:
             if "default" in key.schema:
                 text = put(one, key.name, key.schema["default"], exact)
@@ -141,7 +150,7 @@ def test_what_the_schema_refuses_the_reader_refuses(scene_schema, side):
     """Beyond each limit both refuse; a schema that is stricter than the reader would be a lie."""
     tried = 0
     for one in scenes.sections():
-        if one.name.startswith(("finger.materials", "surface")) or one.kind == "mesh":
+        if one.name.startswith(ELSEWHERE) or one.kind == "mesh":
             continue
         for key in one.keys:
             if side not in key.schema:
@@ -161,7 +170,7 @@ def test_words_that_are_no_choice_are_refused_by_both(scene_schema):
     tried = 0
     for one in scenes.sections():
         for key in one.keys:
-            if "enum" in key.schema and one.kind != "mesh":
+            if "enum" in key.schema and one.kind != "mesh" and not one.name.startswith(ELSEWHERE):
                 assert key.allowed == " | ".join(key.schema["enum"]), key
                 assert judged(scene_schema, put(one, key.name, "no such word"))
                 with pytest.raises(InputError):
@@ -172,7 +181,15 @@ def test_words_that_are_no_choice_are_refused_by_both(scene_schema):
 
 def test_scenes_that_are_read_are_valid_and_misspelt_ones_are_not(scene_schema, tmp_path):
     meshfile.write(square_mesh("quad"), tmp_path / "pad.vtu")
-    texts = [SLIDE, dump(default_scene()), *(templates.text(name) for name in templates.TEMPLATES)]
+    sine = '{ kind = "sine", frequency = 9, amplitude = 5 }'
+    hum = f'signal = {{ kind = "carrier", frequency = 1e4, envelope = {sine} }}'
+    texts = [
+        SLIDE,
+        SLIDE.replace("voltage = 10.0", hum, 1),
+        SLIDE.replace("[finger]", "[finger]\nparticipant = 'ii'"),
+    ]
+    texts += [SLIDE + "[finger.materials.dermis]\nE = 0.1\n"]
+    texts += [dump(default_scene()), *(templates.text(name) for name in templates.TEMPLATES)]
     assert [judged(scene_schema, text) for text in texts] == [[]] * len(texts)
     for wrong in ("frictoin = 0.3", "kind = 3"):
         assert judged(scene_schema, templates.text("hover").replace('kind = "flat"', wrong))
