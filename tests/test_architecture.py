@@ -36,7 +36,10 @@ ROOMS = {
         "strategy state control condensation interface linearisation pressure anderson findings "
         "equilibrium factorised stepping",
     ),
-    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
+    "scene": (
+        {"numpy", "pydantic", "tomli_w"},
+        "motion terms scene keys voltage meanings schema file resolution sense plan",
+    ),
     "simulation": (
         {"numpy", "threadpoolctl", "pandas"},
         "provenance result spectrum model works ledger checkpoint run rendering",
@@ -44,14 +47,14 @@ ROOMS = {
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file folder pools run",
+        "samples file schema folder pools run",
     ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "plotting", "loading", "runfolder", "cli", "__main__"),
+    ("export", "plotting", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones

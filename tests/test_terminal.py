@@ -123,7 +123,7 @@ def test_several_mistakes_stand_on_lines_of_their_own_in_a_terminal(place):
     ]
 
 
-@pytest.mark.parametrize("command", ["", "run", "plan", "study", "sweep", "mesh", "signal"])
+@pytest.mark.parametrize("command", ["", "run", "init", "plan", "study", "sweep", "mesh", "signal", "schema"])
 def test_help_fits(monkeypatch, capsys, command):
     monkeypatch.setenv("COLUMNS", "80")
     assert cli.main([*command.split(), "--help"]) == 0
@@ -134,7 +134,7 @@ def test_help_fits(monkeypatch, capsys, command):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'signal') (see")],
+    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'schema') (see")],
 )
 def test_a_misspelt_command_is_guessed(capsys, given, words):
     assert cli.main([given]) == 2
