@@ -44,12 +44,17 @@ ROOMS = {
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file folder pools run",
     ),
+    "plotting": (
+        {"numpy", "scipy", "matplotlib", "PIL"},
+        "colours labels figures fields ground outline finger curves beside pressing sweeps tractions "
+        "meshes movie",
+    ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "plotting", "runfolder", "cli"),
+    ("export", "runfolder", "cli"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
@@ -57,7 +62,7 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load, and the modules that are themselves loaded only when they are there
-LATE = {"skfem", "meshio", "matplotlib", "numba", "pypardiso", "tqdm", "distributed", "pyarrow"}
+LATE = {"skfem", "meshio", "matplotlib", "PIL", "numba", "pypardiso", "tqdm", "distributed", "pyarrow"}
 COMPILED = {"tissue.kernels.lanes", "tissue.kernels.elastic", "tissue.kernels.viscous"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 
