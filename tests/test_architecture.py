@@ -30,15 +30,15 @@ ROOMS = {
         "assembly weakform userforms dynamics body",
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
+    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
-    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint run rendering"),
+    "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
+    "simulation": ({"numpy", "threadpoolctl"}, "result spectrum model works ledger checkpoint run rendering"),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
@@ -46,8 +46,8 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "colours labels figures fields ground outline finger curves beside pressing sweeps tractions "
-        "meshes movie",
+        "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
+        "tractions meshes movie",
     ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them

@@ -10,6 +10,7 @@ from evfem.plotting.finger import deformed
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
 from evfem.plotting.pressing import contact_area, force_indentation, friction, signal
+from evfem.plotting.spectra import spectrum
 from evfem.plotting.sweeps import sweep, sweep_map
 from evfem.plotting.tractions import contact_pressure
 
@@ -28,6 +29,7 @@ __all__ = [
     "regions",
     "side_by_side",
     "signal",
+    "spectrum",
     "sweep",
     "sweep_map",
 ]

@@ -43,15 +43,18 @@ OVER = ("step", "position", "time", "indentation", "voltage", "applied_force")
 
 
 def abscissa(result: Result) -> str:
-    """The column that a picture is drawn over: the one that all motions change, else the step.
+    """The column that a picture is drawn over: what all motions change, the time if the finger
+    waits, else the step.
 
-    A press is drawn over the indentation, a slide over the position, a voltage ramp over the
-    voltage, a rest over the time.
+    Presses are drawn over the indentation, slides over the position, voltage ramps over the
+    voltage.
     """
     kinds = set(result.motion)
-    wished = {"press": "indentation", "slide": "position", "voltage": "voltage", "wait": "time"}
-    name = wished.get(kinds.pop(), "step") if len(kinds) == 1 else "position"
-    return name if _changes(getattr(result, name)) else "step"
+    wished = {"press": "indentation", "voltage": "voltage"}
+    name = wished.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
+    if _changes(getattr(result, name)):
+        return name
+    return "time" if "wait" in kinds else "step"
 
 
 def _changes(values: Floats) -> bool:
@@ -63,9 +66,10 @@ def _changes(values: Floats) -> bool:
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
 
-    `over` is step, position, time, indentation, voltage or applied_force; None takes what the
-    motions change (`abscissa`): the indentation for presses alone, the position for slides, else
-    the step, with the motions marked. A force that is 0 throughout is left out.
+    `over` is step, position, time, indentation, voltage or applied_force; None takes what all
+    motions change: the indentation for presses alone, the position for slides, the voltage for
+    ramps; the time if the finger waits, else the step, with the motions marked. A force that is 0
+    throughout is left out.
     """
     ax = axes_or_new(ax)
     _draw_columns(ax, result, FORCES, "applied_force", over)
@@ -187,6 +191,6 @@ def named(results: Results) -> dict[str, Result]:
     return found
 
 
-def styled(found: Mapping[str, Result]) -> Any:
-    """Name and result, colour, style of each curve."""
+def styled(found: Mapping[str, Any]) -> Any:
+    """Name and what stands behind it, colour, style of each curve."""
     return zip(found.items(), cycle(CURVES), cycle(STYLES), strict=False)

@@ -13,6 +13,7 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -20,11 +21,11 @@ import tomli_w
 from evfem.common.checks import MOST_STEPS
 from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
-from evfem.electrostatics.signalfile import read_signal
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.contact.textures import Grating, SelfAffine
+from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
 from evfem.errors import InputError, StorageError
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
+from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
@@ -39,12 +40,15 @@ from evfem.scene.keys import (
     StrategyTable,
     Table,
     at,
+    check_size,
+    columns,
     parse,
     shown,
     unknown,
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Scene, Solver
+from evfem.scene.voltage import read_voltage, voltage_keys
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LAWS, from_table
 
@@ -52,6 +56,7 @@ VERSION = 1
 #: largest files in bytes, and most steps of all motions together
 LARGEST_SCENE = 4 * 2**20
 LARGEST_TABLE = 64 * 2**20
+TEXTURES: Mapping[str, type] = {"grating": Grating, "self_affine": SelfAffine}
 FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
@@ -66,7 +71,7 @@ def load(path: str | Path) -> Scene:
 
 def read_text(key: str, path: Path) -> str:
     """The text of a TOML file; errors call the file `key`."""
-    _check_size(key, path, LARGEST_SCENE)
+    check_size(key, path, LARGEST_SCENE)
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -130,19 +135,6 @@ def _build(cls: type, table: Table, prefix: str) -> Any:
         return cls(**values)
 
 
-def _check_size(key: str, path: Path, most: int) -> None:
-    try:
-        size = path.stat().st_size
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
-        reason = getattr(error, "strerror", None) or "no path"
-        given = f"{shown(str(path))} ({reason})"
-        raise InputError(key, given, "a file that exists and can be read") from error
-    if not path.is_file():
-        raise InputError(key, f"{path}, which is no file", "a file")
-    if size > most:
-        raise InputError(key, f"{path} with {size / 2**20:.0f} MB", f"a file of at most {most // 2**20} MB")
-
-
 def _motion(table: Mapping[str, Any], prefix: str) -> Motion:
     kind = table.get("kind", "nothing")
     if not isinstance(kind, str) or kind not in MOTIONS:
@@ -160,32 +152,42 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
     if not isinstance(kind, str) or kind not in SURFACES:
         raise InputError("surface.kind", _plain(kind), " | ".join(SURFACES))
     parsed: Any = parse(SURFACES[kind], table, "surface")
-    insulator = None
-    if electrostatics is not None:
-        prefix = "electrostatics.insulator_"
-        with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
-            insulator = Layer(electrostatics.insulator_thickness, electrostatics.insulator_eps_r)
+    insulator = None if electrostatics is None else _insulator(electrostatics)
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
     with at("surface"):
         if kind == "flat":
             return Flat(**common) if insulator is None else Display(**common)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
+        if kind in TEXTURES:
+            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
             given = "nothing" if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
         if parsed.points is not None:
-            return Profile(*_columns("surface.points", parsed.points), **common)
+            return Profile(*columns("surface.points", parsed.points), **common)
         path = folder / parsed.file
-        _check_size("surface.file", path, LARGEST_TABLE)
+        check_size("surface.file", path, LARGEST_TABLE)
         return Profile.from_csv(path, **common)
 
 
-def _columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]]:
-    for i, row in enumerate(rows):
-        if len(row) != 2:
-            raise InputError(f"{key}[{i}]", shown(row), "a row of two numbers")
-    return [row[0] for row in rows], [row[1] for row in rows]
+def _insulator(table: ElectrostaticsTable) -> Layer:
+    """The insulator by its name, or by its thickness and permittivity."""
+    own = {name: getattr(table, name) for name in ("insulator_thickness", "insulator_eps_r")}
+    if table.insulator is not None:
+        for name, value in own.items():
+            if value is not None:
+                given = f"{value:g} beside insulator = {table.insulator}"
+                raise InputError(f"electrostatics.{name}", given, "one of the two")
+        return INSULATORS[table.insulator]
+    for name, value in own.items():
+        if value is None:
+            allowed = ElectrostaticsTable.model_fields[name].description
+            others = " | ".join(INSULATORS)
+            raise InputError(f"electrostatics.{name}", "nothing", f"{allowed}; or insulator = {others}")
+    prefix = "electrostatics.insulator_"
+    with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
+        return Layer(*own.values())
 
 
 def _law_and_voltage(table: Any, motion: list[Motion], folder: Path) -> tuple[Any, Any]:
@@ -193,23 +195,8 @@ def _law_and_voltage(table: Any, motion: list[Motion], folder: Path) -> tuple[An
         return None, 0.0
     with at("electrostatics"):
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
-    given = [
-        name for name in ("voltage", "voltage_file", "voltage_profile") if getattr(table, name) is not None
-    ]
     ramped = any(isinstance(one, VoltageRamp) for one in motion)
-    if len(given) > 1 or not (given or ramped):
-        allowed = "exactly one of voltage (V) and voltage_file"
-        raise InputError("electrostatics.voltage", " and ".join(given) or "nothing", allowed)
-    if table.voltage_file is not None:
-        path = folder / table.voltage_file
-        _check_size("electrostatics.voltage_file", path, LARGEST_TABLE)
-        key = "electrostatics.voltage_file"
-        with at(key, voltage_file=key, path=key):
-            return law, read_signal(path)
-    if table.voltage_profile is not None:
-        with at("electrostatics.voltage_profile"):
-            return law, VoltageProfile(*_columns("electrostatics.voltage_profile", table.voltage_profile))
-    return law, table.voltage or 0.0
+    return law, read_voltage(table, not ramped, folder)
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:
@@ -221,12 +208,14 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     skin = _build(Electrical, parsed, "finger.electrical")
     if "mesh" in parts:
         return _meshed_finger(parts, skin, folder)
-    known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
+    known = [spec.name for spec in fields(FingerPad) if spec.init]
     for name in parts:
-        if name not in known:
-            raise unknown(f"finger.{name}", name, [*known, "mesh"])
+        if name not in (*known, "participant"):
+            raise unknown(f"finger.{name}", name, [*known, "participant", "mesh"])
+    if "participant" in parts:
+        parts = participant_sizes(parts.pop("participant")) | parts
     if "materials" in parts:
-        parts["materials"] = _materials(parts["materials"])
+        parts["materials"] = _materials(parts["materials"], TABLE_2)
     if electrical:
         parts["electrical"] = skin
     with at("finger"):
@@ -240,13 +229,16 @@ def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) 
         raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")
     parsed = parse(MeshTable, table, "finger")
     path = folder / parsed.mesh
-    _check_size("finger.mesh", path, LARGEST)
+    check_size("finger.mesh", path, LARGEST)
     with at("finger"):
         materials = _materials(parsed.materials)
         return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)
 
 
-def _materials(tables: object) -> dict[str, Any]:
+def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({})) -> dict[str, Any]:
+    """The laws of the regions; one of `usual` whose table names no law is neo-Hookean, and keeps
+    the moduli that its table does not name.
+    """
     if not isinstance(tables, dict):
         raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
     laws = {}
@@ -254,6 +246,8 @@ def _materials(tables: object) -> dict[str, Any]:
         key = f"finger.materials.{name}"
         if not isinstance(table, dict):
             raise InputError(key, shown(table), "a table with a law and its parameters")
+        if name in usual and "law" not in table:
+            table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
         with at("finger"):
             laws[name] = from_table(table, key)
     return laws
@@ -321,8 +315,9 @@ def _law_table(region: str, law: Any) -> dict[str, Any]:
 
 
 def _surface_table(surface: Any) -> dict[str, Any]:
-    if type(surface) not in (Flat, Display, Sinusoid, Profile):
-        raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
+    if type(surface) not in (Flat, Display, Sinusoid, Profile, *TEXTURES.values()):
+        allowed = "Flat, Display, Sinusoid, Profile, Grating or SelfAffine, for a file"
+        raise InputError("surface", type(surface).__name__, allowed)
     friction = (
         surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
     )
@@ -331,6 +326,10 @@ def _surface_table(surface: Any) -> dict[str, Any]:
         return {"kind": "flat", **table}
     if type(surface) is Sinusoid:
         return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
+    for kind, cls in TEXTURES.items():
+        if type(surface) is cls:
+            own = {name: value for name, value in _changed(surface).items() if name != "insulator"}
+            return {"kind": kind, **own, **table}
     rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
     return {"kind": "profile", **table, "points": [list(row) for row in rows]}
 
@@ -342,15 +341,7 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
             "electrostatics.law", type(scene.law).__name__, f"{' | '.join(FORCE_LAWS)}, for a file"
         )
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
-    if isinstance(scene.voltage, FollowForce):
-        raise InputError(
-            "electrostatics.voltage", "FollowForce", "a number or a VoltageProfile in a scene file"
-        )
-    if isinstance(scene.voltage, VoltageProfile):
-        rows = zip(scene.voltage.position.tolist(), scene.voltage.voltage.tolist(), strict=True)
-        table["voltage_profile"] = [list(row) for row in rows]
-    else:
-        table["voltage"] = scene.voltage
+    table |= voltage_keys(scene.voltage)
     insulator = scene.ground.insulator
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}

@@ -16,8 +16,9 @@ import numpy as np
 
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.motion import Hover, VoltageRamp
-from evfem.scene.resolution import unresolved
+from evfem.protocols import TimeSignal
+from evfem.scene.motion import Hover, VoltageRamp, Wait
+from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
@@ -124,7 +125,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    rough = unresolved(scene, mesh)
+    rough, fast = unresolved(scene, mesh), too_fast(scene)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
@@ -143,7 +144,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
-        warnings=(*doubts(scene, mesh, moduli), *([] if rough is None else [rough])),
+        warnings=(*doubts(scene, mesh, moduli), *(text for text in (rough, fast) if text is not None)),
     )
 
 
@@ -173,7 +174,7 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
     hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
     if (
         not hovers
-        or not all(isinstance(motion, (Hover, VoltageRamp)) for motion in scene.motion)
+        or not all(isinstance(motion, (Hover, VoltageRamp, Wait)) for motion in scene.motion)
         or scene.forms
     ):
         return None
@@ -205,19 +206,23 @@ def _electricity(scene: Scene) -> Term:
     if scene.law is None or largest_voltage(scene) == 0.0:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
+    signal = scene.voltage
+    over_time = (
+        f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
+    )
+    law = type(scene.law).__name__
     return Term(
-        "electricity",
-        True,
-        f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling",
+        "electricity", True, f"{law}, {air}, {scene.direction} traction, {scene.coupling} coupling{over_time}"
     )
 
 
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
+    clock = ", the clock sets the voltage alone" if isinstance(scene.voltage, TimeSignal) else ""
     return Term(
         "time",
         dynamics != "quasistatic",
-        "quasi-static" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
+        f"quasi-static{clock}" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
     )
 
 

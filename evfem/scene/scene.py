@@ -18,8 +18,8 @@ from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.protocols import CompleteSurface, ForceLaw, Surface
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.protocols import CompleteSurface, ForceLaw, Surface, TimeSignal
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -29,6 +29,8 @@ DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
+#: voltages that are no number
+SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
 _PENALTY = number("a penalty in N/mm3, larger than 0", lambda p: p > 0)
 _TOLERANCE = number("a relative residual from 1e-13 to 1e-3", lambda t: 1e-13 <= t <= 1e-3)
 
@@ -124,16 +126,17 @@ class Motions:
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
-    `voltage` in V: a number, acting in full from the first step, or a `VoltageProfile` over the
-    position of the bone. `law` None and `voltage` 0: no electrostatics. The insulator belongs to
-    the surface. `air_layer` False: only touching nodes carry electrostatic force. Raises
-    InputError for anything that does not fit together.
+    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
+    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
+    `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
+    touching nodes carry electrostatic force. Raises InputError for anything that does not fit
+    together.
     """
 
     finger: Finger
     surface: Surface
     law: ForceLaw | None = None
-    voltage: float | VoltageProfile | FollowForce = 0.0
+    voltage: float | VoltageProfile | FollowForce | TimeSignal = 0.0
     motion: Motions = Motions()
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
@@ -148,6 +151,7 @@ class Scene:
         set_frozen(self, forms=tuple(self.forms))
         _check_electrostatics(self)
         _check_motion(self)
+        _check_time(self)
         _check_dynamics(self)
 
     def __repr__(self) -> str:
@@ -215,10 +219,10 @@ def _check_parts(scene: Scene) -> None:
     if not all(isinstance(term, Term) for term in scene.forms):
         raise InputError("forms", scene.forms, "terms as made by Scene.with_term")
     if not scene.motion:
-        raise InputError("motion", "nothing", "at least one of Press, Slide, Hover, VoltageRamp")
+        raise InputError("motion", "nothing", "at least one of Press, Slide, Hover, VoltageRamp, Wait")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
-            raise InputError(f"motion[{i}]", motion, "Press, Slide, Hover or VoltageRamp")
+            raise InputError(f"motion[{i}]", motion, "Press, Slide, Hover, VoltageRamp or Wait")
 
 
 def _check_electrostatics(scene: Scene) -> None:
@@ -226,8 +230,8 @@ def _check_electrostatics(scene: Scene) -> None:
     choice("electrostatics.coupling", scene.coupling, COUPLINGS)
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", scene.air_layer, "true or false")
-    if not isinstance(scene.voltage, (VoltageProfile, FollowForce)):
-        allowed = "a voltage in V between -1e6 and 1e6"
+    if not isinstance(scene.voltage, SIGNALS):
+        allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
@@ -252,14 +256,20 @@ def _check_motion(scene: Scene) -> None:
         pressed = (pressed or isinstance(motion, Press)) and not isinstance(motion, Hover)
         if isinstance(motion, VoltageRamp) and scene.law is None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
-        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, (VoltageProfile, FollowForce)):
-            raise InputError(key, "a voltage ramp beside a voltage profile", "one of the two")
-        if isinstance(motion, (Slide, VoltageRamp)) and motion.hold == "force" and not pressed:
+        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, SIGNALS):
+            raise InputError(key, "a voltage ramp beside a voltage profile or signal", "one of the two")
+        if isinstance(motion, (Slide, VoltageRamp, Wait)) and motion.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
         if isinstance(motion, Press) and motion.force == 0.0 and scene.law is None:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
+
+
+def _check_time(scene: Scene) -> None:
+    if isinstance(scene.voltage, TimeSignal) and not any(takes_time(motion) for motion in scene.motion):
+        given = "a signal over time, and no motion that takes any"
+        raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 
 
 def _check_dynamics(scene: Scene) -> None:

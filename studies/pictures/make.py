@@ -33,7 +33,7 @@ def draw_readme(path: Path = README) -> None:
 
     finger = ev.FingerPad()
     display = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
-    motion = [ev.Press(force=0.05), ev.Slide(distance=2.0, steps=40)]
+    motion = [ev.Press(force=0.05), ev.Slide(distance=2.0, steps=40, hold="force")]
     scene = ev.Scene(
         finger, display, law=ev.Kaczmarek(), voltage=1000.0, motion=motion, output=ev.Output(every=50)
     )

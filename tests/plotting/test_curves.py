@@ -17,6 +17,7 @@ from evfem.plotting import (
     friction,
     history,
     signal,
+    spectrum,
 )
 from evfem.plotting.curves import ENERGIES, OVER, abscissa
 from evfem.plotting.labels import kind_of
@@ -78,6 +79,7 @@ def test_forces_that_are_zero_are_left_out():
         (["press", "press", "slide"], {"position": [0.0, 0.0, 0.1]}, "step"),
         (["voltage"] * 3, {"voltage": [0.0, 10.0, 20.0]}, "voltage"),
         (["hover"], {}, "step"),
+        (["press", "wait", "wait"], {"time": [0.0, 0.1, 0.2], "position": [0.0] * 3}, "time"),
     ],
 )
 def test_a_run_is_drawn_over_what_its_motions_change(kinds, columns, over):
@@ -167,6 +169,21 @@ def test_a_signal_stands_above_the_friction_that_it_makes():
     assert_line(lines_of(below)["wish"], one.position, one.applied_tangential_force)
     assert (above.get_ylabel(), below.get_ylabel()) == ("voltage (V)", "friction force (N/mm)")
     assert below.get_xlabel() == "position of the bone (mm)"
+
+
+def test_a_spectrum_is_that_of_the_waiting_finger_without_its_mean():
+    time = np.arange(1, 41) * 0.005  # 0.2 s: lines every 5 Hz up to 100 Hz
+    force = 1.0 + 0.25 * np.sin(2.0 * np.pi * 20.0 * time)
+    result = run_of(["wait"] * 40, time=time, tangential_force=force)
+    result = replace(result, motion_index=np.zeros(40, dtype=int))
+    ax = spectrum(result)
+    frequency, amplitude = ax.get_lines()[0].get_data()
+    np.testing.assert_allclose(frequency, np.arange(1, 21) * 5.0)
+    np.testing.assert_allclose(amplitude, np.where(frequency == 20.0, 0.25, 0.0), atol=1e-12)
+    labels = ("frequency (Hz)", "amplitude of tangential force (N/mm)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == labels
+    both = spectrum({"a": result, "b": result}, "normal_force", stop=0.1)
+    assert both.get_lines()[1].get_xdata()[0] == pytest.approx(10.0)
 
 
 def test_what_can_be_drawn_over_is_in_the_history():

@@ -1,10 +1,13 @@
 """Scene files: three examples load, what is written is read back, mistakes get one sentence."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.meshes import square_mesh
 
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -176,6 +179,21 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
     assert scene.air_layer is False
 
 
+def test_a_participant_of_table_1_may_stand_in_a_file():
+    """Other keys say what is different from it."""
+    text = SHORT + "[finger]\nparticipant = 'iii'\nresolution = 'coarse'\nbone_offset = 0.5\n"
+    assert loads(text).finger == replace(FingerPad.participant("iii", "coarse"), bone_offset=0.5)
+
+
+def test_a_material_of_table_2_may_be_changed_in_one_of_its_moduli():
+    text = SHORT + "[finger.materials]\ndermis.E = 0.06\nnail.nu = 0.2\nhypodermis.viscosity = 0.1\n"
+    laws = loads(text).finger.materials
+    assert laws["dermis"] == NeoHookean(E=0.06, nu=0.48)
+    assert laws["nail"] == NeoHookean(E=17.0, nu=0.2)
+    assert laws["hypodermis"] == NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
+    assert laws["epidermis"] == FingerPad().materials["epidermis"]
+
+
 def scenes(folder):
     """Scenes that use everything a file can hold."""
     laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
@@ -199,14 +217,35 @@ def scenes(folder):
         solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
         output=Output(3),
     )
+    grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
+    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press])
+    rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
+    yield Scene(FingerPad(), rough, motion=[press])
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("number", range(7))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
     assert loads(text).digest() == scene.digest()
     assert dump(loads(text)) == text
+
+
+@pytest.mark.parametrize(("name", "layer"), [("film", (0.09, 3.35)), ("touchscreen", (0.001, 3.9))])
+def test_insulators_have_names(name, layer):
+    own = "insulator_thickness = 0.09\ninsulator_eps_r = 3.35\n"
+    assert own in DISPLAY
+    scene = loads(DISPLAY.replace(own, f'insulator = "{name}"\n'))
+    assert scene.surface.insulator == Layer(*layer)
+    assert loads(dump(scene)).digest() == scene.digest()
+    with pytest.raises(
+        InputError, match=f"electrostatics.insulator_eps_r: given 3 beside insulator = {name}"
+    ):
+        loads(DISPLAY.replace(own, f'insulator = "{name}"\ninsulator_eps_r = 3.0\n'))
+    with pytest.raises(
+        InputError, match=r"electrostatics.insulator: given 'glass'; allowed: film \| touchscreen"
+    ):
+        loads(DISPLAY.replace(own, 'insulator = "glass"\n'))
 
 
 @form
@@ -256,6 +295,21 @@ WRONG = [
     (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", "given 'flat'"),
     (SHORT, "kind = 'flat'", "", "surface.kind", "flat | sinusoid | profile"),
     (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", "given round"),
+    (SHORT, "kind = 'flat'", "kind = 'grating'", "surface.period", "given nothing; allowed: a length in mm"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
+        "surface.hurst",
+        "given 2.0; allowed: a Hurst exponent from 0 to 1",
+    ),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 0.5\nrms = 0.01\nseed = 0.5",
+        "surface.seed",
+        "given 0.5",
+    ),
     (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
@@ -310,6 +364,7 @@ WRONG = [
         "finger.materials.dermis",
         "given 3",
     ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nparticipant = 'xx'", "finger.participant", "i | ii |"),
     (
         SHORT,
         "force = 0.05",
