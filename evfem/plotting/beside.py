@@ -47,7 +47,7 @@ def side_by_side(
     for panels, row in zip(axes, rows, strict=True):
         for ax, view, window in zip(panels, views.values(), row, strict=True):
             mapped = view.draw(ax, window, scale)
-            ax.set_title(told(view.result, view.frame), fontsize="small")
+            ax.set_title(told(view.result, view.frame), fontsize="x-small")
     for ax, name in zip(axes[0], views, strict=True):
         ax.set_title(name, fontsize="medium")
     for ax in axes[:, 1:].ravel():

@@ -1,8 +1,8 @@
 """Fields of a frame as they are coloured: values, smooth colours, scales.
 
-A field of cells becomes smooth by nodal averages, weighted by the area of the cells (Zienkiewicz
-and Zhu's simplest recovery); on a border between regions each region keeps its own average, for
-stress jumps there. Colours between nodes are linear in triangles.
+A field of cells becomes smooth by nodal averages, weighted by the area of the cells; on a border
+between regions each region keeps its own average, for stress jumps there. Colours between nodes
+are linear in triangles.
 """
 
 from __future__ import annotations

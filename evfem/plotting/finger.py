@@ -22,6 +22,7 @@ from evfem.plotting.fields import (
     scale_of,
     shown_values,
     values_of,
+    within,
 )
 from evfem.plotting.figures import WIDTH, add_colorbar, axes_or_new
 from evfem.plotting.ground import Height, height_of
@@ -107,6 +108,7 @@ class View:
         else:
             mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, smooth)
         _draw_borders(ax, mesh, points)
+        _name_bone(ax, mesh, points, window)
         _draw_surface(ax, height, window)
         if self.field in TRACTIONS:
             draw_arrows(ax, mesh, self.frame, self.field, height, window)
@@ -211,6 +213,17 @@ def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
     border = edges[first[(np.bincount(number) == 1) | (low < high)]]
     order = [0, 2, 1] if mesh.order == 2 else [0, 1]
     ax.add_collection(LineCollection(list(points[border[:, order]]), colors=EDGE, linewidths=0.5))
+
+
+def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
+    """What the hole in the middle is, where the tissue has one around the bone."""
+    edges = mesh.edges_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
+    around, count = np.unique(edges, return_counts=True)
+    if not count.size or np.any(count != 2):
+        return
+    middle = 0.5 * (points[around].min(axis=0) + points[around].max(axis=0))
+    if within(middle[None], window)[0]:
+        ax.text(*middle, "bone", ha="center", va="center", color="0.5", fontsize="small")
 
 
 def _draw_surface(ax: Axes, height: Height, window: Window) -> None:

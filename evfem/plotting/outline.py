@@ -2,8 +2,8 @@
 
 A node has its colour on its half of the edges beside it, as it has its share of their length in
 the model. Arrows are the tractions on the finger: contact pressure pushes along the normal of the
-surface, shear along its tangent, attraction pulls down. They stand in the surface; pressure ends
-at the outline, the others begin there.
+surface, shear along its tangent, attraction pulls down. Pressure and shear stand in the surface,
+attraction begins at the outline.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def draw_arrows(ax: Axes, mesh: Mesh, frame: Frame, field: str, height: Height, 
         arrows, pivot = size[:, None] * along * 1.5 * width / MOST_ARROWS, "middle"
         at = at - 0.4 * longest * normal
     else:
-        arrows, pivot = size[:, None] * np.array([0.0, -longest]), "tail"
+        arrows, pivot, at = size[:, None] * np.array([0.0, -longest]), "tail", place[nodes]
     quiver = ax.quiver(*at.T, *arrows.T, angles="xy", scale_units="xy", scale=1.0, width=0.0028, pivot=pivot)
     quiver.set(color=EDGE, zorder=4)
     return quiver

@@ -97,8 +97,10 @@ def test_pressure_acts_along_the_normal_of_a_slope():
     assert np.all(arrows_of(deformed(result, "shear_traction"))[1][:, 0] < 0.0)
 
 
-def test_attraction_pulls_down():
-    _, arrows = arrows_of(deformed(fake_result("quad9"), "electrostatic_traction"))
+def test_attraction_pulls_down_from_the_outline():
+    result = fake_result("quad9")
+    at, arrows = arrows_of(deformed(result, "electrostatic_traction"))
+    np.testing.assert_array_equal(at, pad_of(result)[1])
     assert np.all(arrows[:, 0] == 0.0)
     assert np.all(arrows[:, 1] < 0.0)
 
