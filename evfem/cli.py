@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import evfem
 from evfem.common import notices
-from evfem.errors import InputError, NotConverged, StorageError
+from evfem.errors import InputError, NotConverged, StorageError, quoted
 
 if TYPE_CHECKING:
     from evfem.protocols import Observer
@@ -67,7 +67,8 @@ def parser() -> argparse.ArgumentParser:
         epilog=f"`evfem run` alone computes a built-in scene; `evfem COMMAND --help` says more. {STATUS}",
     )
     top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
-    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
+    top.set_defaults(function=_help)
     for name, does, options, function in (
         ("run", "run a scene and write history, fields, summary and picture", _run_options, _run),
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument, _plan),
@@ -199,7 +200,7 @@ def _status(given: argparse.Namespace) -> int:
     try:
         return given.function(given)
     except InputError as error:
-        return _say(error, BAD_INPUT)
+        return _refuse(error)
     except NotConverged as error:
         return _say(error, NOT_CONVERGED)
     except BrokenPipeError:  # the reader of our output has gone
@@ -235,6 +236,16 @@ def _silence() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def _refuse(error: InputError) -> int:
+    """One line for a person, or one for each mistake in a terminal; elsewhere it stays one line."""
+    if len(error.mistakes) == 1 or not sys.stderr.isatty():
+        return _say(error, BAD_INPUT)
+    _say(f"{len(error.mistakes)} mistakes", BAD_INPUT)
+    for mistake in error.mistakes:
+        _say(mistake, BAD_INPUT)
+    return BAD_INPUT
+
+
 def _say(message: object, status: int) -> int:
     notices.tell(str(message))
     return status
@@ -248,6 +259,11 @@ def _scene(path: Path | None) -> Scene:
     from evfem.scene.file import load
 
     return load(path)
+
+
+def _help(given: argparse.Namespace) -> int:
+    parser().print_help()
+    return DONE
 
 
 def _run(given: argparse.Namespace) -> int:
@@ -331,7 +347,7 @@ def _study(given: argparse.Namespace) -> int:
         names += [n for n in studies.NAMES if n not in studies.APART] if name == "all" else [name]
     for name in names:
         if name not in studies.NAMES:
-            raise InputError("study", name, f"{', '.join(studies.NAMES)}, all")
+            raise InputError("study", quoted(name), f"{', '.join(studies.NAMES)}, all")
     sample = _sample(given)
     for name in dict.fromkeys(names):
         print(f"study {name}", file=sys.stderr, flush=True)

@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem", "numba"},
         "fields forms elements moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous "
@@ -31,14 +31,17 @@ ROOMS = {
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini condensed"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
         "factorised stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result spectrum model works ledger checkpoint run rendering"),
+    "simulation": (
+        {"numpy", "threadpoolctl", "pandas"},
+        "provenance result spectrum model works ledger checkpoint run rendering",
+    ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
@@ -54,7 +57,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "runfolder", "cli"),
+    ("export", "loading", "runfolder", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
@@ -63,6 +66,7 @@ STRANGERS = {"fast", "sweeps"}
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load, and the modules that are themselves loaded only when they are there
 LATE = {"skfem", "meshio", "matplotlib", "PIL", "numba", "pypardiso", "tqdm", "distributed", "pyarrow"}
+LATE |= {"pandas"}
 COMPILED = {"tissue.kernels.lanes", "tissue.kernels.elastic", "tissue.kernels.viscous"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 

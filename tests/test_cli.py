@@ -193,6 +193,21 @@ def test_a_file_of_others_in_the_way_stops_the_run_before_it_starts(place, name)
     assert (place / "here" / name).read_text() == "mine"
 
 
+def test_the_bare_command_shows_its_help(place, capsys):
+    status, out, err = called(place)
+    assert (status, err) == (0, "")
+    assert called(place, "--help")[1] == out
+    assert out.startswith("usage: evfem")
+
+
+def test_the_package_is_the_command(place):
+    words, environment = process_of("plan", "square.toml")
+    words[1:3] = ["-m", "evfem"]
+    done = subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == called(place, "plan", "square.toml")[1]
+
+
 BAD_SCENES = {
     "unknown key": ("friction = 0.2", "frictoin = 0.2", "surface.frictoin"),
     "wrong type": ("E = 0.05", "E = 'soft'", "finger.materials.soft.E"),
@@ -224,7 +239,6 @@ def test_bad_input_is_one_sentence_and_writes_nothing(place, case):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "COMMAND"),
         (["fly"], "invalid choice"),
         (["run", "none.toml"], "No such file"),
         (["run", "--fast"], "unrecognized"),
@@ -388,7 +402,7 @@ def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path
 def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
     status, out, err = called(tmp_path, "study", "section321", "fig99", "--out", "here")
     assert (status, out) == (2, "")
-    assert err.startswith("evfem: study: given fig99; allowed: section321, ")
+    assert err.startswith('evfem: study: given "fig99"; allowed: section321, ')
     assert files(tmp_path) == []
 
 

@@ -113,6 +113,18 @@ def test_a_refused_scene_leaves_one_wrapped_sentence_and_no_bar(place):
     assert all(line.startswith("  ") for line in shown[1:])
 
 
+def test_several_mistakes_stand_on_lines_of_their_own_in_a_terminal(place):
+    wrong = SCENE.replace("friction = 0.2", "friction = -0.2").replace("steps = 4", "steps = 0")
+    (place / "square.toml").write_text(wrong)
+    status, text = terminal(place, "run", "square.toml")
+    assert status == 2
+    assert [line for line in lines(text) if line.startswith("evfem: ")] == [
+        "evfem: 2 mistakes",
+        "evfem: surface.friction: given -0.2; allowed: a number from 0 to 100, or a",
+        "evfem: motion[0].steps: given 0; allowed: a whole number from 1 to 1000000",
+    ]
+
+
 @pytest.mark.parametrize("command", ["", "run", "plan", "study", "sweep", "mesh", "signal"])
 def test_help_fits(monkeypatch, capsys, command):
     monkeypatch.setenv("COLUMNS", "80")

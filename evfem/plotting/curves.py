@@ -77,7 +77,7 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
 
 
 def energies(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Works, stored energy and dissipations (N mm/mm) over `over`, as in `forces`."""
+    """Works, stored energy and dissipations (N) over `over`, as in `forces`."""
     ax = axes_or_new(ax)
     _draw_columns(ax, result, ENERGIES, "external_work", over)
     return ax

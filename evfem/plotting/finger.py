@@ -223,7 +223,7 @@ def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
         return
     middle = 0.5 * (points[around].min(axis=0) + points[around].max(axis=0))
     if within(middle[None], window)[0]:
-        ax.text(*middle, "bone", ha="center", va="center", color="0.5", fontsize="small")
+        ax.text(middle[0], middle[1], "bone", ha="center", va="center", color="0.5", fontsize="small")
 
 
 def _draw_surface(ax: Axes, height: Height, window: Window) -> None:

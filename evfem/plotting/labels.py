@@ -1,62 +1,31 @@
-"""Names and units of what is drawn, the same in every picture.
-
-The last word of a column's name says what it is: every `..._force` is in N/mm, every `..._width`
-in mm. A depth turns these into N and mm².
-"""
+"""Names and units of what is drawn, the same in every picture."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from evfem.errors import InputError
-from evfem.simulation.result import COLUMNS, Result
+from evfem.simulation.result import COLUMNS, UNITS, Result
 
-#: last word of a column's name -> kind of quantity, its unit per mm of depth, its unit for a depth
+#: last word of a column's name -> what it is; columns of one kind share an axis
 KINDS = {
-    "force": ("force", "N/mm", "N"),
-    "width": ("width", "mm", "mm²"),
-    "work": ("energy", "N mm/mm", "mJ"),
-    "energy": ("energy", "N mm/mm", "mJ"),
-    "dissipation": ("energy", "N mm/mm", "mJ"),
-    "pressure": ("pressure", "MPa", "MPa"),
-    "gap": ("gap", "mm", "mm"),
-    "position": ("position of the bone", "mm", "mm"),
-    "indentation": ("indentation", "mm", "mm"),
-    "time": ("time", "s", "s"),
-    "voltage": ("voltage", "V", "V"),
-    "seconds": ("computing time", "s", "s"),
+    "force": "force per depth",
+    "width": "width",
+    "work": "energy per depth",
+    "energy": "energy per depth",
+    "dissipation": "energy per depth",
+    "pressure": "pressure",
 }
 #: columns with a name of their own in a picture
-TEXTS = {"position": "position of the bone", "seconds": "computing time"}
-#: fields of a frame: unit, and name where the underscores alone do not make one
+TEXTS = {"position": "position of the bone", "seconds": "computing time", "min_gap": "smallest gap"}
+#: fields of a frame: unit if it is not MPa, and name where the underscores alone do not make one
 FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
 FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
-#: last word of a key of a scene file -> its unit, beside those of the columns
-KEY_UNITS = {"thickness": "mm", "height": "mm", "distance": "mm", "y": "mm", "E": "MPa", "mu": "MPa"}
-KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "frequency": "Hz", "duration": "s", "amplitude": "V"}
-
-
-def column_text(name: str) -> str:
-    """A column in words, without its unit.
-
-    >>> column_text("normal_force"), column_text("position")
-    ('normal force', 'position of the bone')
-    """
-    return TEXTS.get(name, name.replace("_", " "))
-
-
-def kind_of(name: str, total: bool = False) -> tuple[str, str]:
-    """Kind and unit of a column; columns of one kind share an axis.
-
-    >>> kind_of("tangential_force"), kind_of("contact_width", total=True), kind_of("substeps")
-    (('force per depth', 'N/mm'), ('area', 'mm²'), ('substeps', ''))
-    """
-    word = name.removesuffix("_x").rsplit("_", 1)[-1]
-    kind, unit, whole = KINDS.get(word, (column_text(name), "", ""))
-    if total:
-        return ("area" if unit == "mm" and whole == "mm²" else kind), whole
-    return (f"{kind} per depth" if unit == "N/mm" else kind), unit
+#: last word of a key of a scene file -> its unit
+KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
+KEY_UNITS |= {"force": "N/mm", "voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
+KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
 
 
 def with_unit(text: str, unit: str) -> str:
@@ -68,21 +37,41 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text} ({unit})" if unit else text
 
 
-def column_label(name: str, total: bool = False) -> str:
+def column_text(name: str) -> str:
+    """A column in words, without its unit.
+
+    >>> column_text("normal_force"), column_text("position")
+    ('normal force', 'position of the bone')
+    """
+    return TEXTS.get(name, name.replace("_", " "))
+
+
+def kind_of(name: str) -> tuple[str, str]:
+    """Kind and unit of a column.
+
+    >>> kind_of("electrostatic_force_x"), kind_of("contact_width"), kind_of("substeps")
+    (('force per depth', 'N/mm'), ('width', 'mm'), ('substeps', ''))
+    """
+    word = name.removesuffix("_x").rsplit("_", 1)[-1]
+    return KINDS.get(word, column_text(name)), UNITS[name]
+
+
+def column_label(name: str) -> str:
     """A column with its unit, for an axis of its own.
 
     >>> column_label("min_gap"), column_label("step")
-    ('min gap (mm)', 'step')
+    ('smallest gap (mm)', 'step')
     """
-    text = column_text(name)
-    if total:
-        text = text.replace("width", "area")
-    return with_unit(text, kind_of(name, total)[1])
+    return with_unit(column_text(name), UNITS[name])
 
 
-def axis_label(name: str, total: bool = False) -> str:
-    """The kind of a column with its unit, for an axis that it shares."""
-    return with_unit(*kind_of(name, total))
+def axis_label(name: str) -> str:
+    """The kind of a column with its unit, for an axis that it shares.
+
+    >>> axis_label("stored_energy")
+    'energy per depth (N)'
+    """
+    return with_unit(*kind_of(name))
 
 
 def field_label(field: str) -> str:
@@ -104,14 +93,13 @@ def key_label(key: str) -> str:
     """
     parts = key.split(".")
     if parts[0] in COLUMNS and parts[0] != "motion":
-        return with_unit(", ".join([column_text(parts[0]), *parts[1:]]), kind_of(parts[0])[1])
-    word = parts[-1].rsplit("_", 1)[-1]
-    unit = KEY_UNITS.get(word, KINDS.get(word, ("", "", ""))[1])
+        return with_unit(", ".join([column_text(parts[0]), *parts[1:]]), UNITS[parts[0]])
     short = len(parts) > 1 and len(parts[-1]) <= 2
-    return with_unit(" ".join(parts[-2:] if short else parts[-1:]).replace("_", " "), unit)
+    text = " ".join(parts[-2:] if short else parts[-1:]).replace("_", " ")
+    return with_unit(text, KEY_UNITS.get(parts[-1].rsplit("_", 1)[-1], ""))
 
 
-def values_of(result: Result, name: str, total: bool = False) -> Any:
+def values_of(result: Result, name: str) -> Any:
     """A column of the history (steps,).
 
     Raises InputError for what is no column of numbers.

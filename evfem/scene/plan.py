@@ -10,6 +10,7 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -93,8 +94,9 @@ def _wrapped(begin: str, text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
 
 
-def plan(scene: Scene) -> Plan:
-    """Which terms, unknowns and solver a scene needs, and why; builds the mesh, solves nothing.
+def plan(scene: Scene | str | PathLike[str]) -> Plan:
+    """Which terms, unknowns and solver a scene needs (`Scene`, or the path of a scene file), and why;
+    builds the mesh, solves nothing.
 
     >>> from evfem import Flat, FingerPad, Press, Scene
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
@@ -102,6 +104,10 @@ def plan(scene: Scene) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import WeakForm
 from evfem.tensor import Array, ddot, dot, identity, mul, transpose
 
@@ -50,7 +50,9 @@ def form(function: WeakForm) -> Form:
     'nail_bed'
     """
     if not callable(function):
-        raise InputError("form", function, "a function (u, v, w) that returns the integrand of a residual")
+        raise InputError(
+            "form", quoted(function), "a function (u, v, w) that returns the integrand of a residual"
+        )
     return Form(function)
 
 

@@ -95,7 +95,7 @@ def test_energies_are_those_of_the_history():
     lines = lines_of(ax)
     for name, (label, _, _) in ENERGIES.items():
         assert_line(lines[label], result.step, getattr(result, name))
-    assert ax.get_ylabel() == "energy (N mm/mm)"
+    assert ax.get_ylabel() == "energy per depth (N)"
 
 
 def test_a_history_has_a_panel_for_each_kind_of_column():
