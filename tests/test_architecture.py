@@ -49,12 +49,17 @@ ROOMS = {
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file schema folder pools run",
     ),
+    "plotting": (
+        {"numpy", "scipy", "matplotlib", "PIL"},
+        "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
+        "tractions meshes movie",
+    ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "plotting", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
+    ("export", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones
@@ -62,7 +67,7 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {"skfem", "meshio", "matplotlib", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
+LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
