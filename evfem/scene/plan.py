@@ -25,6 +25,7 @@ from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
+from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
 from evfem.tissue.userforms import Trial, tried
 
@@ -261,9 +262,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         if find_spec("pypardiso")
         else "SuperLU (install evfem[fast] for PARDISO)"
     )
-    kernels = "numba" if find_spec("numba") else "numpy (install evfem[fast] for numba)"
+    cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {kernels}",
+        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

@@ -22,7 +22,7 @@ from evfem.scene.scene import Scene
 def versions() -> dict[str, str]:
     """Versions of evfem, Python and the packages that compute, as far as they are installed."""
     found = {"evfem": evfem.__version__, "python": python_version()}
-    for package in ("numpy", "scipy", "scikit-fem", "meshio", "numba", "pypardiso"):
+    for package in ("numpy", "scipy", "scikit-fem", "meshio", "pypardiso"):
         try:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
