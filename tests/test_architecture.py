@@ -40,7 +40,7 @@ ROOMS = {
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys voltage file resolution sense plan"),
     "simulation": (
         {"numpy", "threadpoolctl", "pandas"},
-        "provenance result spectrum model works ledger checkpoint run rendering",
+        "provenance history result spectrum model works ledger checkpoint run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
