@@ -17,6 +17,7 @@ __version__ = "0.2.0"
 #: module -> the public names it gives
 _NAMES = {
     "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
+    "contact.textures": ("Grating", "SelfAffine"),
     "electrostatics.laws": (
         "FILM",
         "Kaczmarek",

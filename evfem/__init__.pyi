@@ -11,6 +11,8 @@ from evfem.contact.surfaces import Display as Display
 from evfem.contact.surfaces import Flat as Flat
 from evfem.contact.surfaces import Profile as Profile
 from evfem.contact.surfaces import Sinusoid as Sinusoid
+from evfem.contact.textures import Grating as Grating
+from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
 from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals

@@ -31,7 +31,7 @@ ROOMS = {
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
+    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "

@@ -34,7 +34,9 @@ def completed(surface: Surface) -> CompleteSurface:
     if isinstance(surface, CompleteSurface):
         return surface
     if isinstance(surface, type) or not isinstance(surface, Surface):
-        allowed = "Flat, Display, Sinusoid, Profile, or an object with a method height(x)"
+        allowed = (
+            "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
+        )
         raise InputError("surface", quoted(surface), allowed)
     plain = Flat(
         getattr(surface, "friction", 0.0), getattr(surface, "y", None), getattr(surface, "insulator", None)

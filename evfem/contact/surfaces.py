@@ -45,7 +45,7 @@ FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
 
 
-class _Surface:
+class RigidSurface:
     """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
     `insulator`.
     """
@@ -139,7 +139,7 @@ class _Surface:
         raise NotImplementedError
 
 
-class _Level(_Surface):
+class _Level(RigidSurface):
     """A level surface: height, slope and curvature are zero."""
 
     is_flat = True
@@ -186,7 +186,7 @@ class Display(_Level):
 
 
 @dataclass(frozen=True)
-class Sinusoid(_Surface):
+class Sinusoid(RigidSurface):
     """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
 
     `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the
@@ -229,7 +229,7 @@ class Sinusoid(_Surface):
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Profile(_Surface):
+class Profile(RigidSurface):
     """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond
     the ends.
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem import data
 from evfem.common.checks import Within, choice, real, set_frozen
 from evfem.common.views import called, changed, short, table
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
@@ -53,6 +54,16 @@ RANGES: Mapping[str, tuple[float, float, str]] = {
 #: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
 #: inverse.
 STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
+
+#: What grows with the width of the finger from participant to participant.
+WITH_WIDTH = (
+    "nail_thickness",
+    "nail_width",
+    "bone_width",
+    "bone_offset",
+    "epidermis_thickness",
+    "dermis_thickness",
+)
 
 #: resolution -> divisions in quadratic cells; the rows of each layer stand in `LAYERS`.
 RESOLUTIONS: Mapping[str, Divisions] = {
@@ -168,6 +179,19 @@ class FingerPad:
         set_frozen(self, materials=_all_materials(self.materials))
         _check_section(self, self._section)
 
+    @classmethod
+    def participant(cls, name: str, resolution: str = "medium") -> FingerPad:
+        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as
+        measured.
+
+        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
+        moduli are Table 2's, because nobody measured them.
+
+        >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
+        (14.04, 5.05)
+        """
+        return cls(resolution=resolution, **participant_sizes(name))
+
     def __repr__(self) -> str:
         """What differs from Table 2."""
         return called("FingerPad", self._changed())
@@ -218,6 +242,16 @@ class FingerPad:
             ridges=ridges,
             divisions=RESOLUTIONS[self.resolution],
         )
+
+
+def participant_sizes(name: str) -> dict[str, Any]:
+    """Parameters of `FingerPad` that a participant of Table 1 has of his or her own (mm)."""
+    measured = data.load("table1")
+    choice("finger.participant", name, tuple(measured["participant"]))
+    width, height = measured.value(name, "a"), measured.value(name, "b")
+    sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
+    sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
+    return {"width": width, "height": height, **sizes}
 
 
 def _all_materials(own: object) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -21,9 +22,11 @@ import tomli_w
 from evfem.common.checks import MOST_STEPS
 from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
+from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
@@ -54,6 +57,7 @@ VERSION = 1
 #: largest files in bytes, and most steps of all motions together
 LARGEST_SCENE = 4 * 2**20
 LARGEST_TABLE = 64 * 2**20
+TEXTURES: Mapping[str, type] = {"grating": Grating, "self_affine": SelfAffine}
 FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
@@ -164,6 +168,8 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
             return Flat(**common) if insulator is None else Display(**common)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
+        if kind in TEXTURES:
+            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
             given = ABSENT if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
@@ -217,12 +223,16 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
     mistakes = Mistakes()
     mistakes.found += [
-        unknown(f"finger.{name}", name, [*known, "mesh", "depth"]) for name in parts if name not in known
+        unknown(f"finger.{name}", name, [*known, "participant", "mesh", "depth"])
+        for name in parts
+        if name not in (*known, "participant")
     ]
     laws, given = parts.pop("materials", {}), {name: parts[name] for name in parts if name in known}
     with mistakes.of_a_part():
-        given["materials"] = _materials(laws)
+        given["materials"] = _materials(laws, TABLE_2)
     with mistakes.of_a_part(), at("finger"):
+        if "participant" in parts:
+            given = participant_sizes(parts["participant"]) | given
         pad = FingerPad(**given, **({"electrical": skin} if electrical else {}))
     mistakes.report()
     return pad
@@ -241,7 +251,10 @@ def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) 
         return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)
 
 
-def _materials(tables: object) -> dict[str, Any]:
+def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({})) -> dict[str, Any]:
+    """The laws of the regions; one of `usual` whose table names no law is neo-Hookean, and keeps
+    the moduli that its table does not name.
+    """
     if not isinstance(tables, dict):
         raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
     laws, mistakes = {}, Mistakes()
@@ -250,6 +263,8 @@ def _materials(tables: object) -> dict[str, Any]:
         with mistakes.of_a_part(), at("finger"):
             if not isinstance(table, dict):
                 raise InputError(key, shown(table), "a table with a law and its parameters")
+            if name in usual and "law" not in table:
+                table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
             laws[name] = from_table(table, key)
     mistakes.report()
     return laws
@@ -317,8 +332,9 @@ def _law_table(region: str, law: Any) -> dict[str, Any]:
 
 
 def _surface_table(surface: Any) -> dict[str, Any]:
-    if type(surface) not in (Flat, Display, Sinusoid, Profile):
-        raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
+    if type(surface) not in (Flat, Display, Sinusoid, Profile, *TEXTURES.values()):
+        allowed = "Flat, Display, Sinusoid, Profile, Grating or SelfAffine, for a file"
+        raise InputError("surface", type(surface).__name__, allowed)
     friction = (
         surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
     )
@@ -327,6 +343,10 @@ def _surface_table(surface: Any) -> dict[str, Any]:
         return {"kind": "flat", **table}
     if type(surface) is Sinusoid:
         return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
+    for kind, cls in TEXTURES.items():
+        if type(surface) is cls:
+            own = {name: value for name, value in _changed(surface).items() if name != "insulator"}
+            return {"kind": kind, **own, **table}
     rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
     return {"kind": "profile", **table, "points": [list(row) for row in rows]}
 

@@ -56,7 +56,9 @@ class SceneTable(Table):
 
     version: int
     finger: dict[str, Any] = optional("a table [finger]", {})
-    surface: dict[str, Any] = required("a table [surface] with a kind: flat | sinusoid | profile")
+    surface: dict[str, Any] = required(
+        "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"
+    )
     electrostatics: dict[str, Any] | None = optional("a table [electrostatics]")
     solver: dict[str, Any] = optional("a table [solver]", {})
     output: dict[str, Any] = optional("a table [output]", {})
@@ -106,6 +108,29 @@ class ProfileTable(FlatTable):
     points: list[list[float]] | None = optional("rows [[x, height], ...] in mm")
 
 
+class GratingTable(FlatTable):
+    """[surface] of the kind grating."""
+
+    kind: Literal["grating"]  # type: ignore[assignment]
+    period: float = required("a length in mm, larger than 0")
+    groove_depth: float = required("a depth in mm, larger than 0")
+    groove_width: float | None = optional("a width in mm at half depth, below the period")
+    wall_width: float | None = optional("a width in mm up to that of ridge and groove")
+    phase: float = optional("a part of the period, -1 to 1", 0.0)
+
+
+class SelfAffineTable(FlatTable):
+    """[surface] of the kind self_affine."""
+
+    kind: Literal["self_affine"]  # type: ignore[assignment]
+    hurst: float = required("a Hurst exponent from 0 to 1")
+    rms: float = required("a root mean square height in mm, larger than 0")
+    period: float = optional("a length in mm after which it repeats", 10.0)
+    shortest: float = optional("a wavelength in mm up to the longest", 0.2)
+    longest: float | None = optional("a wavelength in mm up to the period")
+    seed: int = optional("a whole number, not negative", 0)
+
+
 class ElectrostaticsTable(Table):
     """[electrostatics]."""
 
@@ -133,6 +158,8 @@ SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
     "sinusoid": SinusoidTable,
     "profile": ProfileTable,
+    "grating": GratingTable,
+    "self_affine": SelfAffineTable,
 }
 MOTIONS: Mapping[str, tuple[type[Table], type]] = {
     cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp, Wait)

@@ -1,5 +1,8 @@
 """Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
 enough; and whether the steps are short enough to follow a voltage over time.
+
+Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
+node to node: five nodes miss a fifth.
 """
 
 from __future__ import annotations
@@ -9,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.contact.textures import SelfAffine
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
@@ -19,6 +23,8 @@ from evfem.scene.scene import Scene
 MISSED = 0.2
 #: share of a profile's slope (root mean square) that may be too fine for the nodes
 ROUGH = 0.5
+#: nodes that the shortest wave of roughness needs
+PER_WAVE = 5.0
 #: samples of the profile per node spacing, and at most
 PER_SPACING, MOST = 8, 200_000
 #: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
@@ -38,6 +44,12 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
         return None
     ends = mesh.points[mesh.edges_of("pad")[:, :2]]
     spacing = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T))) / mesh.order
+    if isinstance(scene.surface, SelfAffine) and scene.surface.shortest < PER_WAVE * spacing:
+        return (
+            f"the shortest waves of the surface ({scene.surface.shortest:g} mm) have fewer than "
+            f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
+            f"shortest wave of {PER_WAVE * spacing:.2g} mm"
+        )
     x = way(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))

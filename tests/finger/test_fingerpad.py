@@ -427,3 +427,25 @@ def test_meshed_finger_raises_its_mesh_and_wants_every_material():
         MeshedFinger(linear, {**laws, "skin": laws["nail"]})
     with pytest.raises(InputError, match=r"solver\.element"):
         MeshedFinger(FingerPad(resolution="coarse").mesh(2), laws).mesh(1)
+
+
+def test_participants_are_as_wide_and_high_as_measured_and_scaled():
+    measured, usual = data.load("table1"), FingerPad()
+    for i, name in enumerate(measured["participant"]):
+        finger = FingerPad.participant(name, "coarse")
+        points = finger.mesh(1).points
+        assert np.ptp(points[:, 0]) == pytest.approx(measured["a"][i], abs=1e-12)
+        assert np.ptp(points[:, 1]) == pytest.approx(measured["b"][i], abs=1e-12)
+        # the shares that bone and layers have of Table 2's finger
+        for key in ("bone_width", "nail_width", "dermis_thickness"):
+            share = getattr(finger, key) / finger.width
+            assert share == pytest.approx(getattr(usual, key) / usual.width, rel=1e-12)
+        assert finger.bone_height / finger.height == pytest.approx(usual.bone_height / usual.height)
+        assert (finger.ridge_height, finger.stratum_corneum_thickness) == (0.15, 0.38)
+        assert (finger.materials, finger.resolution) == (usual.materials, "coarse")
+
+
+def test_an_unknown_participant_is_refused():
+    for name in ("xii", 3):
+        with pytest.raises(InputError, match=r"finger\.participant: given .*; allowed: i \| ii \| iii"):
+            FingerPad.participant(name)

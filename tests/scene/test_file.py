@@ -8,6 +8,7 @@ import pytest
 from tools.meshes import square_mesh
 
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -180,6 +181,21 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
     assert scene.air_layer is False
 
 
+def test_a_participant_of_table_1_may_stand_in_a_file():
+    """Other keys say what is different from it."""
+    text = SHORT + "[finger]\nparticipant = 'iii'\nresolution = 'coarse'\nbone_offset = 0.5\n"
+    assert loads(text).finger == replace(FingerPad.participant("iii", "coarse"), bone_offset=0.5)
+
+
+def test_a_material_of_table_2_may_be_changed_in_one_of_its_moduli():
+    text = SHORT + "[finger.materials]\ndermis.E = 0.06\nnail.nu = 0.2\nhypodermis.viscosity = 0.1\n"
+    laws = loads(text).finger.materials
+    assert laws["dermis"] == NeoHookean(E=0.06, nu=0.48)
+    assert laws["nail"] == NeoHookean(E=17.0, nu=0.2)
+    assert laws["hypodermis"] == NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
+    assert laws["epidermis"] == FingerPad().materials["epidermis"]
+
+
 def scenes(folder):
     """Scenes that use everything a file can hold."""
     laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
@@ -203,9 +219,13 @@ def scenes(folder):
         solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
         output=Output(3),
     )
+    grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
+    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press])
+    rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
+    yield Scene(FingerPad(), rough, motion=[press])
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("number", range(7))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
@@ -288,6 +308,21 @@ WRONG = [
     (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", 'given "flat"'),
     (SHORT, "kind = 'flat'", "", "surface.kind", "flat | sinusoid | profile"),
     (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", 'given "round"'),
+    (SHORT, "kind = 'flat'", "kind = 'grating'", "surface.period", "missing; allowed: a length in mm"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
+        "surface.hurst",
+        "given 2.0; allowed: a Hurst exponent from 0 to 1",
+    ),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 0.5\nrms = 0.01\nseed = 0.5",
+        "surface.seed",
+        "given 0.5",
+    ),
     (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
@@ -342,6 +377,7 @@ WRONG = [
         "finger.materials.dermis",
         "given 3",
     ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nparticipant = 'xx'", "finger.participant", "i | ii |"),
     (
         SHORT,
         "force = 0.05",
