@@ -41,7 +41,7 @@ FIELDS = ("von_mises", *STRESSES, "J", "displacement", *POINT_FIELDS)
 
 
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
+    """Normal, tangential, applied and electrostatic force (N/mm, of a total N) over `over`.
 
     `over` is step, position, time, indentation or voltage; None takes the position if it changes
     in every step, the time if the finger waits, else the step, with the motions marked. A force
@@ -62,7 +62,8 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     if over == "step":
         _mark_motions(ax, result)
     ax.set_xlabel(ABSCISSAE[over])
-    ax.set_ylabel("force per depth (N/mm)")
+    unit = result.units["normal_force"]
+    ax.set_ylabel("force (N)" if unit == "N" else f"force per depth ({unit})")
     ax.grid(alpha=0.3)
     ax.legend()
     return ax

@@ -154,3 +154,11 @@ def test_matplotlib_is_loaded_only_when_something_is_drawn_and_pyplot_never(tmp_
     command = [sys.executable, "-c", f"import sys; sys.path[:0] = {sys.path!r}\n{code}"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
+
+
+def test_a_total_is_drawn_in_newtons():
+    result = fake_result(provenance={"scene": {"name": "fake", "total_steps": 4, "depth": 10.0}})
+    labels = [forces(r).get_ylabel() for r in (result, result.total)]
+    assert labels == ["force per depth (N/mm)", "force (N)"]
+    (line,) = (line for line in forces(result.total).lines if line.get_label().startswith("normal"))
+    np.testing.assert_array_equal(line.get_ydata(), 10.0 * result.normal_force)
