@@ -142,7 +142,8 @@ def whole(most: int = MOST_STEPS) -> dict[str, Any]:
 
 def one_of(*names: str) -> dict[str, Any]:
     """Metadata of a field that is one of `names`."""
-    return {"allowed": " | ".join(names), "check": lambda key, value: choice(key, value, names)}
+    check = lambda key, value: choice(key, value, names)  # noqa: E731
+    return {"allowed": " | ".join(names), "check": check, "names": names}
 
 
 def check_fields(target: Any) -> None:
