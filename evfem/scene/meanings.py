@@ -150,7 +150,11 @@ STRATEGY = {
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
 }
-OUTPUT = {"every": Text("", "fields of every n-th step, and of the last one")}
+OUTPUT = {
+    "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),
+    "precision": Text("", "of the fields; without it single where they would take more than 25 MB"),
+    "compression": Text("", "of the fields' files: a third of the size, slower to write"),
+}
 _STEPS, _HOLD = Text("", "in how many equal parts"), Text("", "what stays as it is")
 MOTION = {
     "press": {
