@@ -3,7 +3,6 @@ arrives.
 """
 
 import io
-import logging
 import os
 import pty
 import re
@@ -11,7 +10,6 @@ import struct
 import sys
 import termios
 from fcntl import ioctl
-from importlib.util import find_spec
 from subprocess import Popen
 
 import pytest
@@ -205,40 +203,6 @@ def test_notices_are_shown_once_and_the_logger_is_left_as_it_was(capsys):
         notices.LOG.info("unheard too")
     assert capsys.readouterr().err == "evfem: one line\n"
     assert (notices.LOG.level, notices.LOG.handlers) == before
-
-
-def test_compiling_is_told_once():
-    """A loop of the package says that it is compiled, one of others does not, without numba
-    nobody.
-    """
-    if find_spec("numba") is None:
-        return
-    from evfem.tissue.kernels import lanes
-
-    def ours(x):
-        return x + 1
-
-    def theirs(x):
-        return x - 1
-
-    ours.__module__, theirs.__module__ = "evfem.tissue.kernels.elastic", "elsewhere"
-    heard = []
-    handler = logging.Handler()
-    handler.emit = heard.append
-    from numba import njit
-
-    said, lanes.COMPILING.said = lanes.COMPILING.said, False
-    try:
-        with notices.listening(handler, logging.INFO):
-            njit(theirs)(1)
-            assert heard == []
-            njit(ours)(1)
-            njit(ours)(1.0)
-    finally:
-        lanes.COMPILING.said = said
-    assert [record.getMessage() for record in heard] == [
-        "compiling the element loops, once after an installation: up to a minute"
-    ]
 
 
 def test_shells_can_complete():

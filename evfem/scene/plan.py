@@ -25,6 +25,7 @@ from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
+from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
 from evfem.tissue.userforms import Trial, tried
 
@@ -160,6 +161,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     # a modulus in kPa is seen here
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
+    deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
     share = rigid_share(scene, mesh)
     if share is not None and share < RIGID_BELOW:
         return Term(
@@ -168,7 +170,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     return Term(
         "tissue",
         True,
-        f"{laws}, plane strain, {stiffness}"
+        f"{laws}, plane strain{deep}, {stiffness}"
         + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
     )
 
@@ -261,9 +263,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         if find_spec("pypardiso")
         else "SuperLU (install evfem[fast] for PARDISO)"
     )
-    kernels = "numba" if find_spec("numba") else "numpy (install evfem[fast] for numba)"
+    cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {kernels}",
+        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

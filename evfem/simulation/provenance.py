@@ -22,7 +22,7 @@ from evfem.scene.scene import Scene
 def versions() -> dict[str, str]:
     """Versions of evfem, Python and the packages that compute, as far as they are installed."""
     found = {"evfem": evfem.__version__, "python": python_version()}
-    for package in ("numpy", "scipy", "scikit-fem", "meshio", "numba", "pypardiso"):
+    for package in ("numpy", "scipy", "scikit-fem", "meshio", "pypardiso"):
         try:
             found[package] = metadata.version(package)
         except metadata.PackageNotFoundError:
@@ -50,7 +50,12 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
         parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
     return {
         **origin(),
-        "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
+        "scene": {
+            "name": scene.name,
+            "digest": scene.digest(),
+            "total_steps": scene.total_steps,
+            "depth": scene.depth,
+        },
         "parameters": parameters,
         "mesh": {
             "digest": digest(mesh),

@@ -43,6 +43,7 @@ from evfem.solver.control import (
 )
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
+from evfem.tissue.kernels.blocks import loops
 
 ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
 
@@ -276,6 +277,7 @@ class Run:
             "cuts": self.stepper.cuts,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
+            "cell_loops": "numpy" if loops() is None else "compiled",
         }
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)

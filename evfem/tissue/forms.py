@@ -6,7 +6,7 @@ tensor axes first, then those of the points. Its nodal forces and their tangent 
 `evfem.tissue.assembly`.
 
 `neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop
-of evfem[fast] does; those loops are tested against them. The attraction's form stands beside its
+does; those loops are tested against them. The attraction's form stands beside its
 nodal rule, in `evfem.contact.attraction`.
 """
 
