@@ -49,12 +49,12 @@ ROOMS = {
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file schema folder pools run",
     ),
+    "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
-        "tractions meshes movie",
+        "fits tractions meshes movie",
     ),
-    "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
