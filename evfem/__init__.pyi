@@ -14,6 +14,7 @@ from evfem.contact.surfaces import Sinusoid as Sinusoid
 from evfem.contact.textures import Grating as Grating
 from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
+from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
@@ -26,6 +27,7 @@ from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal
 from evfem.electrostatics.signals import Amplifier as Amplifier
+from evfem.electrostatics.signals import FollowForce as FollowForce
 from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
@@ -40,6 +42,7 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
 from evfem.scene import file as _scene_file

@@ -191,7 +191,7 @@ def _present(path: Path) -> list[str]:
 def _picture(result: Result, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from evfem.plotting import forces
+    from evfem.plotting.curves import forces
 
     with replacing(path) as temporary:
         figure = forces(result).figure

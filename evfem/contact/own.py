@@ -10,7 +10,7 @@ import numpy as np
 
 from evfem.common.checks import set_frozen
 from evfem.contact.surfaces import Flat
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import CompleteSurface, Surface
 from evfem.tensor import Array, derivative, difference
 
@@ -37,7 +37,7 @@ def completed(surface: Surface) -> CompleteSurface:
         allowed = (
             "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
         )
-        raise InputError("surface", surface, allowed)
+        raise InputError("surface", quoted(surface), allowed)
     plain = Flat(
         getattr(surface, "friction", 0.0), getattr(surface, "y", None), getattr(surface, "insulator", None)
     )

@@ -24,7 +24,7 @@ from evfem.common.checks import real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Layer
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -61,7 +61,7 @@ class RigidSurface:
             allowed = "a height within 1e3 mm, or None for first touch at the start"
             set_frozen(self, y=real("surface.y", self.y, allowed, lambda y: abs(y) <= HIGHEST))
         if not (self.insulator is None or isinstance(self.insulator, Layer)):
-            raise InputError("surface.insulator", self.insulator, "Layer(thickness, eps_r), or None")
+            raise InputError("surface.insulator", quoted(self.insulator), "Layer(thickness, eps_r), or None")
 
     @property
     def has_friction(self) -> bool:
@@ -206,7 +206,7 @@ class Sinusoid(RigidSurface):
         terms = EQUATION_25 if self.terms is None else self.terms
         rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
         if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
-            raise InputError("surface.terms", terms, TERMS)
+            raise InputError("surface.terms", quoted(terms), TERMS)
         set_frozen(self, terms=rows)
 
     def _sum(self, x: Array, order: int) -> Array:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,10 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import count, real, set_frozen
 from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS
-from evfem.electrostatics import hjif, wav
+from evfem.electrostatics import hjif, timesignals, wav
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
-from evfem.errors import InputError, readable
+from evfem.electrostatics.timesignals import Sampled
+from evfem.errors import ABSENT, InputError, quoted, readable
 
 MAP_FORM = "evfem-friction-map-1"
 MOST_COLUMNS, ROWS = 100_000, 64
@@ -102,7 +104,7 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     True
     """
     if not isinstance(profile, VoltageProfile):
-        raise InputError("profile", profile, "a VoltageProfile")
+        raise InputError("profile", quoted(profile), "a VoltageProfile")
     ending = Path(path).suffix.lower()
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
@@ -141,6 +143,17 @@ def read_signal(path: str | Path) -> VoltageProfile:
     return VoltageProfile.from_csv(path)
 
 
+def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
+    """The voltage in a file: over time in a csv file with the header ``time,voltage``, else over
+    the position (`read_signal`).
+    """
+    path = Path(path)
+    with suppress(OSError, UnicodeDecodeError), path.open(encoding="utf-8-sig") as lines:
+        if [cell.strip() for cell in lines.readline(100).split(",")] == timesignals.HEADER:
+            return Sampled.from_csv(path)
+    return read_signal(path)
+
+
 def _check_fit(profile: VoltageProfile, playback: Playback) -> None:
     largest = float(np.max(np.abs(profile.voltage)))
     if largest > playback.full_scale:
@@ -152,7 +165,7 @@ def _too_much(given: str, playback: Playback) -> InputError:
 
 
 def _missing(key: str, what: str, ending: str) -> InputError:
-    return InputError(key, "nothing", f"{what}, needed for {ending}")
+    return InputError(key, ABSENT, f"{what}, needed for {ending}")
 
 
 def _hjif(profile: VoltageProfile, playback: Playback) -> str:

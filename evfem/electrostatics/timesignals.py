@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.checks import Values, above, check_fields, number, plain, real, set_frozen
+from evfem.common.checks import Values, Within, above, check_fields, number, plain, real, set_frozen
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, read_columns
 from evfem.electrostatics import wav
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError, quoted
 from evfem.protocols import TimeSignal
 
 HEADER = ["time", "voltage"]
@@ -39,12 +39,12 @@ POWER = 0.95
 #: largest difference of two spacings of evenly spaced times, as a share of the spacing
 EVEN = 1e-3
 
-_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", lambda f: 0.0 < f <= FASTEST)
-_AMPLITUDE = number(f"a voltage in V from 0 to {LARGEST:g}", lambda u: 0.0 <= u <= LARGEST)
-_BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", lambda u: abs(u) <= LARGEST)
-_PHASE = number("a phase in rad", lambda phase: True)
-_RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", lambda f: 0.0 < f <= FASTEST)
-_START = number("a time in s", lambda t: True)
+_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
+_AMPLITUDE = number(f"a voltage in V from 0 to {LARGEST:g}", Within(0.0, LARGEST))
+_BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-LARGEST, LARGEST))
+_PHASE = number("a phase in rad", Within())
+_RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
+_START = number("a time in s", Within())
 _ENVELOPE = "a voltage in V, or a signal in time that is called with times"
 
 
@@ -106,10 +106,10 @@ class Carrier:
     def __post_init__(self) -> None:
         check_fields(self)
         if not isinstance(self.envelope, TimeSignal):
-            envelope = real("envelope", self.envelope, _ENVELOPE, lambda u: 0.0 <= u <= LARGEST)
+            envelope = real("envelope", self.envelope, _ENVELOPE, Within(0.0, LARGEST))
             set_frozen(self, envelope=envelope)
         if not isinstance(self.resolved, bool):
-            raise InputError("resolved", self.resolved, "true or false")
+            raise InputError("resolved", quoted(self.resolved), "true or false")
 
     @property
     def largest(self) -> float:
@@ -160,7 +160,7 @@ class Sampled:
         if np.abs(voltage).max() > LARGEST:
             raise InputError("voltage", f"{voltage[np.argmax(np.abs(voltage))]:g}", _BIAS["allowed"])
         if not isinstance(self.repeat, bool):
-            raise InputError("repeat", self.repeat, "true or false")
+            raise InputError("repeat", quoted(self.repeat), "true or false")
         set_frozen(self, voltage=voltage)
 
     def __repr__(self) -> str:
@@ -226,7 +226,7 @@ class Sampled:
         volts = wav.full_scale(data) if full_scale is None else full_scale
         if volts is None:
             needed = "the voltage of the largest sample, in V, for a WAV that evfem did not write"
-            raise InputError("full_scale", "nothing", needed)
+            raise InputError("full_scale", ABSENT, needed)
         return cls(shares * above("full_scale", volts, 0.0, "a voltage in V above zero"), rate, start, repeat)
 
     def to_csv(self, path: str | Path) -> None:

@@ -33,7 +33,7 @@ from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.signals import FollowForce
-from evfem.errors import InputError, NotConverged
+from evfem.errors import InputError, NotConverged, quoted
 from evfem.fast.memory import CondensedPad, Kept
 from evfem.fast.step import RememberedPad
 from evfem.fast.training import Memory, check_shapes, remember
@@ -89,7 +89,7 @@ def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE, progress: bo
     _check_scene(scene)
     for key, count in (("press", press), ("slide", slide)):
         if not (isinstance(count, int) and 1 <= count <= 100):
-            raise InputError(key, count, "a number of equilibria from 1 to 100")
+            raise InputError(key, quoted(count), "a number of equilibria from 1 to 100")
     _check_training(scene)
     bar = notices.bar(scene.total_steps, "step", wanted=progress)
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress), bar:
@@ -146,9 +146,9 @@ class FastModel:
         """
         parts = self._parts_for(scene)
         if not (isinstance(checks, int) and 0 <= checks <= scene.total_steps):
-            raise InputError("checks", checks, "a number of steps from 0 to all of the scene's")
+            raise InputError("checks", quoted(checks), "a number of steps from 0 to all of the scene's")
         if not 0.0 < tolerance < np.inf:
-            raise InputError("tolerance", tolerance, "a relative error larger than 0")
+            raise InputError("tolerance", quoted(tolerance), "a relative error larger than 0")
         with threadpool_limits(limits=scene.solver.threads):
             run = FastRun(self.memory.pad, scene, *parts)
             try:
@@ -386,13 +386,13 @@ def _identity(scene: Scene) -> dict[str, str]:
 def _check_scene(scene: Scene) -> None:
     """Refuse what the fast model cannot stand for."""
     if not isinstance(scene, Scene):
-        raise InputError("scene", scene, "a Scene")
+        raise InputError("scene", quoted(scene), "a Scene")
     if not scene.ground.is_flat:
         raise InputError("surface", type(scene.surface).__name__, "a flat surface with the fast model")
     if scene.solver.dynamics != "quasistatic":
-        raise InputError("solver.dynamics", scene.solver.dynamics, "quasistatic with the fast model")
+        raise InputError("solver.dynamics", quoted(scene.solver.dynamics), "quasistatic with the fast model")
     if scene.solver.contact != "exact":
-        raise InputError("solver.contact", scene.solver.contact, "exact with the fast model")
+        raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
     if isinstance(scene.voltage, FollowForce):

@@ -12,6 +12,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
+from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -23,7 +24,7 @@ from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
-from evfem.errors import InputError, StorageError
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
@@ -42,13 +43,13 @@ from evfem.scene.keys import (
     at,
     check_size,
     columns,
+    kind_of,
     parse,
     shown,
-    unknown,
 )
 from evfem.scene.motion import Motion, VoltageRamp
-from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Scene, Solver
-from evfem.scene.voltage import read_voltage, voltage_keys
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.scene.voltage import voltage_keys, voltage_of
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LAWS, from_table
 
@@ -69,6 +70,13 @@ def load(path: str | Path) -> Scene:
     return loads(read_text("scene", path), path.parent, path.stem)
 
 
+def scene_at(path: object) -> Scene:
+    """The scene in the file at a path, where a scene or a path was asked for."""
+    if not isinstance(path, (str, PathLike)):
+        raise InputError("scene", path, "a Scene, or the path of a scene file")
+    return load(Path(path))
+
+
 def read_text(key: str, path: Path) -> str:
     """The text of a TOML file; errors call the file `key`."""
     check_size(key, path, LARGEST_SCENE)
@@ -87,7 +95,7 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML") from error
     if tables.get("version") != VERSION or isinstance(tables["version"], bool):
-        given = shown(tables["version"]) if "version" in tables else "nothing"
+        given = shown(tables["version"]) if "version" in tables else ABSENT
         raise InputError("version", given, f"version = {VERSION}")
     return tables
 
@@ -95,32 +103,32 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
 def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     """The scene in a TOML text; relative paths in it start at `folder`.
 
+    Mistakes in different tables, or at different keys of one, are reported at once.
+
     >>> text = "version = 1\\n[surface]\\nkind = 'flat'\\n[[motion]]\\nkind = 'press'\\nforce = 0.05\\n"
     >>> loads(text).motion
     (Press(force=0.05, indentation=None, steps=10, speed=None),)
     """
     tables = tables_of("scene", text)
     top = parse(SceneTable, tables, "")
-    folder = Path(folder)
-    table = top.electrostatics
-    electrostatics = None if table is None else parse(ElectrostaticsTable, table, "electrostatics")
-    motion = [_motion(table, f"motion[{i}]") for i, table in enumerate(top.motion)]
-    if (total := sum(one.steps for one in motion)) > MOST_STEPS:
-        raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
-    law, voltage = _law_and_voltage(electrostatics, motion, folder)
-    return Scene(
-        finger=_finger(top.finger, folder),
-        surface=_surface(top.surface, folder, electrostatics),
-        law=law,
-        voltage=voltage,
-        motion=motion,
-        air_layer=electrostatics.air_layer if electrostatics else True,
-        direction=electrostatics.direction if electrostatics else DIRECTIONS[0],
-        coupling=electrostatics.coupling if electrostatics else COUPLINGS[0],
-        solver=_solver(parse(SolverTable, top.solver, "solver")),
-        output=_build(Output, parse(OutputTable, top.output, "output"), "output"),
-        name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")),
-    )
+    folder, mistakes, electrostatics = Path(folder), Mistakes(), None
+    parts: dict[str, Any] = {}
+    with mistakes.of_a_part():
+        parts["finger"] = _finger(top.finger, folder)
+    with mistakes.of_a_part():
+        if top.electrostatics is not None:
+            electrostatics = parse(ElectrostaticsTable, top.electrostatics, "electrostatics")
+            parts |= _attraction(electrostatics, top.motion, folder)
+    with mistakes.of_a_part():
+        parts["surface"] = _surface(top.surface, folder, electrostatics)
+    with mistakes.of_a_part():
+        parts["motion"] = _motions(top.motion)
+    with mistakes.of_a_part():
+        parts["solver"] = _solver(parse(SolverTable, top.solver, "solver"))
+    with mistakes.of_a_part():
+        parts["output"] = _build(Output, parse(OutputTable, top.output, "output"), "output")
+    mistakes.report()
+    return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 
 
 def _solver(table: Any) -> Solver:
@@ -135,22 +143,20 @@ def _build(cls: type, table: Table, prefix: str) -> Any:
         return cls(**values)
 
 
-def _motion(table: Mapping[str, Any], prefix: str) -> Motion:
-    kind = table.get("kind", "nothing")
-    if not isinstance(kind, str) or kind not in MOTIONS:
-        raise InputError(f"{prefix}.kind", _plain(kind), " | ".join(MOTIONS))
-    model, cls = MOTIONS[kind]
-    return _build(cls, parse(model, table, prefix), prefix)
-
-
-def _plain(value: object) -> str:
-    return value if isinstance(value, str) else shown(value)
+def _motions(tables: list[dict[str, Any]]) -> list[Motion]:
+    mistakes, motions = Mistakes(), []
+    for i, table in enumerate(tables):
+        with mistakes.of_a_part():
+            model, cls = MOTIONS[kind_of(table, f"motion[{i}]", MOTIONS)]
+            motions.append(_build(cls, parse(model, table, f"motion[{i}]"), f"motion[{i}]"))
+    mistakes.report()
+    if (total := sum(one.steps for one in motions)) > MOST_STEPS:
+        raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
+    return motions
 
 
 def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any:
-    kind = table.get("kind", "nothing")
-    if not isinstance(kind, str) or kind not in SURFACES:
-        raise InputError("surface.kind", _plain(kind), " | ".join(SURFACES))
+    kind = kind_of(table, "surface", SURFACES)
     parsed: Any = parse(SURFACES[kind], table, "surface")
     insulator = None if electrostatics is None else _insulator(electrostatics)
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
@@ -162,7 +168,7 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
         if kind in TEXTURES:
             return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
-            given = "nothing" if parsed.file is None else "file and points"
+            given = ABSENT if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
         if parsed.points is not None:
             return Profile(*columns("surface.points", parsed.points), **common)
@@ -180,23 +186,26 @@ def _insulator(table: ElectrostaticsTable) -> Layer:
                 given = f"{value:g} beside insulator = {table.insulator}"
                 raise InputError(f"electrostatics.{name}", given, "one of the two")
         return INSULATORS[table.insulator]
+    mistakes = Mistakes()
     for name, value in own.items():
-        if value is None:
-            allowed = ElectrostaticsTable.model_fields[name].description
-            others = " | ".join(INSULATORS)
-            raise InputError(f"electrostatics.{name}", "nothing", f"{allowed}; or insulator = {others}")
+        with mistakes.of_a_part():
+            if value is None:
+                allowed = ElectrostaticsTable.model_fields[name].description
+                others = " | ".join(INSULATORS)
+                raise InputError(f"electrostatics.{name}", ABSENT, f"{allowed}; or insulator = {others}")
+    mistakes.report()
     prefix = "electrostatics.insulator_"
     with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
         return Layer(*own.values())
 
 
-def _law_and_voltage(table: Any, motion: list[Motion], folder: Path) -> tuple[Any, Any]:
-    if table is None:
-        return None, 0.0
+def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
+    """What a table [electrostatics] says of a scene."""
     with at("electrostatics"):
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
-    ramped = any(isinstance(one, VoltageRamp) for one in motion)
-    return law, read_voltage(table, not ramped, folder)
+    ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
+    same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
+    return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:
@@ -208,18 +217,22 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     skin = _build(Electrical, parsed, "finger.electrical")
     if "mesh" in parts:
         return _meshed_finger(parts, skin, folder)
-    known = [spec.name for spec in fields(FingerPad) if spec.init]
-    for name in parts:
-        if name not in (*known, "participant"):
-            raise unknown(f"finger.{name}", name, [*known, "participant", "mesh"])
-    if "participant" in parts:
-        parts = participant_sizes(parts.pop("participant")) | parts
-    if "materials" in parts:
-        parts["materials"] = _materials(parts["materials"], TABLE_2)
-    if electrical:
-        parts["electrical"] = skin
-    with at("finger"):
-        return FingerPad(**parts)
+    known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
+    mistakes = Mistakes()
+    mistakes.found += [
+        unknown(f"finger.{name}", name, [*known, "participant", "mesh"])
+        for name in parts
+        if name not in (*known, "participant")
+    ]
+    laws, given = parts.pop("materials", {}), {name: parts[name] for name in parts if name in known}
+    with mistakes.of_a_part():
+        given["materials"] = _materials(laws, TABLE_2)
+    with mistakes.of_a_part(), at("finger"):
+        if "participant" in parts:
+            given = participant_sizes(parts["participant"]) | given
+        pad = FingerPad(**given, **({"electrical": skin} if electrical else {}))
+    mistakes.report()
+    return pad
 
 
 def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) -> MeshedFinger:
@@ -241,15 +254,16 @@ def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({}
     """
     if not isinstance(tables, dict):
         raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
-    laws = {}
+    laws, mistakes = {}, Mistakes()
     for name, table in tables.items():
         key = f"finger.materials.{name}"
-        if not isinstance(table, dict):
-            raise InputError(key, shown(table), "a table with a law and its parameters")
-        if name in usual and "law" not in table:
-            table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
-        with at("finger"):
+        with mistakes.of_a_part(), at("finger"):
+            if not isinstance(table, dict):
+                raise InputError(key, shown(table), "a table with a law and its parameters")
+            if name in usual and "law" not in table:
+                table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
             laws[name] = from_table(table, key)
+    mistakes.report()
     return laws
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -14,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
 from evfem.electrostatics.laws import INSULATORS
-from evfem.errors import InputError, readable
+from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
 from evfem.solver.strategy import Strategy
@@ -170,20 +169,27 @@ T = TypeVar("T", bound=Table)
 
 
 def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
-    """The checked table, or the first mistake in it; an unknown key comes before what it may stand
-    for.
+    """The checked table, or all mistakes in it, one of each key: first unknown keys, then others but
+    the lack of what an unknown one may stand for.
     """
     try:
         return model.model_validate(table)
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=False)
-    first = min(found, key=lambda e: e["type"] != "extra_forbidden")
-    name, *deeper = first["loc"]
-    key = _join(prefix, str(name)) + "".join(f"[{part}]" for part in deeper if isinstance(part, int))
-    if first["type"] == "extra_forbidden":
-        raise unknown(key, str(name), list(model.model_fields))
-    allowed = model.model_fields[str(name)].description or "another value"
-    raise InputError(key, "nothing" if first["type"] == "missing" else shown(first["input"]), allowed)
+    known = list(model.model_fields)
+    mistakes: dict[str, InputError] = {}
+    meant: set[str] = set()
+    for one in sorted(found, key=lambda e: e["type"] != "extra_forbidden"):
+        name, *deeper = map(str, one["loc"])
+        key = _join(prefix, name) + "".join(f"[{part}]" for part in deeper if part.isdecimal())
+        if one["type"] == "extra_forbidden":
+            mistakes[name] = unknown(key, name, known)
+            meant |= {*near(name, known)}
+        elif name not in mistakes and not (one["type"] == "missing" and name in meant):
+            given = ABSENT if one["type"] == "missing" else shown(one["input"])
+            allowed = model.model_fields[name].description or "another value"
+            mistakes[name] = InputError(key, given, allowed)
+    raise together(list(mistakes.values()))
 
 
 def check_size(key: str, path: Path, most: int) -> None:
@@ -208,11 +214,13 @@ def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]
     return [row[0] for row in rows], [row[1] for row in rows]
 
 
-def unknown(key: str, name: str, known: list[str]) -> InputError:
-    """The error for a key that does not exist, with the one that may have been meant."""
-    close = difflib.get_close_matches(name[:40], known, n=1)
-    hint = f"{close[0]}? (" if close else ""
-    return InputError(key, "an unknown key", hint + ", ".join(known) + (")" if close else ""))
+def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any]) -> str:
+    """The kind that a table says it is, one of `kinds`."""
+    kind = table.get("kind", ABSENT)
+    if not isinstance(kind, str) or kind not in kinds:
+        given = ABSENT if kind is ABSENT else shown(kind)
+        raise InputError(f"{prefix}.kind", given, " | ".join(kinds))
+    return kind
 
 
 def _join(prefix: str, name: str) -> str:
@@ -235,7 +243,13 @@ def at(prefix: str, **renamed: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        key = renamed.get(error.key.replace(" ", "_").replace(".", "_"), error.key)
-        key = key if _table_of(key) == _table_of(prefix) else _join(prefix, key)
-        given = error.given if isinstance(error.given, str) else shown(error.given)
-        raise InputError(key, given, error.allowed) from error
+        raise together([_moved(one, prefix, renamed) for one in error.mistakes]) from error
+
+
+def _moved(mistake: InputError, prefix: str, renamed: Mapping[str, str]) -> InputError:
+    key = renamed.get(mistake.key.replace(" ", "_").replace(".", "_"), mistake.key)
+    key = key if _table_of(key) == _table_of(prefix) else _join(prefix, key)
+    given = (
+        mistake.given if mistake.given is ABSENT or isinstance(mistake.given, str) else shown(mistake.given)
+    )
+    return InputError(key, given, mistake.allowed)

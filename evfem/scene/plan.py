@@ -10,6 +10,7 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
+from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
 from evfem.tissue.userforms import Trial, tried
 
@@ -93,8 +95,9 @@ def _wrapped(begin: str, text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
 
 
-def plan(scene: Scene) -> Plan:
-    """Which terms, unknowns and solver a scene needs, and why; builds the mesh, solves nothing.
+def plan(scene: Scene | str | PathLike[str]) -> Plan:
+    """Which terms, unknowns and solver a scene needs (`Scene`, or the path of a scene file), and why;
+    builds the mesh, solves nothing.
 
     >>> from evfem import Flat, FingerPad, Press, Scene
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
@@ -102,6 +105,10 @@ def plan(scene: Scene) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 
@@ -255,9 +262,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         if find_spec("pypardiso")
         else "SuperLU (install evfem[fast] for PARDISO)"
     )
-    kernels = "numba" if find_spec("numba") else "numpy (install evfem[fast] for numba)"
+    cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {kernels}",
+        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

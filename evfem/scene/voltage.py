@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
 
 from evfem.common.views import changed
-from evfem.electrostatics.signalfile import read_signal
+from evfem.electrostatics.signalfile import read_voltage
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import HEADER, Carrier, Sampled, Sine
-from evfem.errors import InputError
+from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
+from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
-from evfem.scene.keys import Table, at, check_size, columns, derived, optional, parse, required, shown
+from evfem.scene.keys import (
+    Table,
+    at,
+    check_size,
+    columns,
+    derived,
+    kind_of,
+    optional,
+    parse,
+    required,
+    shown,
+)
 
 #: keys of [electrostatics] that give a voltage
 KEYS = ("voltage", "voltage_file", "voltage_profile", "signal")
@@ -39,20 +49,20 @@ class SampledTable(Table):
 SIGNALS: Mapping[str, type[Table]] = {"sine": SineTable, "carrier": CarrierTable, "sampled": SampledTable}
 
 
-def read_voltage(table: Any, needed: bool, folder: Path) -> Any:
+def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
     """The voltage of the table [electrostatics], 0 where none is given nor `needed`; paths start
     at `folder`.
     """
     given = [name for name in KEYS if getattr(table, name) is not None]
     if len(given) > 1 or (needed and not given):
         allowed = "exactly one of voltage (V), voltage_file and signal"
-        raise InputError("electrostatics.voltage", " and ".join(given) or "nothing", allowed)
+        raise InputError("electrostatics.voltage", " and ".join(given) or ABSENT, allowed)
     if table.voltage_file is not None:
         path = folder / table.voltage_file
         check_size("electrostatics.voltage_file", path, LARGEST)
         key = "electrostatics.voltage_file"
         with at(key, voltage_file=key, path=key):
-            return Sampled.from_csv(path) if _over_time(path) else read_signal(path)
+            return read_voltage(path)
     if table.voltage_profile is not None:
         with at("electrostatics.voltage_profile"):
             return VoltageProfile(*columns("electrostatics.voltage_profile", table.voltage_profile))
@@ -61,19 +71,8 @@ def read_voltage(table: Any, needed: bool, folder: Path) -> Any:
     return table.voltage or 0.0
 
 
-def _over_time(path: Path) -> bool:
-    """Whether a file is a csv file over time, by its first line."""
-    with suppress(OSError, UnicodeDecodeError), path.open(encoding="utf-8-sig") as lines:
-        return [cell.strip() for cell in lines.readline(100).split(",")] == HEADER
-    return False
-
-
 def _signal(table: Mapping[str, Any], prefix: str, folder: Path) -> TimeSignal:
-    kind = table.get("kind", "nothing")
-    if not isinstance(kind, str) or kind not in SIGNALS:
-        raise InputError(
-            f"{prefix}.kind", kind if isinstance(kind, str) else shown(kind), " | ".join(SIGNALS)
-        )
+    kind = kind_of(table, prefix, SIGNALS)
     parsed: Any = parse(SIGNALS[kind], table, prefix)
     values = {name: getattr(parsed, name) for name in SIGNALS[kind].model_fields if name != "kind"}
     if kind == "sampled":

@@ -11,11 +11,8 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from datetime import UTC, datetime
-from functools import cache
-from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
-from platform import python_version
 from typing import Any
 
 import numpy as np
@@ -23,22 +20,28 @@ import numpy as np
 import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import plain
-from evfem.common.digest import digest
-from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.storage import load_arrays, save_arrays, write_text
 from evfem.common.tables import csv_text
-from evfem.common.views import called, curves, table
-from evfem.errors import InputError
-from evfem.mesh.mesh import CELLS, KINDS, Mesh
-from evfem.scene.scene import Scene
+from evfem.common.views import curves, plus, table
+from evfem.errors import InputError, readable, unknown
+from evfem.mesh.archive import mesh_arrays, mesh_of
+from evfem.mesh.mesh import Mesh
+
+# public in `ev.result`, where they were before
+from evfem.simulation.provenance import origin as origin
+from evfem.simulation.provenance import provenance as provenance
+from evfem.simulation.provenance import versions as versions
 
 Row = Mapping[str, Any]
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-4"
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-#: what is shown of the last step, with units
-SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
-SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
+#: what is shown of the last step
+SHOWN = (
+    *("position", "indentation", "voltage"),
+    *("normal_force", "tangential_force", "electrostatic_force", "contact_width"),
+)
 INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
 #: columns without which a saved result is none; any other is NaN where an older version did not write it yet
 NEEDED = ("motion", *INTEGERS, *RESUMED)
@@ -65,6 +68,11 @@ class Frame:
     cauchy_stress: Floats
     J: Floats
 
+    def __repr__(self) -> str:
+        """Which step it is, where, and its size."""
+        size = f"{len(self.displacement)} nodes, {len(self.J)} cells"
+        return f"Frame of step {self.step} at {plus(self.position):.4g} mm, {plus(self.time):.4g} s: {size}"
+
 
 POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
 CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
@@ -75,6 +83,11 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 
+def column(unit: str, meaning: str) -> dict[str, str]:
+    """Metadata of a field of `Result` that is a column of the history."""
+    return {"unit": unit, "meaning": meaning}
+
+
 @dataclass(frozen=True, eq=False)
 class Result:
     """Every column of the history as an array over the steps, the frames kept, the mesh and the
@@ -82,40 +95,41 @@ class Result:
 
     A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of
     saved results and checkpoints. `Ledger.row` computes its value; a whole number also stands in
-    `INTEGERS`.
+    `INTEGERS`. Its unit and meaning are in `UNITS` and `MEANINGS`. `result["normal_force"]` is
+    `result.normal_force`.
 
     `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
     the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
     the downward attraction.
     """
 
-    step: Ints
-    motion_index: Ints
-    motion: list[str]
-    time: Floats
-    position: Floats
-    indentation: Floats
-    voltage: Floats
-    applied_force: Floats
-    applied_tangential_force: Floats
-    normal_force: Floats
-    tangential_force: Floats
-    electrostatic_force: Floats
-    electrostatic_force_x: Floats
-    contact_width: Floats
-    real_contact_width: Floats
-    min_gap: Floats
-    external_work: Floats
-    electrostatic_work: Floats
-    stored_energy: Floats
-    friction_dissipation: Floats
-    viscous_dissipation: Floats
-    kinetic_energy: Floats
-    integrator_dissipation: Floats
-    snap_dissipation: Floats
-    substeps: Ints
-    newton_iterations: Ints
-    seconds: Floats
+    step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
+    motion_index: Ints = field(metadata=column("", "number of the motion, from 0"))
+    motion: list[str] = field(metadata=column("", "kind of the motion"))
+    time: Floats = field(metadata=column("s", "at the end of the step"))
+    position: Floats = field(metadata=column("mm", "x of the bone"))
+    indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
+    voltage: Floats = field(metadata=column("V", "effective"))
+    applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
+    applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
+    normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
+    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x"))
+    electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards"))
+    electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
+    contact_width: Floats = field(metadata=column("mm", "from the first to the last touching node's share"))
+    real_contact_width: Floats = field(metadata=column("mm", "sum of the touching nodes' shares"))
+    min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
+    external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
+    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
+    stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
+    friction_dissipation: Floats = field(metadata=column("N", "by friction"))
+    viscous_dissipation: Floats = field(metadata=column("N", "in the tissue"))
+    kinetic_energy: Floats = field(metadata=column("N", "of the tissue, with inertia"))
+    integrator_dissipation: Floats = field(metadata=column("N", "by the finite step, of either sign"))
+    snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
+    substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
+    newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
+    seconds: Floats = field(metadata=column("s", "wall time"))
     # a field before this line is a column of the history
     frames: list[Frame]
     mesh: Mesh
@@ -140,6 +154,30 @@ class Result:
         """The history as one dictionary per step, plain Python numbers."""
         columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
         return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+
+    def __getitem__(self, name: str) -> Any:
+        """A column by its name."""
+        if name not in COLUMNS:
+            raise unknown("column", str(name), COLUMNS, readable(name))
+        return getattr(self, name)
+
+    def table(self) -> Any:
+        """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
+        installed a numpy record array of the same columns; `table["normal_force"]` is one.
+        """
+        columns = {name: np.asarray(self[name]) for name in COLUMNS}
+        if find_spec("pandas") is not None:
+            from pandas import DataFrame
+
+            return DataFrame(columns)
+        records = np.recarray(len(self.step), [(name, column.dtype) for name, column in columns.items()])
+        for name, values in columns.items():
+            records[name] = values
+        return records
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the history as `evfem run` does (`history.csv`), whole or not at all."""
+        write_text(path, csv_header() + "".join(map(csv_line, self.rows)))
 
     def summary(self) -> dict[str, Any]:
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
@@ -191,10 +229,7 @@ class Result:
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [
-            (name.replace("_", " "), f"{getattr(self, name)[-1] + 0.0:.4g} {unit}")
-            for name, unit in SHOWN.items()
-        ]
+        return [(name.replace("_", " "), f"{plus(self[name][-1]):.4g} {UNITS[name]}") for name in SHOWN]
 
     def save(self, path: str | Path) -> None:
         """Write everything to one .npz file, in one step. Raises StorageError when the disk
@@ -206,13 +241,16 @@ class Result:
             values = [getattr(frame, spec.name) for frame in self.frames]
             if values:
                 arrays[f"frames/{spec.name}"] = np.stack([np.asarray(value) for value in values])
-        arrays |= _mesh_arrays(self.mesh)
+        arrays |= mesh_arrays(self.mesh)
         arrays["provenance"] = np.array(json.dumps(self.provenance))
         save_arrays(path, arrays)
 
 
 _NAMES = [spec.name for spec in fields(Result)]
 COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
+#: column -> its unit ("" for a number or a word), and what it is
+UNITS: Mapping[str, str] = {s.name: s.metadata["unit"] for s in fields(Result) if s.name in COLUMNS}
+MEANINGS: Mapping[str, str] = {s.name: s.metadata["meaning"] for s in fields(Result) if s.name in COLUMNS}
 
 
 def load(path: str | Path) -> Result:
@@ -229,7 +267,7 @@ def load(path: str | Path) -> Result:
         raise InputError("result", given, f"a file written by Result.save of evfem {evfem.__version__}")
     try:
         columns = {name: _column_of(arrays, name) for name in COLUMNS}
-        mesh = _mesh_from(arrays)
+        mesh = mesh_of(arrays)
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
         if len({len(column) for column in columns.values()}) > 1:
@@ -282,50 +320,6 @@ def _column(name: str, values: list[Any]) -> Any:
 def _json(value: Any) -> Any:
     """The value itself, or None for a number that JSON does not know."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Versions of evfem, Python and the packages that compute, as far as they are installed."""
-    found = {"evfem": evfem.__version__, "python": python_version()}
-    for package in ("numpy", "scipy", "scikit-fem", "meshio", "numba", "pypardiso"):
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
-
-
-def origin() -> dict[str, Any]:
-    """Versions and date, for the provenance of whatever is computed now."""
-    return {"versions": dict(versions()), "date": datetime.now(UTC).isoformat(timespec="seconds")}
-
-
-def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
-    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
-    JSON.
-
-    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
-    user's own.
-    """
-    from evfem.scene.file import dump
-
-    try:
-        parameters = dump(scene)
-    except InputError:
-        parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
-    return {
-        **origin(),
-        "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
-        "parameters": parameters,
-        "mesh": {
-            "digest": digest(mesh),
-            "nodes": len(mesh.points),
-            "cells": len(mesh.cells),
-            "kind": mesh.kind,
-        },
-        "solver": dict(solver),
-    }
 
 
 @dataclass(frozen=True)
@@ -392,35 +386,6 @@ def _check_rows(rows: Any) -> None:
             raise ValueError(f"row {step}")
         if not all(math.isfinite(row[name]) for name in RESUMED):
             raise ValueError(f"row {step}")
-
-
-def _mesh_arrays(mesh: Mesh) -> dict[str, np.ndarray]:
-    arrays = {"mesh/points": mesh.points, "mesh/cells": mesh.cells, "mesh/region": mesh.region}
-    arrays |= {f"mesh/set/{name}": np.asarray(nodes) for name, nodes in mesh.node_sets.items()}
-    return arrays | {
-        "mesh/kind": np.array(mesh.kind),
-        "mesh/region_names": np.array(json.dumps({name: int(i) for name, i in mesh.region_names.items()})),
-    }
-
-
-def _mesh_from(arrays: Mapping[str, np.ndarray]) -> Mesh:
-    kind = str(arrays["mesh/kind"])
-    if kind not in KINDS:
-        raise ValueError("cells of an unknown kind")
-    points, cells, region = (arrays[f"mesh/{name}"] for name in ("points", "cells", "region"))
-    prefix = "mesh/set/"
-    sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
-    names = json.loads(str(arrays["mesh/region_names"]))
-    if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
-        raise ValueError("points of the mesh")
-    if region.ndim != 1 or cells.shape != (len(region), CELLS[kind].nodes) or region.dtype.kind not in "iu":
-        raise ValueError("cells of the mesh")
-    if not isinstance(names, dict) or not all(type(number) is int for number in names.values()):
-        raise ValueError("names of regions")
-    for nodes in (cells, *sets.values()):
-        if nodes.dtype.kind not in "iu" or (nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points)):
-            raise ValueError("nodes that do not exist")
-    return Mesh(points, cells, kind, region, names, sets)
 
 
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:

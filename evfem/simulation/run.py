@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ from evfem.solver.control import (
 )
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
+from evfem.tissue.kernels.blocks import loops
 
 ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
 
@@ -60,10 +62,14 @@ class Request:
 
 
 def simulate(
-    scene: Scene, *, progress: bool = False, observers: Sequence[Observer] = (), resume: Saved | None = None
+    scene: Scene | str | PathLike[str],
+    *,
+    progress: bool = False,
+    observers: Sequence[Observer] = (),
+    resume: Saved | None = None,
 ) -> Result:
-    """Press, slide and attract as the scene says; returns the history, the fields of every n-th
-    step and how they came about.
+    """Press, slide and attract as the scene says (`Scene`, or the path of a scene file); returns the
+    history, the fields of every n-th step and how they came about.
 
     `observers` are objects with any of `started(mesh, scene, total_steps)`,
     `step(row, frame, checkpoint)` after every converged step (`frame` is None on steps without
@@ -75,6 +81,10 @@ def simulate(
     `NotConverged`, with the result so far, and leaves everything up to the last good step with the
     observers.
     """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
@@ -267,6 +277,7 @@ class Run:
             "cuts": self.stepper.cuts,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
+            "cell_loops": "numpy" if loops() is None else "compiled",
         }
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)

@@ -121,7 +121,7 @@ def test_any_wav_with_one_channel_is_read(tmp_path, dtype):
     signal = Sampled.from_wav(tmp_path / "own.wav", full_scale=200.0, start=0.25)
     assert (signal.rate, signal.start) == (8000.0, 0.25)
     np.testing.assert_allclose(signal.voltage, 200.0 * shape, atol=200.0 / steps)
-    with pytest.raises(InputError, match="full_scale: given nothing"):
+    with pytest.raises(InputError, match="full_scale: missing"):
         Sampled.from_wav(tmp_path / "own.wav")
 
 

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from evfem import data
-from evfem.errors import InputError
+from evfem.errors import InputError, readable
 from evfem.finger import fingerpad
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, Electrical, FingerPad, MeshedFinger
 from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
@@ -387,7 +387,7 @@ def test_a_wrong_number_gets_the_sentence_of_its_parameter(name):
     for value in ("abc", None, True, low - 0.3, high + 0.3, float("nan"), float("-inf")):
         with pytest.raises(InputError) as caught:
             FingerPad(**{name: value})
-        expected = f"finger.{name}: given {value}; allowed: {low:g} to {high:g}{unit}"
+        expected = f"finger.{name}: given {readable(value)}; allowed: {low:g} to {high:g}{unit}"
         assert str(caught.value) == expected
 
 

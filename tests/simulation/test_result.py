@@ -3,7 +3,9 @@
 import csv
 import io
 import json
+import sys
 import zipfile
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +13,18 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
-from evfem.simulation.result import COLUMNS, NEEDED, Checkpoint, Result, csv_header, csv_line, load, versions
+from evfem.simulation.result import (
+    COLUMNS,
+    MEANINGS,
+    NEEDED,
+    UNITS,
+    Checkpoint,
+    Result,
+    csv_header,
+    csv_line,
+    load,
+    versions,
+)
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (
@@ -183,6 +196,47 @@ def test_csv_numbers_are_plain_also_from_numpy_scalars():
     row = fake_row(3) | {"normal_force": np.float64(0.1), "step": np.int64(3), "min_gap": np.nan}
     values = dict(zip(COLUMNS, csv_line(row).strip().split(","), strict=True))
     assert (values["normal_force"], values["step"], values["min_gap"]) == ("0.1", "3", "nan")
+
+
+def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
+    result = fake_result()
+    for name in COLUMNS:
+        assert result[name] is getattr(result, name)
+    with pytest.raises(
+        InputError, match='column: given "normal_forse"; allowed: normal_force\\? \\(step, motion'
+    ):
+        result["normal_forse"]
+
+
+def test_a_written_history_is_that_of_a_run_folder(tmp_path):
+    result = fake_result()
+    result.to_csv(tmp_path / "mine.csv")
+    assert (tmp_path / "mine.csv").read_text() == csv_header() + "".join(map(csv_line, result.rows))
+
+
+def test_the_table_has_every_column_without_pandas_and_with_it(monkeypatch):
+    """`pandas` stands for a module with a DataFrame made of columns."""
+    result = fake_result()
+    monkeypatch.setattr("evfem.simulation.result.find_spec", lambda name: None)
+    records = result.table()
+    assert records.dtype.names == COLUMNS
+    assert [tuple(row.values()) for row in result.rows] == records.tolist()
+    assert records.step.dtype.kind == "i"
+    monkeypatch.setattr("evfem.simulation.result.find_spec", lambda name: name == "pandas")
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=lambda columns: ("frame", columns)))
+    kind, columns = result.table()
+    assert kind == "frame"
+    assert tuple(columns) == COLUMNS
+    np.testing.assert_array_equal(columns["voltage"], result.voltage)
+
+
+def test_every_column_has_a_unit_and_a_meaning():
+    units = {"", "s", "mm", "V", "N/mm", "N"}
+    assert tuple(UNITS) == tuple(MEANINGS) == COLUMNS
+    assert set(UNITS.values()) == units
+    assert all(MEANINGS.values())
+    assert {UNITS[name] for name in COLUMNS if name.endswith("_force")} == {"N/mm"}
+    assert {UNITS[name] for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))} == {"N"}
 
 
 def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
