@@ -1,7 +1,7 @@
 """The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them
 again.
 
-Those of the gallery come from their studies, `evfem study NAME --out docs/pictures`.
+Those of the studies come from `evfem study NAME --out docs/pictures`.
 """
 
 import re
@@ -30,6 +30,13 @@ OF_PAGES = {
     "pictures-beside.png": ("howto/pictures.md", "beside.png"),
     "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
 }
+EXAMPLES = (
+    "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "
+)
+EXAMPLES += "laws spectrum history rendered texture beside sweep map samples"
+for name in EXAMPLES.split():
+    file = f"{name}.gif" if name == "slide" else f"{name}.png"
+    OF_PAGES[f"gallery-{file}"] = ("gallery.md", file)
 CODE = re.compile(r"^(<!-- not run: .+? -->\n)?```python\n(.*?)^```$", re.M | re.S)
 
 
