@@ -26,7 +26,7 @@ def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | 
     order, and everything that is varied beside `x` and `by` are points without lines. Names on the
     abscissa stand in the order of the table.
     """
-    rows = _done(table, x, y)
+    rows = _done(table, x, y, *([by] if by else []))
     ax = axes_or_new(ax)
     groups = list(dict.fromkeys(row[by] for row in rows)) if by else [None]
     names = _names(rows, x)
