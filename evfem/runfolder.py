@@ -252,7 +252,8 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
     lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
         row = row if depth is None else over_depth(row, depth)
-        numbers = [_number(float(row[name]), _digits(name)) for name in HEADS]
+        sizes = zip(HEADS, WIDTHS, strict=True)
+        numbers = [_number(float(row[name]), _digits(name), width - 1) for name, width in sizes]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)
 
@@ -278,9 +279,18 @@ def _line(step: str, motion: str, values: Sequence[str]) -> str:
     return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, WIDTHS, strict=True))
 
 
-def _number(value: float, digits: int) -> str:
-    """With so many decimals, and no sign on what rounds to zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+def _number(value: float, digits: int, width: int) -> str:
+    """With so many decimals, fewer where the column is too narrow for them, and no sign on what
+    rounds to zero.
+
+    >>> _number(-1e-7, 5, 9), _number(-12345.678, 5, 9), _number(-1e12, 5, 9), _number(1.0, 5, 9)
+    ('0.00000', '-12345.68', '-1.00e+12', '1.00000')
+    """
+    for kept in range(digits, -1, -1):
+        text = f"{round(value, kept) + 0.0:.{kept}f}"
+        if len(text) <= width:
+            return text
+    return f"{value:.2e}" if width > 8 else f"{value:.0e}"
 
 
 def _digits(name: str) -> int:
