@@ -20,10 +20,10 @@ from typing import Any
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, names_in, refuse_others, replacing, write_names, write_text
 from evfem.errors import InputError
-from evfem.export import FieldFiles, ParaViewSeries
+from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth
+from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth, read_rows
 from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
 
 #: bytes of fields that are said before they are written
@@ -201,6 +201,33 @@ def finished(path: Path, scene: Scene, found: Saved) -> bool:
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         return json.loads((path / SUMMARY).read_text(encoding="utf-8"))["complete"] is True
     return False
+
+
+def result_in(path: Path) -> Result:
+    """The result of a run that has ended, from what it left in its folder: the history, the fields
+    that were written, the mesh of its scene.
+
+    Raises InputError for another folder, a run that has not ended, or damaged files.
+    """
+    allowed = "a folder that `evfem run` left, at its end"
+    from evfem.scene.file import loads
+    from evfem.scene.plan import scene_mesh
+
+    if not (path / SUMMARY).is_file() or not (path / HISTORY).is_file():
+        raise InputError("path", f"{path}, without {SUMMARY} or {HISTORY}", allowed)
+    try:
+        with disk(f"read {path}"):
+            origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
+            rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
+        mesh, _ = scene_mesh(loads(origin["parameters"]))
+        frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
+        return Result.from_rows(rows, frames, mesh, origin)
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
+        raise InputError("path", f"{path}, damaged: {error}", allowed) from error
+
+
+def _fields_of(path: Path, row: Row) -> Path:
+    return ParaViewSeries(path / FIELDS).frame_path(row["step"])
 
 
 def _without_a_row(history: Path) -> bool:
