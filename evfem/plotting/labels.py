@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.simulation.result import COLUMNS, UNITS, Result
 
 #: last word of a column's name -> what it is; columns of one kind share an axis
@@ -106,5 +106,5 @@ def values_of(result: Result, name: str) -> Any:
     """
     names = [column for column in COLUMNS if column != "motion"]
     if name not in names:
-        raise InputError("column", name, " | ".join(names))
+        raise InputError("column", quoted(name), " | ".join(names))
     return getattr(result, name)
