@@ -180,7 +180,7 @@ def _run(given: argparse.Namespace) -> int:
         folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
         if resume is not None and finished(path, scene, resume):
             notices.tell(f"the run in {path} is complete, nothing is left to compute")
-            return _report(folder.path, resume.rows, scene.total_steps)
+            return _report(folder.path, resume.rows, scene)
         return _simulate(folder)
 
 
@@ -207,17 +207,17 @@ def _finish(folder: RunFolder, result: object) -> int:
     """Write what is left to write and print the table; a second Ctrl-C does not tear the files."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     folder.close(result)  # type: ignore[arg-type]
-    return _report(folder.path, folder.rows, folder.scene.total_steps)
+    return _report(folder.path, folder.rows, folder.scene)
 
 
-def _report(path: Path, rows: Sequence[Row], total: int) -> int:
+def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     """Print the table of a run, how far it came, and where its results are."""
     from evfem.runfolder import table
 
     if rows:
-        print(table(rows))
+        print(table(rows, depth=scene.depth))
     seconds = sum(float(row["seconds"]) for row in rows)
-    print(f"{len(rows)} of {total} steps in {seconds:.1f} s; results in {path}", flush=True)
+    print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
     return DONE
 
 

@@ -42,7 +42,7 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "threadpoolctl", "pandas"},
-        "provenance result spectrum model works ledger checkpoint run rendering",
+        "provenance history result spectrum model works ledger checkpoint run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (

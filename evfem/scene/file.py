@@ -48,7 +48,7 @@ from evfem.scene.keys import (
     shown,
 )
 from evfem.scene.motion import Motion, VoltageRamp
-from evfem.scene.scene import Output, Scene, Solver
+from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.voltage import voltage_keys, voltage_of
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LAWS, from_table
@@ -115,6 +115,9 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     parts: dict[str, Any] = {}
     with mistakes.of_a_part():
         parts["finger"] = _finger(top.finger, folder)
+    with mistakes.of_a_part(), at("finger"):
+        if "depth" in top.finger:
+            parts["depth"] = DEPTH["check"]("depth", top.finger["depth"])
     with mistakes.of_a_part():
         if top.electrostatics is not None:
             electrostatics = parse(ElectrostaticsTable, top.electrostatics, "electrostatics")
@@ -209,7 +212,7 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:
-    parts: dict[str, Any] = dict(table)
+    parts = {name: value for name, value in table.items() if name != "depth"}  # the scene's
     electrical = parts.pop("electrical", {})
     if not isinstance(electrical, dict):
         raise InputError("finger.electrical", shown(electrical), "a table [finger.electrical]")
@@ -220,7 +223,7 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
     mistakes = Mistakes()
     mistakes.found += [
-        unknown(f"finger.{name}", name, [*known, "participant", "mesh"])
+        unknown(f"finger.{name}", name, [*known, "participant", "mesh", "depth"])
         for name in parts
         if name not in (*known, "participant")
     ]
@@ -277,7 +280,7 @@ def dump(scene: Scene) -> str:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
     tables = {
         "version": VERSION,
-        "finger": _finger_table(scene.finger),
+        "finger": _finger_table(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
         "surface": _surface_table(scene.surface),
     }
     if scene.law is not None:

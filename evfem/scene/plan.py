@@ -161,6 +161,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     # a modulus in kPa is seen here
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
+    deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
     share = rigid_share(scene, mesh)
     if share is not None and share < RIGID_BELOW:
         return Term(
@@ -169,7 +170,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     return Term(
         "tissue",
         True,
-        f"{laws}, plane strain, {stiffness}"
+        f"{laws}, plane strain{deep}, {stiffness}"
         + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
     )
 

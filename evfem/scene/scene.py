@@ -31,6 +31,7 @@ DIRECTIONS = ("vertical", "normal")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
+DEPTH = number("a depth in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True))
 _PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True))
 _TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3))
 
@@ -129,8 +130,9 @@ class Scene:
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
     position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
     `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. Raises InputError for anything that does not fit
-    together.
+    touching nodes carry electrostatic force. `depth` (mm) is how deep the plane finger is meant to
+    be; it changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything
+    that does not fit together.
     """
 
     finger: Finger
@@ -144,6 +146,7 @@ class Scene:
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
+    depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
 
     def __post_init__(self) -> None:
@@ -215,6 +218,8 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("solver", quoted(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
         raise InputError("output", quoted(scene.output), "an Output")
+    if scene.depth is not None:
+        set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
         raise InputError("name", quoted(scene.name), "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):

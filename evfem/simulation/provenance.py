@@ -50,7 +50,12 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
         parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
     return {
         **origin(),
-        "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
+        "scene": {
+            "name": scene.name,
+            "digest": scene.digest(),
+            "total_steps": scene.total_steps,
+            "depth": scene.depth,
+        },
         "parameters": parameters,
         "mesh": {
             "digest": digest(mesh),

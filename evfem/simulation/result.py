@@ -1,8 +1,8 @@
 """What a run leaves behind: a history with one row per step, fields of some steps, and how it came
 about.
 
-Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz without pickled
-objects.
+Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth); N, mm2 and mJ in `Result.total`.
+Files are .npz without pickled objects.
 """
 
 from __future__ import annotations
@@ -10,8 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from importlib.util import find_spec
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,31 +19,39 @@ import numpy as np
 import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import plain
-from evfem.common.storage import load_arrays, save_arrays, write_text
-from evfem.common.tables import csv_text
+from evfem.common.storage import load_arrays, save_arrays
 from evfem.common.views import curves, plus, table
-from evfem.errors import InputError, readable, unknown
+from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
 
 # public in `ev.result`, where they were before
+from evfem.simulation.history import COLUMNS as COLUMNS
+from evfem.simulation.history import INTEGERS as INTEGERS
+from evfem.simulation.history import MEANINGS as MEANINGS
+from evfem.simulation.history import NEEDED as NEEDED
+from evfem.simulation.history import RESUMED as RESUMED
+from evfem.simulation.history import UNITS as UNITS
+from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
+from evfem.simulation.history import History, column_of, over_depth
+from evfem.simulation.history import Row as Row
+from evfem.simulation.history import csv_header as csv_header
+from evfem.simulation.history import csv_line as csv_line
 from evfem.simulation.provenance import origin as origin
 from evfem.simulation.provenance import provenance as provenance
 from evfem.simulation.provenance import versions as versions
 
-Row = Mapping[str, Any]
+#: key of the provenance of a total, with its depth (mm)
+WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-4"
-#: columns from which a run goes on
-RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 #: what is shown of the last step
 SHOWN = (
     *("position", "indentation", "voltage"),
     *("normal_force", "tangential_force", "electrostatic_force", "contact_width"),
 )
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
-#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
-NEEDED = ("motion", *INTEGERS, *RESUMED)
+#: what is shown of it over a whole depth
+SHOWN_WHOLE = SHOWN[3:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,54 +90,17 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 
-def column(unit: str, meaning: str) -> dict[str, str]:
-    """Metadata of a field of `Result` that is a column of the history."""
-    return {"unit": unit, "meaning": meaning}
-
-
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(History):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the
     provenance.
 
-    A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of
-    saved results and checkpoints. `Ledger.row` computes its value; a whole number also stands in
-    `INTEGERS`. Its unit and meaning are in `UNITS` and `MEANINGS`. `result["normal_force"]` is
-    `result.normal_force`.
-
+    Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
     `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
     the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
     the downward attraction.
     """
 
-    step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
-    motion_index: Ints = field(metadata=column("", "number of the motion, from 0"))
-    motion: list[str] = field(metadata=column("", "kind of the motion"))
-    time: Floats = field(metadata=column("s", "at the end of the step"))
-    position: Floats = field(metadata=column("mm", "x of the bone"))
-    indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
-    voltage: Floats = field(metadata=column("V", "effective"))
-    applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
-    applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
-    normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
-    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x"))
-    electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards"))
-    electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
-    contact_width: Floats = field(metadata=column("mm", "from the first to the last touching node's share"))
-    real_contact_width: Floats = field(metadata=column("mm", "sum of the touching nodes' shares"))
-    min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
-    external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
-    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
-    stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
-    friction_dissipation: Floats = field(metadata=column("N", "by friction"))
-    viscous_dissipation: Floats = field(metadata=column("N", "in the tissue"))
-    kinetic_energy: Floats = field(metadata=column("N", "of the tissue, with inertia"))
-    integrator_dissipation: Floats = field(metadata=column("N", "by the finite step, of either sign"))
-    snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
-    substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
-    newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
-    seconds: Floats = field(metadata=column("s", "wall time"))
-    # a field before this line is a column of the history
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -146,38 +116,53 @@ class Result:
             if set(row) != set(COLUMNS):
                 odd = sorted(set(row) ^ set(COLUMNS))
                 raise InputError("row", f"missing or unknown {odd}", ", ".join(COLUMNS))
-        columns = {name: _column(name, [row[name] for row in rows]) for name in COLUMNS}
+        columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
         return cls(**columns, frames=list(frames), mesh=mesh, provenance=provenance)
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The history as one dictionary per step, plain Python numbers."""
-        columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
-        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+    def units(self) -> Mapping[str, str]:
+        """The unit of each column."""
+        return WHOLE_UNITS if WHOLE in self.provenance else UNITS
 
-    def __getitem__(self, name: str) -> Any:
-        """A column by its name."""
-        if name not in COLUMNS:
-            raise unknown("column", str(name), COLUMNS, readable(name))
-        return getattr(self, name)
+    @property
+    def depth(self) -> float | None:
+        """The scene's depth (mm), None without one."""
+        return self.provenance.get("scene", {}).get("depth")
 
-    def table(self) -> Any:
-        """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
-        installed a numpy record array of the same columns; `table["normal_force"]` is one.
+    @property
+    def total(self) -> Result:
+        """This result over the whole `depth`: under the same names forces in N, widths as areas in
+        mm2, works and energies in mJ; lengths, pressures and fields are as they were.
+
+        `result.total.rows`, `.table()`, `.to_csv(path)` and the plots then have these units too.
+        Raises InputError where the scene says no depth.
         """
-        columns = {name: np.asarray(self[name]) for name in COLUMNS}
-        if find_spec("pandas") is not None:
-            from pandas import DataFrame
+        depth = self._known_depth
+        if WHOLE in self.provenance:
+            return self
+        columns = over_depth({name: self[name] for name in COLUMNS}, depth)
+        return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
 
-            return DataFrame(columns)
-        records = np.recarray(len(self.step), [(name, column.dtype) for name, column in columns.items()])
-        for name, values in columns.items():
-            records[name] = values
-        return records
+    @property
+    def contact_area(self) -> Floats:
+        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without
+        one.
+        """
+        return self.total.contact_width
 
-    def to_csv(self, path: str | Path) -> None:
-        """Write the history as `evfem run` does (`history.csv`), whole or not at all."""
-        write_text(path, csv_header() + "".join(map(csv_line, self.rows)))
+    @property
+    def real_contact_area(self) -> Floats:
+        """Real contact area (mm2): `real_contact_width` over the depth. Raises InputError without
+        one.
+        """
+        return self.total.real_contact_width
+
+    @property
+    def _known_depth(self) -> float:
+        if self.depth is None:
+            allowed = "a depth in mm, by Scene(depth=...) or depth in [finger]"
+            raise InputError("depth", ABSENT, allowed)
+        return self.depth
 
     def summary(self) -> dict[str, Any]:
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
@@ -185,9 +170,9 @@ class Result:
         steps = len(self.step)
         extremes = {}
         if steps:
-            peaks = ("normal_force", "tangential_force", "electrostatic_force", "contact_width")
+            peaks = (*SHOWN_WHOLE, "peak_contact_pressure")
             extremes = {name: float(np.max(np.abs(getattr(self, name)))) for name in peaks}
-        return {
+        found = {
             "scene": scene.get("name", "scene"),
             "complete": steps == scene.get("total_steps", steps),
             "steps": steps,
@@ -200,14 +185,26 @@ class Result:
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
             "seconds": float(self.seconds.sum()),
-            "units": {"length": "mm", "force": "N/mm", "stress": "MPa", "voltage": "V", "energy": "N"},
+            "units": {
+                "length": "mm",
+                "force": self.units["normal_force"],
+                "stress": "MPa",
+                "voltage": "V",
+                "energy": self.units["stored_energy"],
+            },
             "provenance": self.provenance,
         }
+        if self._shows_total:
+            whole = self.total.summary()
+            found["total"] = {"depth": self.depth} | {key: whole[key] for key in ("last", "largest", "units")}
+        return found
 
     def __repr__(self) -> str:
         """How far the run came, where it ended and with what forces."""
         last = self._last
-        lines = ["; ".join(f"{key} {text}" for key, text in row) for row in (last[:3], last[3:5], last[5:])]
+        parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
+        lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
+        lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
@@ -229,7 +226,19 @@ class Result:
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [(name.replace("_", " "), f"{plus(self[name][-1]):.4g} {UNITS[name]}") for name in SHOWN]
+        return [*self._ends(SHOWN), *(self.total._ends(SHOWN_WHOLE) if self._shows_total else [])]
+
+    @property
+    def _shows_total(self) -> bool:
+        return self.depth is not None and WHOLE not in self.provenance
+
+    def _ends(self, names: Sequence[str]) -> list[tuple[str, str]]:
+        """Columns of the last row, in words."""
+        found = []
+        for name in names:
+            words = name.replace("_width", "_area") if self.units[name] == "mm2" else name
+            found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
+        return found
 
     def save(self, path: str | Path) -> None:
         """Write everything to one .npz file, in one step. Raises StorageError when the disk
@@ -244,13 +253,6 @@ class Result:
         arrays |= mesh_arrays(self.mesh)
         arrays["provenance"] = np.array(json.dumps(self.provenance))
         save_arrays(path, arrays)
-
-
-_NAMES = [spec.name for spec in fields(Result)]
-COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
-#: column -> its unit ("" for a number or a word), and what it is
-UNITS: Mapping[str, str] = {s.name: s.metadata["unit"] for s in fields(Result) if s.name in COLUMNS}
-MEANINGS: Mapping[str, str] = {s.name: s.metadata["meaning"] for s in fields(Result) if s.name in COLUMNS}
 
 
 def load(path: str | Path) -> Result:
@@ -289,32 +291,6 @@ def _checked_column(name: str, column: np.ndarray) -> Any:
     if column.ndim != 1 or (column.size and column.dtype.kind not in kinds):
         raise ValueError(f"column {name}")
     return [str(kind) for kind in column] if name == "motion" else column
-
-
-def csv_line(row: Row) -> str:
-    """One row of history.csv with its line end; floats with every digit that counts.
-
-    >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
-    '1,0,press,0.0,0.0,0.0,0.1'
-    """
-    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
-
-
-def csv_header() -> str:
-    """The first line of history.csv."""
-    return csv_text([COLUMNS])
-
-
-def _plain_value(name: str, value: Any) -> str | int | float:
-    if name == "motion":
-        return str(value)
-    return int(value) if name in INTEGERS else float(value)
-
-
-def _column(name: str, values: list[Any]) -> Any:
-    if name == "motion":
-        return [str(value) for value in values]
-    return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)
 
 
 def _json(value: Any) -> Any:

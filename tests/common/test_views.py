@@ -94,6 +94,19 @@ def test_a_result_shows_how_far_it_came_and_its_end():
     assert [float(v) for v in box.split()] == pytest.approx([0.0, -2.0, 3.0, 2.0])
 
 
+def test_a_result_with_a_depth_shows_its_end_over_it_too():
+    result = fake_result(provenance={"scene": {"name": "fake", "total_steps": 4, "depth": 10.0}})
+    assert repr(result).splitlines()[3:] == [
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
+        "  over 10 mm: normal force 18.57 N; tangential force 20 N",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
+    ]
+    assert repr(result.total).splitlines()[2:] == [
+        "  normal force 18.57 N; tangential force 20 N",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
+    ]
+
+
 def test_results_without_or_with_odd_steps():
     empty = Result.from_rows([], [], fake_result().mesh, {})
     assert repr(empty) == "Result of 'scene': 0 of 0 steps, 0 with fields, 9 nodes"

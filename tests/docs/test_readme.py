@@ -68,7 +68,7 @@ def example(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def scene():
-    return ev.Scene(FINGER, DISPLAY, law=ev.Kaczmarek(), voltage=1000.0, motion=MOTION, name="slide")
+    return ev.Scene(FINGER, DISPLAY, ev.Kaczmarek(), 1000.0, MOTION, name="slide", depth=10.0)
 
 
 @pytest.fixture(scope="module")
@@ -78,10 +78,10 @@ def result(example):
     return names["result"], live
 
 
-def test_the_readmes_two_scenes_are_the_same_and_the_built_in_one_with_held_load(example):
+def test_the_readmes_two_scenes_are_the_same_and_the_built_in_one_with_held_load_and_a_depth(example):
     names, printed, _, _ = example
     press, slide = default_scene().motion
-    held = replace(default_scene(), motion=(press, replace(slide, hold="force")))
+    held = replace(default_scene(), motion=(press, replace(slide, hold="force")), depth=10.0)
     assert names["scene"].digest() == loads(block("toml")).digest() == held.digest()
     assert str(ev.plan(names["scene"])) in printed
 

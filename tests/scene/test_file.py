@@ -112,6 +112,7 @@ speed = 20.0
 hold = "indentation"
 """
 SHORT = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
+DEEP = "[finger]\ndepth = 10\n"
 
 
 @pytest.fixture
@@ -230,6 +231,17 @@ def test_what_is_written_is_read_back(folder, number):
     text = dump(scene)
     assert loads(text).digest() == scene.digest()
     assert dump(loads(text)) == text
+
+
+def test_the_depth_stands_with_the_finger(folder):
+    for text in (SHORT, OWN_MESH):
+        with_depth = text.replace("[finger]", "[finger]\ndepth = 10") if "[finger]" in text else text + DEEP
+        scene = loads(with_depth, folder)
+        assert scene.depth == 10.0
+        assert replace(scene, depth=None).digest() == loads(text, folder).digest()
+        assert loads(dump(scene)).digest() == scene.digest()
+    with pytest.raises(InputError, match=r"finger.depth: given -1; allowed: a depth in mm, larger than 0"):
+        loads(SHORT + DEEP.replace("10", "-1"))
 
 
 @pytest.mark.parametrize(("name", "layer"), [("film", (0.09, 3.35)), ("touchscreen", (0.001, 3.9))])
