@@ -55,6 +55,7 @@ def _counts(ax: Axes, ends: list[Ending]) -> None:
         ax.plot(0.78, place, MARKS[name][0], color="white", markersize=5, markeredgewidth=0.0)
     ax.set(xscale="log", xlim=(0.7, 4.0 * max(len(ends), 1)), xlabel=f"of {len(ends)} scenes")
     ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("")
     ax.tick_params(axis="y", length=0)
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)
@@ -72,6 +73,7 @@ def _scatter(ax: Axes, ends: list[Ending], values: list[float] | list[int], labe
     ax.set(xscale="log", yscale="log", xlabel="requested steps", ylabel=label)
     for axis in (ax.xaxis, ax.yaxis):
         axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
     ax.grid(color="#DDDDDD", linewidth=0.5)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
