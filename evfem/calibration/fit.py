@@ -84,13 +84,21 @@ def fit(
         if out is not None:
             folder = SweepFolder(Path(out))
             stack.enter_context(alone_in(folder.path))
-            folder.open((), problem.digest)
+            _open(folder, problem.digest)
             folder.write_provenance({"digest": problem.digest, **problem.provenance})
         runs = Runs(OpenPool(pool, stack), problem.paths, folder)
         result = _solve(problem, runs, progress)
     if folder is not None:
         result.save(folder.path / "fit.json")
     return result
+
+
+def _open(folder: SweepFolder, plan: str) -> None:
+    """Make the folder, or go on in that of the same fit."""
+    try:
+        folder.open((), plan)
+    except InputError as error:
+        raise InputError("out", error.given, "another folder, or that of the same fit") from error
 
 
 class _Problem:

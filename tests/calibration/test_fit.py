@@ -213,7 +213,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(path, tmp_path, monkeypatch):
     assert found.values == whole.values
     assert load(out / "fit.json").values == whole.values
     assert json.loads((out / "sweep.json").read_text())["digest"]
-    with pytest.raises(InputError, match="points of another sweep"):
+    with pytest.raises(InputError, match=r"out: given .*; allowed: another folder, or that of the same fit"):
         ev.fit(path, data, {E: (0.02, 0.4)}, out=out, workers=1)
 
 
