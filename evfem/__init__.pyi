@@ -11,8 +11,13 @@ from evfem.contact.surfaces import Display as Display
 from evfem.contact.surfaces import Flat as Flat
 from evfem.contact.surfaces import Profile as Profile
 from evfem.contact.surfaces import Sinusoid as Sinusoid
+from evfem.contact.textures import Grating as Grating
+from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
+from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
+from evfem.electrostatics.laws import FILM as FILM
+from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
 from evfem.electrostatics.laws import Layer as Layer
 from evfem.electrostatics.laws import Layers as Layers
@@ -22,7 +27,11 @@ from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal
 from evfem.electrostatics.signals import Amplifier as Amplifier
+from evfem.electrostatics.signals import FollowForce as FollowForce
 from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
+from evfem.electrostatics.timesignals import Carrier as Carrier
+from evfem.electrostatics.timesignals import Sampled as Sampled
+from evfem.electrostatics.timesignals import Sine as Sine
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
@@ -33,6 +42,7 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh
 from evfem.scene import file as _scene_file
@@ -40,6 +50,7 @@ from evfem.scene.motion import Hover as Hover
 from evfem.scene.motion import Press as Press
 from evfem.scene.motion import Slide as Slide
 from evfem.scene.motion import VoltageRamp as VoltageRamp
+from evfem.scene.motion import Wait as Wait
 from evfem.scene.plan import plan as plan
 from evfem.scene.scene import Output as Output
 from evfem.scene.scene import Scene as Scene
@@ -53,6 +64,7 @@ from evfem.simulation.result import Checkpoint as Checkpoint
 from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
+from evfem.simulation.spectrum import spectrum as spectrum
 from evfem.solver.strategy import Strategy as Strategy
 from evfem.sweeps.file import Sweep as Sweep
 from evfem.sweeps.run import SweepResult as SweepResult

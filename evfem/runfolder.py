@@ -22,6 +22,7 @@ from evfem.errors import InputError
 from evfem.export import ParaViewSeries
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth
 from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
 
 MANIFEST = ".evfem-files"
@@ -114,7 +115,7 @@ class RunFolder:
         summary = result.summary()
         write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
         if self.plots and self.rows:
-            _picture(result, self.path / PICTURE)
+            _picture(result if result.depth is None else result.total, self.path / PICTURE)
         return summary
 
     def _open(self) -> None:
@@ -191,7 +192,7 @@ def _present(path: Path) -> list[str]:
 def _picture(result: Result, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from evfem.plotting import forces
+    from evfem.plotting.curves import forces
 
     with replacing(path) as temporary:
         figure = forces(result).figure
@@ -209,12 +210,12 @@ HEADS = {
     "tangential_force": "tangential",
     "electrostatic_force": "electrost.",
 }
-UNITS = ("mm", "mm", "V", "N/mm", "N/mm", "N/mm", "N/mm")
 WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 
 
-def table(rows: Sequence[Row], most: int = 12) -> str:
-    """At most about `most` rows of a history, always the last of each motion, in 80 columns.
+def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
+    """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
+    a whole `depth` (mm) forces are in N.
 
     >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
     >>> print(table([row]))
@@ -222,8 +223,10 @@ def table(rows: Sequence[Row], most: int = 12) -> str:
                        mm      mm       V      N/mm      N/mm       N/mm       N/mm
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
-    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", UNITS)]
+    units = UNITS if depth is None else WHOLE_UNITS
+    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
+        row = row if depth is None else over_depth(row, depth)
         numbers = [_number(float(row[name]), _digits(name)) for name in HEADS]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)

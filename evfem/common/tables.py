@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 #: most rows of a csv file
 MOST_ROWS = 1_000_000
@@ -58,9 +58,9 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
     try:
         array = np.array(given)
     except ValueError:  # rows of unequal length
-        raise InputError(key, given, allowed) from None
+        raise InputError(key, quoted(given), allowed) from None
     if array.dtype.kind not in "iuf" or array.ndim != axes:
-        raise InputError(key, given, allowed)
+        raise InputError(key, quoted(given), allowed)
     if not np.isfinite(array).all():
         place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(key, f"a value that is not finite, number {place}", allowed)

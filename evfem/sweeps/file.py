@@ -21,9 +21,9 @@ import tomli_w
 from pydantic import Field as Key
 
 from evfem.common.checks import set_frozen
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted, unknown
 from evfem.scene.file import VERSION, dump, read_text, tables_of
-from evfem.scene.keys import SceneTable, Table, at, parse, shown, unknown
+from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
@@ -150,7 +150,7 @@ def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
 def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     """One entry of the grid: (label, keys and values) of each of its rows."""
     if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
-        given = "nothing" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
+        given = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
         raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
     if not isinstance(entry, Mapping):
         _check_key(f"grid.{name}", name)
@@ -179,7 +179,7 @@ def _plain(place: str, value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [_plain(place, one) for one in value]
     if not isinstance(value, (bool, int, float, str)):
-        raise InputError(place, value, "numbers, text, true or false, and lists of them")
+        raise InputError(place, quoted(value), "numbers, text, true or false, and lists of them")
     return value
 
 
@@ -213,7 +213,7 @@ def _check_output(output: Any, motions: int) -> None:
     if words[0] not in columns:
         raise unknown(f"outputs: {output}", words[0], columns)
     if len(words) == 3 and not (words[2].isdecimal() and int(words[2]) < motions):
-        raise InputError("outputs", output, f"motions from 0 to {motions - 1}")
+        raise InputError("outputs", quoted(output), f"motions from 0 to {motions - 1}")
 
 
 class SweepTable(Table):

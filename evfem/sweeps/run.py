@@ -22,7 +22,7 @@ from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
 from evfem.common.storage import alone_in
-from evfem.errors import InputError, NotConverged
+from evfem.errors import InputError, NotConverged, readable, unknown
 from evfem.scene.file import loads
 from evfem.simulation.result import origin
 from evfem.simulation.run import simulate
@@ -48,7 +48,7 @@ class SweepResult:
     def __getitem__(self, column: str) -> Any:
         """A column (points,): numbers as an array, NaN where there is none, else a list."""
         if column not in self.columns:
-            raise InputError("column", column, ", ".join(self.columns))
+            raise unknown("column", str(column), self.columns, readable(column))
         values = [row[column] for row in self.rows]
         if all(value is None or type(value) in (int, float) for value in values):
             return np.array([math.nan if value is None else value for value in values])

@@ -21,6 +21,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.tensor import Array, cofactor, complex_step, det, identity, trace, transpose
 from evfem.tissue.fields import Field, Integrand, Parts, fluxes, fluxes_at_once
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space, scatter
 
 
@@ -120,12 +121,12 @@ class Points:
 def points_of(space: Space, cells: Ints, small_strain: bool = False) -> Points:
     """The quadrature points of a space in some of its cells."""
     gradient = space.gradient[cells]
-    sample = gradient if space.sample is space.gradient else space.sample[cells]
+    sample = gradient if space.sampled is space.at else space.sample[cells]
     projection = None if space.projection is None else space.projection[cells]
     return Points(
         cells,
         space.nodes[cells],
-        space.value[cells],
+        np.broadcast_to(space.value, (len(cells), *space.value.shape)),
         gradient,
         space.weight[cells],
         space.points[:, cells],
@@ -305,12 +306,9 @@ class Integral:
         """Nodal forces (N, dim)."""
         return scatter(self.points.nodes, self.cell_forces(u), len(u))
 
-    def add_tangent(self, u: Floats, cells: Floats) -> None:
-        """Add the tangents to the cell matrices (E, n dim, n dim) of the whole mesh."""
-        if self.points.normal is None:
-            cells[self.points.cells] += self.cell_tangents(u)
-        else:  # a cell may have several facets
-            np.add.at(cells, self.points.cells, self.cell_tangents(u))
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangents to the `data` of a pattern."""
+        pattern.add(self.cell_tangents(u), self.points.cells, data)
 
 
 class UserIntegral(Integral):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from evfem.studies.stability.scenes import benchmark, layered
 from tools.builders import finger
-from tools.grids import assembled, rectangle
+from tools.grids import mixed_tangent_of, rectangle
 from tools.meshes import block
 
 import evfem as ev
@@ -160,7 +160,7 @@ def test_a_linear_step_solves_both_equations(element):
     free, units = free.ravel(), np.eye(u.size)
     through = np.array([tissue.pressure_forces(u0, e.reshape(q.shape)).ravel() for e in np.eye(q.size)]).T
     change = np.array([tissue.pressure_change(u0, e.reshape(u.shape)).ravel() for e in units]).T
-    K = assembled(space, tissue.tangent(u0, q0)).toarray()
+    K = mixed_tangent_of(tissue, u0, q0).toarray()
     misfit = tissue.pressure(u) - q
     mixed_forces = tissue.forces(u) - tissue.pressure_forces(u, misfit)
     system = np.block(
