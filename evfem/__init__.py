@@ -16,6 +16,10 @@ __version__ = "0.2.0"
 
 #: module -> the public names it gives
 _NAMES = {
+    "calibration.fit": ("fit",),
+    "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
+    "calibration.parameters": ("Parameter",),
+    "calibration.result": ("FitResult",),
     "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "contact.textures": ("Grating", "SelfAffine"),
     "electrostatics.laws": (

@@ -6,6 +6,11 @@ from evfem import plotting as plotting
 from evfem import protocols as protocols
 from evfem import reference as reference
 from evfem import tensor as tensor
+from evfem.calibration.fit import fit as fit
+from evfem.calibration.measured import MeasuredCurve as MeasuredCurve
+from evfem.calibration.measured import MeasuredValues as MeasuredValues
+from evfem.calibration.parameters import Parameter as Parameter
+from evfem.calibration.result import FitResult as FitResult
 from evfem.contact import surfaces as surfaces
 from evfem.contact.surfaces import Display as Display
 from evfem.contact.surfaces import Flat as Flat

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from evfem.common.checks import Within
+from evfem.scene.scene import DEPTH as SCENE_DEPTH
 
 
 class Text(NamedTuple):
@@ -26,6 +27,10 @@ class Text(NamedTuple):
 
 POSITIVE, NOT_NEGATIVE, RELATIVE = Within(0.0, above=True), Within(0.0), Within(1.0)
 TABLE = "a table"
+
+DEPTH = Text(
+    "mm", "of the finger; adds forces in N, areas in mm2", SCENE_DEPTH["allowed"], SCENE_DEPTH["test"]
+)
 
 SCENE = {
     "version": Text("", "version of the format", "1"),
@@ -61,6 +66,7 @@ FINGER = {
     ),
     "electrical": Text("", "the dielectric skin", f"{TABLE} [finger.electrical]"),
     "viscosity": Text("s", "relaxation time of materials without their own"),
+    "depth": DEPTH,
 }
 MESHED_FINGER = {
     "mesh": Text("", "a mesh of your own, in mm"),
@@ -68,6 +74,7 @@ MESHED_FINGER = {
     "materials": Text("", "the law of each region"),
     "electrical": Text("", "the dielectric skin"),
     "viscosity": Text("s", "relaxation time of materials without their own", "", Within(0.0, 1e3)),
+    "depth": DEPTH,
 }
 ELECTRICAL = {
     "stratum_corneum_thickness": Text("mm", "without it the region's local thickness", "", POSITIVE),
@@ -150,7 +157,11 @@ STRATEGY = {
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
 }
-OUTPUT = {"every": Text("", "fields of every n-th step, and of the last one")}
+OUTPUT = {
+    "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),
+    "precision": Text("", "of the fields; without it single where they would take more than 25 MB"),
+    "compression": Text("", "of the fields' files: a third of the size, slower to write"),
+}
 _STEPS, _HOLD = Text("", "in how many equal parts"), Text("", "what stays as it is")
 MOTION = {
     "press": {
