@@ -27,6 +27,7 @@ from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
+from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
 #: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
@@ -268,6 +269,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
+    stiff = [name for name, law in scene.finger.materials.items() if nearly_incompressible(split(law))]
+    if stiff:
+        lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]
     if unsymmetric:
         lines.append(
