@@ -28,7 +28,7 @@ ROOMS = {
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
+    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
     "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
