@@ -30,7 +30,7 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.storage import alone_in
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.scene.file import VERSION, loads, read_text, tables_of
 from evfem.scene.scene import Scene
 from evfem.simulation.result import origin
@@ -109,7 +109,7 @@ class _Problem:
         self.parameters = Parameters.of(parameters)
         for one in self.data:
             if not isinstance(one, (MeasuredCurve, MeasuredValues)):
-                raise InputError("data", one, "MeasuredCurve, MeasuredValues, or a list of them")
+                raise InputError("data", quoted(one), "MeasuredCurve, MeasuredValues, or a list of them")
             one.check(len(self.tables.get("motion", ())))
         self.questions = [(run.keys, run.question) for one in self.data for run in one.runs()]
         self.runs = grouped(self.questions)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.plotting.colours import BLACK, BLUE, CURVES, GREEN, ORANGE, PURPLE, SKY, STYLES, VERMILION
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
 from evfem.plotting.labels import Units, axis_label, column_label, column_text, kind_of, values_of
@@ -105,7 +105,7 @@ def checked_over(over: str | None, result: Result) -> str:
     if over is None:
         return abscissa(result)
     if over not in OVER:
-        raise InputError("over", over, " | ".join(OVER))
+        raise InputError("over", quoted(over), " | ".join(OVER))
     return over
 
 
@@ -153,7 +153,7 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     Raises InputError for what is no column of numbers.
     """
     if isinstance(columns, str) or not columns:
-        raise InputError("columns", columns, "a list of at least one column of the history")
+        raise InputError("columns", quoted(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
     kinds: dict[tuple[str, str], list[str]] = {}
     for name in columns:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.simulation.history import COLUMNS, UNITS
 from evfem.simulation.result import Result
 
@@ -124,5 +124,5 @@ def values_of(result: Result, name: str) -> Any:
     """
     names = [column for column in COLUMNS if column != "motion"]
     if name not in names:
-        raise InputError("column", name, " | ".join(names))
+        raise InputError("column", quoted(name), " | ".join(names))
     return getattr(result, name)

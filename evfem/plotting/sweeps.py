@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.plotting.colours import CURVES, ONE_SIGN, STYLES
 from evfem.plotting.figures import add_colorbar, axes_or_new
 from evfem.plotting.labels import key_label
@@ -74,7 +74,7 @@ def _done(table: SweepResult, *columns: str) -> list[dict[str, Any]]:
     """The rows in which these columns have a value; InputError for other columns, or none left."""
     for name in columns:
         if name not in table.columns:
-            raise InputError("column", name, ", ".join(table.columns))
+            raise InputError("column", quoted(name), ", ".join(table.columns))
     rows = [row for row in table.rows if all(row[name] is not None for name in columns)]
     if not rows:
         raise InputError("table", f"no point with {' and '.join(columns)}", "a sweep with results")

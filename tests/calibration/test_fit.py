@@ -180,7 +180,7 @@ def test_a_result_is_written_and_read_back(path, tmp_path):
     assert list(found.table()["parameter"]) == [E, MU]
     assert list(found.table()["value"]) == [found[E], found[MU]]
     assert found.provenance["versions"]["evfem"] == ev.__version__
-    with pytest.raises(InputError, match="parameter: given nu"):
+    with pytest.raises(InputError, match='parameter: given "nu"'):
         found["nu"]
 
 
