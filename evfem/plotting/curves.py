@@ -64,7 +64,8 @@ def _changes(values: Floats) -> bool:
 
 
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
-    """Normal, tangential, applied and electrostatic force (N/mm) over `over`.
+    """Normal, tangential, applied and electrostatic force over `over`, in N/mm, those of a
+    `Result.total` in N.
 
     `over` is step, position, time, indentation, voltage or applied_force; None takes what all
     motions change: the indentation for presses alone, the position for slides, the voltage for
@@ -96,7 +97,7 @@ def _draw_columns(
         y = drawn[name]
         if name == always or np.any(np.abs(y) > least):
             ax.plot(x, y, style, color=colour, label=label, marker=_marker(x))
-    finish(ax, result, over, axis_label(always))
+    finish(ax, result, over, axis_label(always, result.units))
     ax.legend()
 
 
@@ -113,7 +114,7 @@ def finish(ax: Axes, result: Result, over: str, label: str) -> None:
     """Labels, grid, and over the steps the motions."""
     if over == "step":
         _mark_motions(ax, result)
-    ax.set_xlabel(column_label(over))
+    ax.set_xlabel(column_label(over, result.units))
     ax.set_ylabel(label)
     ax.grid(alpha=0.3)
 
@@ -148,22 +149,21 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     kinds: dict[tuple[str, str], list[str]] = {}
     for name in columns:
         values_of(result, name)
-        kinds.setdefault(kind_of(name), []).append(name)
+        kinds.setdefault(kind_of(name, result.units), []).append(name)
     panels = new_panels(len(kinds), 1.0 + 1.9 * len(kinds))
     x = values_of(result, over)
     for ax, names in zip(panels, kinds.values(), strict=True):
         for name, colour, style in zip(names, cycle(CURVES), cycle(STYLES), strict=False):
-            ax.plot(
-                x, values_of(result, name), style, color=colour, label=column_text(name), marker=_marker(x)
-            )
+            text = column_text(name, result.units)
+            ax.plot(x, values_of(result, name), style, color=colour, label=text, marker=_marker(x))
         alone = len(names) == 1
-        ax.set_ylabel(column_label(names[0]) if alone else axis_label(names[0]))
+        ax.set_ylabel((column_label if alone else axis_label)(names[0], result.units))
         ax.grid(alpha=0.3)
         if not alone:
             ax.legend()
     if over == "step":
         _mark_motions(panels[0], result)
-    panels[-1].set_xlabel(column_label(over))
+    panels[-1].set_xlabel(column_label(over, result.units))
     return panels
 
 
@@ -177,18 +177,28 @@ def compare(
     for (name, result), colour, style in styled(found):
         x = values_of(result, over)
         ax.plot(x, values_of(result, column), style, color=colour, label=name, marker=_marker(x))
-    ax.set(xlabel=column_label(over), ylabel=column_label(column))
+    units = units_of(found)
+    ax.set(xlabel=column_label(over, units), ylabel=column_label(column, units))
     ax.grid(alpha=0.3)
     ax.legend()
     return ax
 
 
 def named(results: Results) -> dict[str, Result]:
-    """Results by their names; one alone has none."""
+    """Results by their names; one alone has none. All must have the same units."""
     found = {"": results} if isinstance(results, Result) else dict(results)
     if not found:
         raise InputError("results", "nothing", "a result, or {name: result, ...}")
+    if len({result.units["normal_force"] for result in found.values()}) > 1:
+        raise InputError(
+            "results", "results per mm of depth beside totals", "one kind: result or result.total"
+        )
     return found
+
+
+def units_of(found: Mapping[str, Result]) -> Mapping[str, str]:
+    """The units of the columns, which all results share."""
+    return next(iter(found.values())).units
 
 
 def styled(found: Mapping[str, Any]) -> Any:

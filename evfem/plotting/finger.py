@@ -165,7 +165,7 @@ def told(result: Result, frame: Frame) -> str:
     text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
     if rows.size:
         row = rows[0]
-        text += f", load {result.applied_force[row] + 0.0:.3g} N/mm"
+        text += f", load {result.applied_force[row] + 0.0:.3g} {result.units['applied_force']}"
         text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
     return text
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from evfem.errors import InputError
 from evfem.simulation.result import COLUMNS, UNITS, Result
 
+Units = Mapping[str, str]
 #: last word of a column's name -> what it is; columns of one kind share an axis
 KINDS = {
     "force": "force per depth",
@@ -37,41 +39,51 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text} ({unit})" if unit else text
 
 
-def column_text(name: str) -> str:
-    """A column in words, without its unit.
+def column_text(name: str, units: Units = UNITS) -> str:
+    """A column in words, without its unit; a width over a depth is an area.
 
-    >>> column_text("normal_force"), column_text("position")
-    ('normal force', 'position of the bone')
+    >>> from evfem.simulation.result import WHOLE_UNITS
+    >>> column_text("normal_force"), column_text("contact_width", WHOLE_UNITS)
+    ('normal force', 'contact area')
     """
+    name = name.replace("width", "area") if units[name] == "mm2" else name
     return TEXTS.get(name, name.replace("_", " "))
 
 
-def kind_of(name: str) -> tuple[str, str]:
+def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
     """Kind and unit of a column.
 
+    >>> from evfem.simulation.result import WHOLE_UNITS
     >>> kind_of("electrostatic_force_x"), kind_of("contact_width"), kind_of("substeps")
     (('force per depth', 'N/mm'), ('width', 'mm'), ('substeps', ''))
+    >>> kind_of("electrostatic_force_x", WHOLE_UNITS), kind_of("contact_width", WHOLE_UNITS)
+    (('force', 'N'), ('area', 'mm²'))
     """
     word = name.removesuffix("_x").rsplit("_", 1)[-1]
-    return KINDS.get(word, column_text(name)), UNITS[name]
+    unit = units[name].replace("2", "²")
+    if units[name] == "mm2":
+        return "area", unit
+    kind = KINDS.get(word, column_text(name))
+    return kind if units[name] == UNITS[name] else kind.removesuffix(" per depth"), unit
 
 
-def column_label(name: str) -> str:
+def column_label(name: str, units: Units = UNITS) -> str:
     """A column with its unit, for an axis of its own.
 
     >>> column_label("min_gap"), column_label("step")
     ('smallest gap (mm)', 'step')
     """
-    return with_unit(column_text(name), UNITS[name])
+    return with_unit(column_text(name, units), kind_of(name, units)[1])
 
 
-def axis_label(name: str) -> str:
+def axis_label(name: str, units: Units = UNITS) -> str:
     """The kind of a column with its unit, for an axis that it shares.
 
-    >>> axis_label("stored_energy")
-    'energy per depth (N)'
+    >>> from evfem.simulation.result import WHOLE_UNITS
+    >>> axis_label("stored_energy"), axis_label("stored_energy", WHOLE_UNITS)
+    ('energy per depth (N)', 'energy (mJ)')
     """
-    return with_unit(*kind_of(name))
+    return with_unit(*kind_of(name, units))
 
 
 def field_label(field: str) -> str:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evfem.errors import InputError
-from evfem.plotting.curves import Results, checked_over, finish, named, styled
+from evfem.plotting.curves import Results, checked_over, finish, named, styled, units_of
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
-from evfem.plotting.labels import axis_label, column_label, values_of
+from evfem.plotting.labels import axis_label, column_label, kind_of, values_of, with_unit
 from evfem.simulation.result import Result
 
 if TYPE_CHECKING:
@@ -26,13 +26,13 @@ def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
         rows = _presses(result)
         x, y = values_of(result, "indentation")[rows], values_of(result, "applied_force")[rows]
         ax.plot(x, y, style, color=colour, label=name, marker=".")
-    _label(ax, "indentation", axis_label("applied_force"), found)
+    _label(ax, "indentation", axis_label("applied_force", units_of(found)), found)
     return ax
 
 
 def contact_area(results: Results, ax: Axes | None = None) -> Axes:
-    """Contact width over the applied force of the presses: from edge to edge, and of all that
-    touches.
+    """Contact width, or the area of a `Result.total`, over the applied force of the presses: from
+    edge to edge, and of all that touches.
     """
     ax = axes_or_new(ax)
     found = named(results)
@@ -45,7 +45,7 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
         ):
             label = f"{name}, {text}" if name else text
             ax.plot(load, values_of(result, column)[rows], style, color=colour, label=label, marker=".")
-    _label(ax, "applied_force", axis_label("contact_width"), found)
+    _label(ax, "applied_force", axis_label("contact_width", units_of(found)), found)
     ax.legend()
     return ax
 
@@ -80,7 +80,8 @@ def signal(results: Results, over: str | None = None) -> Panels:
         x = values_of(result, over)
         for ax, column in zip(panels, ("voltage", "applied_tangential_force"), strict=True):
             ax.plot(x, values_of(result, column), style, color=colour, label=name)
-    for ax, label in zip(panels, ("voltage (V)", "friction force (N/mm)"), strict=True):
+    force = with_unit("friction force", kind_of("applied_tangential_force", first.units)[1])
+    for ax, label in zip(panels, ("voltage (V)", force), strict=True):
         finish(ax, first, over, label)
     panels[0].set_xlabel("")
     _legend(panels[1], found)
@@ -95,7 +96,7 @@ def _presses(result: Result) -> np.ndarray:
 
 
 def _label(ax: Axes, over: str, label: str, found: dict[str, Result]) -> None:
-    ax.set(xlabel=column_label(over), ylabel=label)
+    ax.set(xlabel=column_label(over, units_of(found)), ylabel=label)
     ax.grid(alpha=0.3)
     _legend(ax, found)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from evfem.plotting.curves import Results, named, styled
+from evfem.plotting.curves import Results, named, styled, units_of
 from evfem.plotting.figures import axes_or_new
 from evfem.plotting.labels import column_label
 from evfem.simulation import spectrum as spectra
@@ -38,7 +38,7 @@ def spectrum(
     for (name, (frequency, amplitude)), colour, style in styled(drawn):
         marker = "." if len(frequency) <= FEW else None
         ax.plot(frequency[1:], amplitude[1:], style, color=colour, label=name, marker=marker, linewidth=1.0)
-    ax.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {column_label(column)}")
+    ax.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {column_label(column, units_of(found))}")
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)
     if len(found) > 1:

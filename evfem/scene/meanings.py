@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from evfem.common.checks import Within
+from evfem.scene.scene import DEPTH
 
 
 class Text(NamedTuple):
@@ -36,6 +37,7 @@ SCENE = {
     "output": Text("", "which fields are kept"),
     "motion": Text("", "what happens, one table [[motion]] after the other"),
 }
+_DEPTH = Text("mm", "of the finger, for totals in N and mm2", DEPTH["allowed"], DEPTH["test"])
 FINGER = {
     "participant": Text("", "sizes of one of Table 1's fingers; other keys go before", "i to xi"),
     "width": Text("mm", "full width of the cross-section"),
@@ -61,6 +63,7 @@ FINGER = {
     ),
     "electrical": Text("", "the dielectric skin", f"{TABLE} [finger.electrical]"),
     "viscosity": Text("s", "relaxation time of materials without their own"),
+    "depth": _DEPTH,
 }
 MESHED_FINGER = {
     "mesh": Text("", "a mesh of your own, in mm"),
@@ -68,6 +71,7 @@ MESHED_FINGER = {
     "materials": Text("", "the law of each region"),
     "electrical": Text("", "the dielectric skin"),
     "viscosity": Text("s", "relaxation time of materials without their own", "", Within(0.0, 1e3)),
+    "depth": _DEPTH,
 }
 ELECTRICAL = {
     "stratum_corneum_thickness": Text("mm", "without it the region's local thickness", "", POSITIVE),

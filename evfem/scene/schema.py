@@ -163,7 +163,12 @@ def _finger() -> Section:
     }
     texts = meanings.FINGER | ranges
     texts["resolution"] = texts["resolution"]._replace(allowed=" | ".join(RESOLUTIONS))
-    own = {"participant": (str | None, Default(default=None)), "materials": table, "electrical": table}
+    own = {
+        "depth": (float | None, Default(default=None)),
+        "participant": (str | None, Default(default=None)),
+        "materials": table,
+        "electrical": table,
+    }
     found = section("finger", _from_fields(FingerPad, **own), texts, "parametric")
     for key in found.keys:
         if key.name == "resolution":

@@ -49,7 +49,7 @@ class History:
     time: Floats = field(metadata=column("s", "at the end of the step"))
     position: Floats = field(metadata=column("mm", "x of the bone"))
     indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
-    voltage: Floats = field(metadata=column("V", "effective"))
+    voltage: Floats = field(metadata=column("V", "effective; of the moment where it is resolved in time"))
     applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
     applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
     normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))

@@ -195,3 +195,21 @@ def test_every_column_has_a_kind_and_a_unit():
     counts = {"step", "motion_index", "motion", "substeps", "newton_iterations"}
     assert {name for name in COLUMNS if not kind_of(name)[1]} == counts
     assert kind_of("electrostatic_force_x") == kind_of("normal_force") == ("force per depth", "N/mm")
+
+
+def test_totals_are_drawn_in_newtons_and_areas():
+    provenance = {"scene": {"name": "fake", "total_steps": 4, "depth": 10.0}}
+    result = fake_result(provenance=provenance)
+    whole = result.total
+    assert [forces(r).get_ylabel() for r in (result, whole)] == ["force per depth (N/mm)", "force (N)"]
+    assert energies(whole).get_ylabel() == "energy (mJ)"
+    line = lines_of(forces(whole))["normal (contact)"]
+    np.testing.assert_array_equal(line.get_ydata(), 10.0 * result.normal_force)
+    ax = contact_area(whole)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("applied force (N)", "area (mm²)")
+    assert compare({"a": whole}, "contact_width").get_ylabel() == "contact area (mm²)"
+    assert [panel.get_ylabel() for panel in signal(whole)] == ["voltage (V)", "friction force (N)"]
+    panels = history(whole, ["normal_force", "contact_width", "real_contact_width", "voltage"])
+    assert [panel.get_ylabel() for panel in panels] == ["normal force (N)", "area (mm²)", "voltage (V)"]
+    with pytest.raises(InputError, match="results per mm of depth beside totals"):
+        compare({"a": whole, "b": result}, "normal_force")

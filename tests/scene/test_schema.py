@@ -90,7 +90,7 @@ def test_every_key_of_the_models_has_its_row():
     models |= {("motion", kind): model for kind, (model, _) in keys.MOTIONS.items()}
     for place, model in models.items():
         assert found.pop(place) == set(model.model_fields), place
-    assert found.pop(("finger", "parametric")) == {"participant"} | {
+    assert found.pop(("finger", "parametric")) == {"participant", "depth"} | {
         spec.name for spec in fields(FingerPad) if spec.init
     }
     for name, law in LAWS.items():
