@@ -16,6 +16,10 @@ __version__ = "0.2.0"
 
 #: module -> the public names it gives
 _NAMES = {
+    "calibration.fit": ("fit",),
+    "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
+    "calibration.parameters": ("Parameter",),
+    "calibration.result": ("FitResult",),
     "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "contact.textures": ("Grating", "SelfAffine"),
     "electrostatics.laws": (
@@ -33,6 +37,7 @@ _NAMES = {
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     "fast.model": ("FastModel", "reduce"),
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
+    "finger.scan": ("RidgeScan",),
     "loading": ("load",),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),

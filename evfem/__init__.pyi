@@ -6,6 +6,11 @@ from evfem import plotting as plotting
 from evfem import protocols as protocols
 from evfem import reference as reference
 from evfem import tensor as tensor
+from evfem.calibration.fit import fit as fit
+from evfem.calibration.measured import MeasuredCurve as MeasuredCurve
+from evfem.calibration.measured import MeasuredValues as MeasuredValues
+from evfem.calibration.parameters import Parameter as Parameter
+from evfem.calibration.result import FitResult as FitResult
 from evfem.contact import surfaces as surfaces
 from evfem.contact.surfaces import Display as Display
 from evfem.contact.surfaces import Flat as Flat
@@ -42,6 +47,7 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
 from evfem.mesh.mesh import Mesh as Mesh

@@ -235,12 +235,15 @@ class _Milestones:
 
 
 def _plan(given: argparse.Namespace) -> int:
-    from evfem.scene.plan import plan
+    from evfem.export import FieldFiles
+    from evfem.scene.plan import plan_on, scene_mesh
 
     scene = _scene(given.scene)
     with notices.status("building the mesh"):
-        needed = str(plan(scene))
-    print(needed, flush=True)
+        mesh, element = scene_mesh(scene)
+        needed = plan_on(scene, mesh, element)
+    files = FieldFiles.of(scene, mesh)
+    print(f"{needed}\n\nFiles of a run\n  {files}", flush=True)
     return DONE
 
 

@@ -9,16 +9,17 @@ from typing import Any
 from evfem.common.storage import format_of
 from evfem.errors import InputError
 
-Found = Any  # Result, FastModel, VoltageProfile, Sampled, Scene, Sweep or Mesh
+Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep or Mesh
 ALLOWED = (
-    "a result or a fast model (.npz), a signal (.csv, .wav), a scene or a sweep (.toml), a mesh (.vtu, .msh)"
+    "a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene or a sweep (.toml), "
+    "a mesh (.vtu, .msh)"
 )
 
 
 def load(path: str | Path) -> Found:
     """What is in a file: a `Result` or a `FastModel` (as their `save` wrote them, under any name),
-    a `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a
-    `Mesh` (.vtu, .msh).
+    a `FitResult` (.json), a `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene`
+    or a `Sweep` (.toml), a `Mesh` (.vtu, .msh).
 
     Raises InputError for any other or a damaged file, StorageError when the disk refuses.
 
@@ -67,6 +68,12 @@ def _tables(path: Path) -> Found:
     return sweepfile.load(path) if "scene" in tables else scenefile.load(path)
 
 
+def _fit(path: Path) -> Found:
+    from evfem.calibration.result import load
+
+    return load(path)
+
+
 def _mesh(path: Path) -> Found:
     from evfem.mesh.file import read
 
@@ -75,6 +82,7 @@ def _mesh(path: Path) -> Found:
 
 READERS: Mapping[str, Callable[[Path], Found]] = {
     ".csv": _signal,
+    ".json": _fit,
     ".wav": _signal,
     ".toml": _tables,
     ".vtu": _mesh,

@@ -19,7 +19,7 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl"},
+        {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
     "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
@@ -28,7 +28,7 @@ ROOMS = {
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
+    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
     "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
@@ -41,7 +41,7 @@ ROOMS = {
         "motion terms scene keys voltage meanings schema file resolution drift sense plan",
     ),
     "simulation": (
-        {"numpy", "threadpoolctl", "pandas"},
+        {"numpy", "threadpoolctl"},
         "provenance history result spectrum model works ledger checkpoint run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
@@ -49,10 +49,11 @@ ROOMS = {
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file schema folder pools run",
     ),
+    "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
-        "tractions meshes movie",
+        "fits tractions meshes movie",
     ),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them

@@ -146,6 +146,18 @@ def one_of(*names: str) -> dict[str, Any]:
     return {"allowed": " | ".join(names), "check": check, "names": names}
 
 
+def yes_or_no() -> dict[str, Any]:
+    """Metadata of a field that is True or False."""
+    return {"allowed": "true | false", "check": truth}
+
+
+def truth(key: str, value: object) -> bool:
+    """`value` if it is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(key, quoted(value), "true | false")
+    return value
+
+
 def check_fields(target: Any) -> None:
     """Check and store every field of a frozen dataclass that has a rule; a default None may stay
     None. All mistakes are reported at once.

@@ -1,4 +1,4 @@
-"""Pictures of results, meshes and sweeps with matplotlib: functions that return the Axes they drew
+"""Pictures of results, meshes, sweeps and fits with matplotlib: functions that return the Axes they drew
 on, or the axes of several panels; their `figure` is saved by
 `forces(result).figure.savefig("forces.png")`.
 """
@@ -7,6 +7,7 @@ from evfem.plotting.beside import side_by_side
 from evfem.plotting.curves import compare, energies, forces, history
 from evfem.plotting.fields import FIELDS
 from evfem.plotting.finger import deformed
+from evfem.plotting.fits import residuals
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
 from evfem.plotting.pressing import contact_area, force_indentation, friction, signal
@@ -27,6 +28,7 @@ __all__ = [
     "friction",
     "history",
     "regions",
+    "residuals",
     "side_by_side",
     "signal",
     "spectrum",

@@ -91,7 +91,7 @@ def _draw_columns(
     there.
     """
     over = checked_over(over, result)
-    x, drawn = values_of(result, over), {name: values_of(result, name) for name in lines}
+    x, drawn = along(result, over, over), {name: along(result, name, over) for name in lines}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
     for name, (label, colour, style) in lines.items():
         y = drawn[name]
@@ -108,6 +108,16 @@ def checked_over(over: str | None, result: Result) -> str:
     if over not in OVER:
         raise InputError("over", over, " | ".join(OVER))
     return over
+
+
+def along(result: Result, name: str, over: str) -> Any:
+    """A column as it is drawn over another one; over the time, of the steps that take none only the
+    last.
+    """
+    values = values_of(result, name)
+    if over != "time" or not len(values):
+        return values
+    return values[np.append(np.diff(result.time) > 0.0, True)]
 
 
 def finish(ax: Axes, result: Result, over: str, label: str) -> None:
@@ -151,11 +161,11 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
         values_of(result, name)
         kinds.setdefault(kind_of(name, result.units), []).append(name)
     panels = new_panels(len(kinds), 1.0 + 1.9 * len(kinds))
-    x = values_of(result, over)
+    x = along(result, over, over)
     for ax, names in zip(panels, kinds.values(), strict=True):
         for name, colour, style in zip(names, cycle(CURVES), cycle(STYLES), strict=False):
             text = column_text(name, result.units)
-            ax.plot(x, values_of(result, name), style, color=colour, label=text, marker=_marker(x))
+            ax.plot(x, along(result, name, over), style, color=colour, label=text, marker=_marker(x))
         alone = len(names) == 1
         ax.set_ylabel((column_label if alone else axis_label)(names[0], result.units))
         ax.grid(alpha=0.3)
@@ -175,8 +185,8 @@ def compare(
     over = checked_over(over, next(iter(found.values())))
     ax = axes_or_new(ax)
     for (name, result), colour, style in styled(found):
-        x = values_of(result, over)
-        ax.plot(x, values_of(result, column), style, color=colour, label=name, marker=_marker(x))
+        x = along(result, over, over)
+        ax.plot(x, along(result, column, over), style, color=colour, label=name, marker=_marker(x))
     units = units_of(found)
     ax.set(xlabel=column_label(over, units), ylabel=column_label(column, units))
     ax.grid(alpha=0.3)

@@ -31,7 +31,5 @@ def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
     ax.autoscale_view()
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
-    left, right = ax.get_xlim()
-    ax.set_xlim(left, right + 0.45 * (right - left))  # the legend stands beside the mesh
-    ax.legend(loc="upper right")
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
     return ax

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evfem.errors import InputError
-from evfem.plotting.curves import Results, checked_over, finish, named, styled, units_of
+from evfem.plotting.curves import Results, along, checked_over, finish, named, styled, units_of
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
 from evfem.plotting.labels import axis_label, column_label, kind_of, values_of, with_unit
 from evfem.simulation.result import Result
@@ -61,10 +61,10 @@ def friction(results: Results, over: str | None = None, ax: Axes | None = None) 
     first = next(iter(found.values()))
     over = checked_over(over, first)
     for (name, result), colour, style in styled(found):
-        load = values_of(result, "applied_force")
+        load = along(result, "applied_force", over)
         rows = load > 0.0
-        ratio = values_of(result, "applied_tangential_force")[rows] / load[rows]
-        ax.plot(values_of(result, over)[rows], ratio, style, color=colour, label=name)
+        ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
+        ax.plot(along(result, over, over)[rows], ratio, style, color=colour, label=name)
     finish(ax, first, over, "apparent friction coefficient")
     _legend(ax, found)
     return ax
@@ -77,9 +77,9 @@ def signal(results: Results, over: str | None = None) -> Panels:
     over = checked_over(over, first)
     panels = new_panels(2, 4.8)
     for (name, result), colour, style in styled(found):
-        x = values_of(result, over)
+        x = along(result, over, over)
         for ax, column in zip(panels, ("voltage", "applied_tangential_force"), strict=True):
-            ax.plot(x, values_of(result, column), style, color=colour, label=name)
+            ax.plot(x, along(result, column, over), style, color=colour, label=name)
     force = with_unit("friction force", kind_of("applied_tangential_force", first.units)[1])
     for ax, label in zip(panels, ("voltage (V)", force), strict=True):
         finish(ax, first, over, label)

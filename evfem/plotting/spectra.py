@@ -12,7 +12,8 @@ from evfem.simulation import spectrum as spectra
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FEW = 100  # so many frequencies are marked each
+FEW = 100  # so many frequencies are lines from 0, more are a curve
+THICK = 4.0  # points; a line in front of another is thinner
 
 
 def spectrum(
@@ -35,11 +36,16 @@ def spectrum(
         for name, result in found.items()
     }
     ax = axes_or_new(ax)
-    for (name, (frequency, amplitude)), colour, style in styled(drawn):
-        marker = "." if len(frequency) <= FEW else None
-        ax.plot(frequency[1:], amplitude[1:], style, color=colour, label=name, marker=marker, linewidth=1.0)
+    for number, ((name, (frequency, amplitude)), colour, style) in enumerate(styled(drawn)):
+        f, a = frequency[1:], amplitude[1:]
+        if len(f) <= FEW:
+            ax.vlines(f, 0.0, a, colors=colour, linewidth=THICK / (1.0 + number))
+            ax.plot(
+                f, a, linestyle="none", marker="oxs^v"[number % 5], color=colour, label=name, markersize=4
+            )
+        else:
+            ax.plot(f, a, style, color=colour, label=name, linewidth=1.0)
     ax.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {column_label(column, units_of(found))}")
-    ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)
     if len(found) > 1:
         ax.legend()

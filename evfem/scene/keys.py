@@ -15,7 +15,7 @@ from pydantic import Field as Key
 from evfem.electrostatics.laws import INSULATORS
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
-from evfem.scene.scene import COUPLINGS, DEPTH, DIRECTIONS, Output, Solver
+from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
 from evfem.solver.strategy import Strategy
 
 # A field's description is what an error says is allowed.
@@ -73,7 +73,6 @@ class MeshTable(Table):
     materials: dict[str, dict[str, Any]] = required("a table [finger.materials.NAME] for every region")
     electrical: dict[str, Any] = optional("a table [finger.electrical]", {})
     viscosity: float = optional("a relaxation time in s, not negative", 0.0)
-    depth: float | None = optional(DEPTH["allowed"])
 
 
 class ElectricalTable(Table):

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from evfem.common.checks import Within
-from evfem.scene.scene import DEPTH
+from evfem.scene.scene import DEPTH as SCENE_DEPTH
 
 
 class Text(NamedTuple):
@@ -28,6 +28,10 @@ class Text(NamedTuple):
 POSITIVE, NOT_NEGATIVE, RELATIVE = Within(0.0, above=True), Within(0.0), Within(1.0)
 TABLE = "a table"
 
+DEPTH = Text(
+    "mm", "of the finger; adds forces in N, areas in mm2", SCENE_DEPTH["allowed"], SCENE_DEPTH["test"]
+)
+
 SCENE = {
     "version": Text("", "version of the format", "1"),
     "finger": Text("", "the finger; without it that of the paper's Table 2"),
@@ -37,7 +41,6 @@ SCENE = {
     "output": Text("", "which fields are kept"),
     "motion": Text("", "what happens, one table [[motion]] after the other"),
 }
-_DEPTH = Text("mm", "of the finger, for totals in N and mm2", DEPTH["allowed"], DEPTH["test"])
 FINGER = {
     "participant": Text("", "sizes of one of Table 1's fingers; other keys go before", "i to xi"),
     "width": Text("mm", "full width of the cross-section"),
@@ -49,6 +52,9 @@ FINGER = {
     "ridge_phase": Text("pitches", "0: a crest in the middle, 0.5: a groove"),
     "ridge_crest": Text("pitches", "flat part of a crest; 0: rounded ridges"),
     "ridge_groove": Text("pitches", "flat part of a groove, with flat crests"),
+    "ridge_scan": Text(
+        "", "ridges as they were scanned", "the path of a csv file with the header x,height or x,y"
+    ),
     "stratum_corneum_thickness": Text("mm", "at a crest"),
     "epidermis_thickness": Text("mm", "of the living epidermis"),
     "dermis_thickness": Text("mm", "of the dermis"),
@@ -63,7 +69,7 @@ FINGER = {
     ),
     "electrical": Text("", "the dielectric skin", f"{TABLE} [finger.electrical]"),
     "viscosity": Text("s", "relaxation time of materials without their own"),
-    "depth": _DEPTH,
+    "depth": DEPTH,
 }
 MESHED_FINGER = {
     "mesh": Text("", "a mesh of your own, in mm"),
@@ -71,7 +77,7 @@ MESHED_FINGER = {
     "materials": Text("", "the law of each region"),
     "electrical": Text("", "the dielectric skin"),
     "viscosity": Text("s", "relaxation time of materials without their own", "", Within(0.0, 1e3)),
-    "depth": _DEPTH,
+    "depth": DEPTH,
 }
 ELECTRICAL = {
     "stratum_corneum_thickness": Text("mm", "without it the region's local thickness", "", POSITIVE),
@@ -154,7 +160,11 @@ STRATEGY = {
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
 }
-OUTPUT = {"every": Text("", "fields of every n-th step, and of the last one")}
+OUTPUT = {
+    "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),
+    "precision": Text("", "of the fields; without it single where they would take more than 25 MB"),
+    "compression": Text("", "of the fields' files: a third of the size, slower to write"),
+}
 _STEPS, _HOLD = Text("", "in how many equal parts"), Text("", "what stays as it is")
 MOTION = {
     "press": {

@@ -12,7 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
-from evfem.common.checks import Within, check_fields, choice, number, one_of, real, set_frozen, whole
+from evfem.common.checks import (
+    Within,
+    check_fields,
+    choice,
+    number,
+    one_of,
+    real,
+    set_frozen,
+    whole,
+    yes_or_no,
+)
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
@@ -28,6 +38,7 @@ from evfem.tissue.forms import Form
 DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
+PRECISIONS = ("single", "double")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
@@ -105,9 +116,16 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output:
-    """Fields are kept of every `every`-th step, and of the last one."""
+    """Fields are kept of every `every`-th step, and of the last one; None keeps all.
 
-    every: int = field(default=1, metadata=whole())
+    What is left open `evfem run` chooses so that its files of fields stay small
+    (`evfem.export.FieldFiles`): with `every` None it may write fewer of them, with `precision`
+    None in single precision. `compression` makes them smaller still, and slower to write.
+    """
+
+    every: int | None = field(default=None, metadata=whole())
+    precision: str | None = field(default=None, metadata=one_of(*PRECISIONS))
+    compression: bool = field(default=False, metadata=yes_or_no())
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -32,6 +32,8 @@ SPOKEN = {"number": "number", "integer": "whole number", "string": "text", "bool
 SPOKEN |= {"object": "table", "array": "list"}
 #: signals whose fields know their limits
 CLASSES: Mapping[str, type | None] = {"sine": Sine, "carrier": Carrier, "sampled": None}
+#: a key of [finger] that belongs to the scene
+DEPTH: Any = (float | None, Default(default=None))
 Schema = dict[str, Any]
 
 
@@ -163,12 +165,9 @@ def _finger() -> Section:
     }
     texts = meanings.FINGER | ranges
     texts["resolution"] = texts["resolution"]._replace(allowed=" | ".join(RESOLUTIONS))
-    own = {
-        "depth": (float | None, Default(default=None)),
-        "participant": (str | None, Default(default=None)),
-        "materials": table,
-        "electrical": table,
-    }
+    scan = (str | dict[str, list[float]] | None, Default(default=None))
+    own = {"participant": (str | None, Default(default=None)), "materials": table, "electrical": table}
+    own |= {"ridge_scan": scan, "depth": DEPTH}
     found = section("finger", _from_fields(FingerPad, **own), texts, "parametric")
     for key in found.keys:
         if key.name == "resolution":
@@ -210,6 +209,7 @@ def sections() -> list[Section]:
         _of_kind("motion", kind, model, meanings.MOTION[kind], cls)
         for kind, (model, cls) in keys.MOTIONS.items()
     ]
+    meshed = create_model("MeshKeys", __base__=keys.MeshTable, depth=DEPTH)
     signals = [
         _of_kind("electrostatics.signal", kind, model, meanings.SIGNAL, CLASSES[kind])
         for kind, model in SIGNALS.items()
@@ -217,7 +217,7 @@ def sections() -> list[Section]:
     return [
         section("", keys.SceneTable, meanings.SCENE),
         _finger(),
-        section("finger", keys.MeshTable, meanings.MESHED_FINGER, "mesh"),
+        section("finger", meshed, meanings.MESHED_FINGER, "mesh"),
         *_materials(),
         section("finger.electrical", keys.ElectricalTable, meanings.ELECTRICAL),
         *surfaces,

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import write_text
-from evfem.common.tables import csv_text
+from evfem.common.tables import csv_text, frame
 from evfem.errors import readable, unknown
 
 Row = Mapping[str, Any]
@@ -95,15 +94,7 @@ class History:
         """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
         installed a numpy record array of the same columns; `table["normal_force"]` is one.
         """
-        columns = {name: np.asarray(self[name]) for name in COLUMNS}
-        if find_spec("pandas") is not None:
-            from pandas import DataFrame
-
-            return DataFrame(columns)
-        records = np.recarray(len(self.step), [(name, column.dtype) for name, column in columns.items()])
-        for name, values in columns.items():
-            records[name] = values
-        return records
+        return frame({name: np.asarray(self[name]) for name in COLUMNS})
 
     def to_csv(self, path: str | Path) -> None:
         """Write the history as `evfem run` does (`history.csv`), whole or not at all."""

@@ -255,7 +255,7 @@ class Run:
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
-        if request.step % self.scene.output.every and request.step != self.scene.total_steps:
+        if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
         return self.frames[-1]

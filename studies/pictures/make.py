@@ -1,7 +1,7 @@
 """The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them
 again.
 
-Those of the gallery come from their studies, `evfem study NAME --out docs/pictures`.
+Those of the studies come from `evfem study NAME --out docs/pictures`.
 """
 
 import re
@@ -21,6 +21,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 #: "paraview.png" needs evfem[vtk]
 OF_PAGES = {
     "howto-layers.png": ("howto/finger.md", "layers.png"),
+    "howto-residuals.png": ("howto/fit.md", "residuals.png"),
     "tutorial-forces.png": ("tutorial.md", "forces.png"),
     "tutorial-deformed.png": ("tutorial.md", "deformed.png"),
     "paraview.png": ("howto/paraview.md", "pad.png"),
@@ -29,6 +30,13 @@ OF_PAGES = {
     "pictures-beside.png": ("howto/pictures.md", "beside.png"),
     "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
 }
+EXAMPLES = (
+    "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "
+)
+EXAMPLES += "laws spectrum history rendered texture beside sweep map samples"
+for name in EXAMPLES.split():
+    file = f"{name}.gif" if name == "slide" else f"{name}.png"
+    OF_PAGES[f"gallery-{file}"] = ("gallery.md", file)
 CODE = re.compile(r"^(<!-- not run: .+? -->\n)?```python\n(.*?)^```$", re.M | re.S)
 
 

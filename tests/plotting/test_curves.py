@@ -79,7 +79,7 @@ def test_forces_that_are_zero_are_left_out():
         (["press", "press", "slide"], {"position": [0.0, 0.0, 0.1]}, "step"),
         (["voltage"] * 3, {"voltage": [0.0, 10.0, 20.0]}, "voltage"),
         (["hover"], {}, "step"),
-        (["press", "wait", "wait"], {"time": [0.0, 0.1, 0.2], "position": [0.0] * 3}, "time"),
+        (["press", "wait", "wait"], {"time": [0.1, 0.2, 0.3], "position": [0.0] * 3}, "time"),
     ],
 )
 def test_a_run_is_drawn_over_what_its_motions_change(kinds, columns, over):
@@ -87,6 +87,16 @@ def test_a_run_is_drawn_over_what_its_motions_change(kinds, columns, over):
     assert abscissa(result) == over
     ax = forces(result)
     assert_line(lines_of(ax)["normal (contact)"], getattr(result, over), result.normal_force)
+
+
+def test_over_the_time_steps_that_take_none_are_one_moment():
+    result = run_of(["press", "press", "wait", "wait"], time=[0.0, 0.0, 0.1, 0.2], position=[0.0] * 4)
+    kept = [1, 2, 3]
+    assert_line(lines_of(forces(result))["normal (contact)"], result.time[kept], result.normal_force[kept])
+    (panel,) = history(result, ["voltage"])
+    assert_line(panel.get_lines()[0], result.time[kept], result.voltage[kept])
+    drawn = signal(result)[0].get_lines()[0]
+    assert_line(drawn, result.time[kept], result.voltage[kept])
 
 
 def test_energies_are_those_of_the_history():

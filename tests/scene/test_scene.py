@@ -110,6 +110,8 @@ WRONG_PARTS = [
     (lambda: Solver(tolerance=0.1), "tolerance"),
     (lambda: Solver(threads=0), "threads"),
     (lambda: Output(every=0), "every"),
+    (lambda: Output(precision="half"), "precision"),
+    (lambda: Output(compression=1), "compression"),
 ]
 
 

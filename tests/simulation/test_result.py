@@ -219,12 +219,12 @@ def test_a_written_history_is_that_of_a_run_folder(tmp_path):
 def test_the_table_has_every_column_without_pandas_and_with_it(monkeypatch):
     """`pandas` stands for a module with a DataFrame made of columns."""
     result = fake_result()
-    monkeypatch.setattr("evfem.simulation.history.find_spec", lambda name: None)
+    monkeypatch.setattr("evfem.common.tables.find_spec", lambda name: None)
     records = result.table()
     assert records.dtype.names == COLUMNS
     assert [tuple(row.values()) for row in result.rows] == records.tolist()
     assert records.step.dtype.kind == "i"
-    monkeypatch.setattr("evfem.simulation.history.find_spec", lambda name: name == "pandas")
+    monkeypatch.setattr("evfem.common.tables.find_spec", lambda name: name == "pandas")
     monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=lambda columns: ("frame", columns)))
     kind, columns = result.table()
     assert kind == "frame"
