@@ -18,6 +18,7 @@ import numpy as np
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
+from evfem.scene.drift import drifting
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
@@ -133,7 +134,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    rough, fast = unresolved(scene, mesh), too_fast(scene)
+    others = unresolved(scene, mesh), too_fast(scene), *drifting(scene, mesh, moduli)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
@@ -152,7 +153,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
-        warnings=(*doubts(scene, mesh, moduli), *(text for text in (rough, fast) if text is not None)),
+        warnings=(*doubts(scene, mesh, moduli), *(text for text in others if text is not None)),
     )
 
 
