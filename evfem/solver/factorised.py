@@ -28,6 +28,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
+    ALIKE,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     LOST,
@@ -80,6 +81,7 @@ class FactorisedBody:
         self.record = self.linearisation.record
         self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self._anderson = Anderson()
+        self._renewed = False
         self._scaled_down = 0
 
     # -- a step begins
@@ -96,6 +98,7 @@ class FactorisedBody:
         self.linearisation.choose_candidates(state, REACH * travel)
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
+        self._renewed = False
         self._scaled_down = 0
         return state
 
@@ -168,7 +171,10 @@ class FactorisedBody:
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate, with the factorisation at hand if that does and a new one if not."""
-        if self.linearisation.refactorise_if_needed(state, self.record.residuals):
+        again, residuals = self._renewed, self.record.residuals
+        self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
+        # where new tangents one after the other gain little, their maps are nearly one
+        if self._renewed and not (again and residuals[-1] < ALIKE):
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)

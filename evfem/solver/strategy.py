@@ -24,11 +24,11 @@ _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part; `patience`: renew the factorisation when more iterations than
-    this would be left with the old one; `smallest_part`: of a requested step, before it counts as
-    not converged; `easy`: a part with so few iterations lets the next one grow by the factor
-    `growth`; `reach`: a part begins at most so many times the last one's displacements ahead (0:
-    at the last state).
+    `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
+    the factorisation when more iterations than this would be left with the old one;
+    `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
+    so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
+    most so many times the last one's displacements ahead (0: at the last state).
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)
