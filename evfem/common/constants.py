@@ -45,7 +45,7 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
-ALIKE                   below this residual iterations with a new tangent each are combined too    thin
+ALIKE                   below this residual iterations with a new tangent each are combined too   thin
                                                                                                   insulators
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators

@@ -134,7 +134,7 @@ class Result(History):
         """This result over the whole `depth`: under the same names forces in N, widths as areas in
         mm2, works and energies in mJ; lengths, pressures and fields are as they were.
 
-        `result.total.rows`, `.table()`, `.to_csv(path)` and the plots then have these units too.
+        ``result.total.rows``, ``.table()``, ``.to_csv(path)`` and the plots then have these units too.
         Raises InputError where the scene says no depth.
         """
         depth = self._known_depth
