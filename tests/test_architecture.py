@@ -27,18 +27,18 @@ ROOMS = {
         {"numpy", "scipy", "skfem", "numba"},
         "fields forms elements moduli splitlaw ogden laws kernels.lanes kernels.elastic kernels.viscous "
         "space "
-        "assembly weakform userforms dynamics body",
+        "assembly weakform userforms dynamics drag body",
     ),
     "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed"),
+    "contact": ({"numpy", "scipy"}, "surfaces own pad edge attraction signorini condensed stability"),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation anderson findings equilibrium "
-        "factorised stepping",
+        "factorised relaxation stepping",
     ),
     "scene": ({"numpy", "pydantic", "tomli_w"}, "motion terms scene keys file resolution sense plan"),
-    "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint run rendering"),
+    "simulation": ({"numpy", "threadpoolctl"}, "result model works ledger checkpoint failure run rendering"),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},

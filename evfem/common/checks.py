@@ -124,6 +124,17 @@ def one_of(*names: str) -> dict[str, Any]:
     return {"allowed": " | ".join(names), "check": lambda key, value: choice(key, value, names)}
 
 
+def switch() -> dict[str, Any]:
+    """Metadata of a field that is on or off."""
+    return {"allowed": "true | false", "check": _on_or_off}
+
+
+def _on_or_off(key: str, value: object) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(key, value, "true | false")
+    return bool(value)
+
+
 def check_fields(target: Any) -> None:
     """Check and store every field of a frozen dataclass that has a rule; a default None may stay
     None.

@@ -42,16 +42,13 @@ from evfem.contact.signorini import (
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    Unstable,
     lost_stability,
     solve_with_attraction,
 )
 
 #: why there is no solution where the compliance is not positive
-LOST_STABILITY = (
-    "there is no equilibrium at rest near here: on the slopes of the profile the contact forces push the "
-    "finger aside harder than its tissue holds it; let the motion take time (speed, with dynamics = viscous "
-    "or inertial)"
-)
+LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,10 +246,10 @@ class LinearContactStep:
         follower = FollowerStiffness.of(known, near, np.diagonal(self.body.compliance)[0::2])
         C, W = follower.apply(self.body.among(near), free[rows])
         axes = known.axes[near]
-        start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
+        start = local(axes, W[:, :1])[:, 0] + np.concatenate(
             [known.surface.normal_gap[near], known.slip[near]]
         )
-        compliance = _local(axes, _local(axes, C).T).T
+        compliance = local(axes, local(axes, C).T).T
         if known.interface_compliance.any():
             compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
@@ -264,7 +261,7 @@ class LinearContactStep:
             found = solve_with_attraction(problem, attraction, status, self.snap)
         except ContactNotSolved as error:
             if follower.loaded.size and lost_stability(problem):
-                raise ContactNotSolved(LOST_STABILITY) from error
+                raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
@@ -290,7 +287,7 @@ class LinearContactStep:
         floor = UNHELD * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
         own = np.diagonal(pivot)
         pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return ExtraUnknowns(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
+        return ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, pivot, value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -353,7 +350,7 @@ def y_before_x(nodes: Ints) -> Ints:
     return np.concatenate([2 * nodes + 1, 2 * nodes])
 
 
-def _local(axes: Floats, columns: Floats) -> Floats:
+def local(axes: Floats, columns: Floats) -> Floats:
     """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat
     surface.
     """

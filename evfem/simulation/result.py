@@ -39,9 +39,10 @@ RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
 #: what is shown of the last step, with units
 SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
 SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
-#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
-NEEDED = ("motion", *INTEGERS, *RESUMED)
+INTEGERS = ("step", "motion_index", "substeps", "newton_iterations", "relaxations")
+#: columns without which a saved result is none; where an older version did not write another one yet, it is
+#: NaN, or 0 where it counts something
+NEEDED = ("motion", "step", "motion_index", "substeps", "newton_iterations", *RESUMED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +116,7 @@ class Result:
     snap_dissipation: Floats
     substeps: Ints
     newton_iterations: Ints
+    relaxations: Ints
     seconds: Floats
     # a field before this line is a column of the history
     frames: list[Frame]
@@ -161,6 +163,7 @@ class Result:
             "largest": extremes,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
+            "relaxations": int(self.relaxations.sum()),
             "seconds": float(self.seconds.sum()),
             "units": {"length": "mm", "force": "N/mm", "stress": "MPa", "voltage": "V", "energy": "N"},
             "provenance": self.provenance,
@@ -218,9 +221,9 @@ COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file
-    without one of those is refused as of another version. No object is unpickled, and no more
-    memory is taken than the file is long (at most 4 GB).
+    A column that an older version did not write yet is NaN, or 0 if it counts something, unless it
+    is one of `NEEDED`: a file without one of those is refused as of another version. No object is
+    unpickled, and no more memory is taken than the file is long (at most 4 GB).
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     lacking = [f"history/{name}" for name in NEEDED if f"history/{name}" not in arrays]
@@ -243,7 +246,10 @@ def load(path: str | Path) -> Result:
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
     column = arrays.get(f"history/{name}")
-    return np.full(len(arrays["history/step"]), np.nan) if column is None else _checked_column(name, column)
+    if column is not None:
+        return _checked_column(name, column)
+    steps = len(arrays["history/step"])
+    return np.zeros(steps, dtype=np.int64) if name in INTEGERS else np.full(steps, np.nan)
 
 
 def _checked_column(name: str, column: np.ndarray) -> Any:
