@@ -10,6 +10,8 @@ constant                meaning                                                 
 ======================  ========================================================================  ==========
 SMALLEST_FORCE          forces are compared with the largest reaction, N/mm, or with this
 KILOVOLT                squared voltages are counted in kV^2 where they are an unknown
+INCOMPRESSIBLE          tissue that is so many times stiffer against volume than in shear has     incom-
+                        its pressure as an unknown of the iterations                              pressible
 SMALLEST_J              no update shrinks a sampled volume below this ratio                       tissue
 SHORTEST_FRACTION       an update that must be cut below this fails the step                      tissue
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
@@ -43,6 +45,10 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
+ALIKE                   below this residual iterations with a new tangent each are combined too    thin
+                                                                                                  insulators
+MORE                    so many times the iterations may be used where the residuals' fall        thin
+                        promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
@@ -78,6 +84,7 @@ NAMED                   so many of the largest out-of-balance forces are named i
 
 SMALLEST_FORCE = 1e-6
 KILOVOLT = 1000.0
+INCOMPRESSIBLE = 100.0
 SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05
@@ -100,6 +107,8 @@ FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
+ALIKE = 1e-3
+MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
 STABLE = 0.9

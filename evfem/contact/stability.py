@@ -26,7 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.condensed import LinearContactStep, local, y_before_x
+from evfem.contact.condensed import LinearContactStep, y_before_x
+from evfem.contact.follower import local
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ExtraUnknowns
 
 #: the forces, by what they do

@@ -8,7 +8,7 @@ parameters with the defaults given there; every length is in mm.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.checks import choice, real, set_frozen
+from evfem import data
+from evfem.common.checks import Within, choice, real, set_frozen
 from evfem.common.views import called, changed, short, table
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import LAYERS, NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
+from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
@@ -53,6 +55,20 @@ RANGES: Mapping[str, tuple[float, float, str]] = {
 #: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
 #: inverse.
 STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
+
+#: What grows with the width of the finger from participant to participant.
+WITH_WIDTH = (
+    "nail_thickness",
+    "nail_width",
+    "bone_width",
+    "bone_offset",
+    "epidermis_thickness",
+    "dermis_thickness",
+)
+
+#: What a scan of the ridges takes the place of, and the part of its depth that two nodes may miss.
+PROFILE = ("ridges", "ridge_height", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove")
+MISSED = 0.5
 
 #: resolution -> divisions in quadratic cells; the rows of each layer stand in `LAYERS`.
 RESOLUTIONS: Mapping[str, Divisions] = {
@@ -98,7 +114,9 @@ class FingerPad:
     fractions `ridge_crest` and `ridge_groove` of the pitch, with cosine-shaped walls. Ridges fade
     out between 0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape
     that meets the ratio of ridge to gross contact area of Adams et al.
-    (doi:10.1098/rsif.2012.0467) within 10 %.
+    (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (`RidgeScan`, or the path of a csv file
+    with the header x,height or x,y) takes the place of this profile; `ridge_width` then says how
+    finely the pad is divided.
 
     **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the
     ridges: the stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height`
@@ -139,6 +157,7 @@ class FingerPad:
     ridge_phase: float = 0.0
     ridge_crest: float = 0.0
     ridge_groove: float = 0.0
+    ridge_scan: RidgeScan | str | os.PathLike[str] | None = None
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
     stratum_corneum_thickness: float = thickness_of("stratum_corneum")
     epidermis_thickness: float = thickness_of("epidermis")
@@ -154,16 +173,36 @@ class FingerPad:
     viscosity: float = 0.0
 
     def __post_init__(self) -> None:
+        mistakes = Mistakes()
         for name, (low, high, unit) in RANGES.items():
-            allowed = f"{low:g} to {high:g}{unit}"
-            set_frozen(
-                self, **{name: real(f"finger.{name}", getattr(self, name), allowed, _between(low, high))}
-            )
-        if not isinstance(self.ridges, bool):
-            raise InputError("finger.ridges", self.ridges, "true or false")
-        choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+            key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
+            with mistakes.of_a_part():
+                set_frozen(self, **{name: real(key, getattr(self, name), allowed, Within(low, high))})
+        with mistakes.of_a_part():
+            if not isinstance(self.ridges, bool):
+                raise InputError("finger.ridges", quoted(self.ridges), "true or false")
+        with mistakes.of_a_part():
+            choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+        with mistakes.of_a_part():
+            if self.ridge_scan is not None:
+                set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
+                _check_alone(self)
+        mistakes.report()
         set_frozen(self, materials=_all_materials(self.materials))
         _check_section(self, self._section)
+
+    @classmethod
+    def participant(cls, name: str, resolution: str = "medium") -> FingerPad:
+        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as
+        measured.
+
+        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
+        moduli are Table 2's, because nobody measured them.
+
+        >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
+        (14.04, 5.05)
+        """
+        return cls(resolution=resolution, **participant_sizes(name))
 
     def __repr__(self) -> str:
         """What differs from Table 2."""
@@ -172,10 +211,19 @@ class FingerPad:
     def _repr_html_(self) -> str:
         """For notebooks: sizes, and what differs from Table 2."""
         ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
+        ridges = ridges if self.ridge_scan is None else short(self.ridge_scan)
         rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
         rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
         rows.append(("resolution", self.resolution))
-        told = {"width", "height", "ridges", "ridge_height", "ridge_width", "stratum_corneum_thickness"}
+        told = {
+            "width",
+            "height",
+            "ridges",
+            "ridge_scan",
+            "ridge_height",
+            "ridge_width",
+            "stratum_corneum_thickness",
+        }
         own = {name: v for name, v in self._changed().items() if name not in told | {"resolution"}}
         return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
 
@@ -193,15 +241,18 @@ class FingerPad:
         bone.
         """
         if order not in (1, 2):
-            raise InputError("order", order, "1 or 2")
+            raise InputError("order", quoted(order), "1 or 2")
         return self._section.mesh(order)
 
     @property
     def _section(self) -> Section:
         outer = Ellipse(0.5 * self.width, 0.5 * self.height)
         bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
-        ridges = None
-        if self.ridges:
+        ridges: Ridges | ScannedRidges | None = None
+        if isinstance(self.ridge_scan, RidgeScan):
+            scanned = self.ridge_scan.depths(outer)
+            ridges = ScannedRidges(*scanned, self.ridge_width, FULL * outer.a, ZONE * outer.a)
+        elif self.ridges:
             profile = (self.ridge_height, self.ridge_width, self.ridge_exponent, self.ridge_phase)
             ridges = Ridges(*profile, self.ridge_crest, self.ridge_groove, FULL * outer.a, ZONE * outer.a)
         return Section(
@@ -217,13 +268,21 @@ class FingerPad:
         )
 
 
-def _between(low: float, high: float) -> Callable[[float], bool]:
-    return lambda value: low <= value <= high
+def participant_sizes(name: str) -> dict[str, Any]:
+    """Parameters of `FingerPad` that a participant of Table 1 has of his or her own (mm)."""
+    measured = data.load("table1")
+    choice("finger.participant", name, tuple(measured["participant"]))
+    width, height = measured.value(name, "a"), measured.value(name, "b")
+    sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
+    sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
+    return {"width": width, "height": height, **sizes}
 
 
 def _all_materials(own: object) -> dict[str, Any]:
     if not isinstance(own, Mapping):
-        raise InputError("finger.materials", own, "a law for each region that is not to have that of Table 2")
+        raise InputError(
+            "finger.materials", quoted(own), "a law for each region that is not to have that of Table 2"
+        )
     laws: dict[str, Any] = {
         layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in (*LAYERS, NAIL)
     }
@@ -232,6 +291,14 @@ def _all_materials(own: object) -> dict[str, Any]:
             raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
         laws[name] = law
     return laws
+
+
+def _check_alone(pad: FingerPad) -> None:
+    """Refuse a formula of ridges, or none, beside scanned ones."""
+    for name in PROFILE:
+        if getattr(pad, name) != getattr(FingerPad, name):
+            given = f"{name} = {getattr(pad, name)} beside a scan"
+            raise InputError(f"finger.{name}", given, "one of the two: the scan has the ridges as they are")
 
 
 def _check_section(pad: FingerPad, section: Section) -> None:
@@ -243,13 +310,12 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
         _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
-        _at_most(
-            "ridge_height", ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness"
-        )
+        height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
+        _at_most(height, ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness")
         _at_most(
             "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
         )
-        _check_walls(ridges, outer)
+        _check_walls(pad, ridges, outer)
     _at_most(
         "nail_thickness",
         pad.nail_thickness,
@@ -278,10 +344,19 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         )
 
 
-def _check_walls(ridges: Ridges, outer: Ellipse) -> None:
+def _check_walls(pad: FingerPad, ridges: Ridges | ScannedRidges, outer: Ellipse) -> None:
     slope = ridges.steepest / (1.0 - ridges.height * outer.b / outer.a**2)
-    limit = STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
-    if slope > limit:
+    limit = STEEPEST_FLAT if pad.ridge_crest > 0.0 else STEEPEST
+    if isinstance(ridges, ScannedRidges):
+        spacing = 0.5 * ridges.pitch / RESOLUTIONS[pad.resolution].per_ridge
+        missed = ridges.missed(spacing)
+        if slope > limit or missed > MISSED * ridges.height:
+            given = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
+            allowed = (
+                f"slopes up to {limit:g}, and at most {MISSED * ridges.height:.3g} mm: a smoother scan, "
+            )
+            raise InputError("finger.ridge_scan", given, allowed + "or a finer finger.resolution")
+    elif slope > limit:
         raise InputError(
             "finger.ridge_height",
             f"walls with a slope of {slope:.3g}",
@@ -310,7 +385,7 @@ class MeshedFinger:
     regions: Mapping[str, int] | None = None
 
     def __post_init__(self) -> None:
-        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", _between(0.0, 1e3))
+        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", Within(0.0, 1e3))
         set_frozen(self, viscosity=viscosity, materials=dict(self.materials))
         if not isinstance(self.source, Mesh):
             set_frozen(self, source=Path(self.source))
@@ -318,7 +393,7 @@ class MeshedFinger:
         for name in names:
             if name not in self.materials:
                 raise InputError(
-                    f"finger.materials.{name}", "nothing", "a material for every region of the mesh"
+                    f"finger.materials.{name}", ABSENT, "a material for every region of the mesh"
                 )
         for name in self.materials:
             if name not in names:

@@ -11,7 +11,8 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself
-        give up if the residual grows or is not finite
+        give up if the residual grows or is not finite, or after the strategy's iterations, unless
+            their fall promises the end soon
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
@@ -29,7 +30,7 @@ from typing import Protocol
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, SMALLEST_FORCE
+from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, MORE, SMALLEST_FORCE
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
@@ -237,12 +238,12 @@ class Equilibrium(Statics):
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
         self.record.residuals = history
-        for _ in range(self.strategy.iterations):
+        while len(history) < self.strategy.iterations or self._nearly(history):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
             reached = target.reached(state.bone)
-            history.append(balance.residual if reached else max(balance.residual, 1.0))
+            history.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
             if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):
@@ -253,7 +254,17 @@ class Equilibrium(Statics):
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
-        raise StepFailed(f"no equilibrium in {self.strategy.iterations} iterations", history)
+        raise StepFailed(f"no equilibrium in {len(history)} iterations", history)
+
+    def _nearly(self, history: list[float]) -> bool:
+        """Whether up to `MORE` times the iterations will do, as fast as the residuals (i,) fell in
+        the last quarter: a part that is cut would lose all of them.
+        """
+        most, window = int(MORE * self.strategy.iterations), len(history) // 4
+        if not 0 < window < len(history) < most or history[-1] <= self.tolerance:
+            return False
+        rate = (history[-1] / history[-1 - window]) ** (1.0 / window)
+        return history[-1] * rate ** (most - len(history)) < self.tolerance
 
     def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)

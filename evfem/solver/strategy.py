@@ -14,24 +14,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from evfem.common.checks import check_fields, number, switch, whole
+from evfem.common.checks import Within, check_fields, number, switch, whole
 
-_PATIENCE = number("a number of iterations, not negative", lambda n: n >= 0)
-_PART = number("a share of a step, above 0, at most 1", lambda s: 0.0 < s <= 1.0)
-_GROWTH = number("a factor from 1 to 10", lambda f: 1.0 <= f <= 10.0)
-_REACH = number("a factor from 0 to 10", lambda f: 0.0 <= f <= 10.0)
+_PATIENCE = number("a number of iterations, not negative", Within(0.0))
+_PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
+_GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
+_REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
 
 @dataclass(frozen=True)
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part; `patience`: renew the factorisation when more iterations than
-    this would be left with the old one; `smallest_part`: of a requested step, before it counts as
-    not converged; `easy`: a part with so few iterations lets the next one grow by the factor
-    `growth`; `reach`: a part begins at most so many times the last one's displacements ahead (0:
-    at the last state); `relaxation`: where even the smallest part fails, and takes no time, the
-    finger is released and comes to rest at another equilibrium.
+    `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
+    the factorisation when more iterations than this would be left with the old one;
+    `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
+    so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
+    most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
+    where even the smallest part fails, and takes no time, the finger is released and comes to rest
+    at another equilibrium.
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)

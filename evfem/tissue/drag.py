@@ -24,6 +24,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 
 
@@ -48,9 +49,9 @@ class Drag:
         """Nodal forces (N, dim) in N per mm of depth."""
         return self._terms.forces(u)
 
-    def add_tangent(self, u: Floats, cells: Floats) -> None:
-        """Add the tangent to the cell matrices (E, dim n, dim n)."""
-        self._terms.add_tangent(u, cells)
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangent to the `data` of a pattern."""
+        self._terms.add_tangent(u, pattern, data)
 
     def dissipation(self, u: Floats) -> float:
         """What the drag dissipates in the step that ends at u, N mm per mm of depth."""

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from tools.builders import SKIN
 from tools.meshes import between, held
 
+from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.errors import NotConverged
@@ -89,6 +90,12 @@ class Point:
     def beyond(self, bone):
         """x of the tip in the next trough with the bone at the same place."""
         return brentq(lambda x: self.bone(x) - bone, 0.55 * LENGTH, LENGTH + self.snap())
+
+
+@pytest.fixture(autouse=True)
+def no_way_around(monkeypatch):
+    """The iterations would find many of these equilibria by a weaker follower stiffness."""
+    monkeypatch.setattr(FollowerStiffness, "weaker", lambda *known: ())
 
 
 @pytest.fixture(scope="module")

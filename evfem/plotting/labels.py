@@ -1,0 +1,128 @@
+"""Names and units of what is drawn, the same in every picture.
+
+`units` are those of a result: per mm of depth, or over a whole depth (`Result.total`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from evfem.errors import InputError, quoted
+from evfem.simulation.history import COLUMNS, UNITS
+from evfem.simulation.result import Result
+
+Units = Mapping[str, str]
+
+#: last word of a column's name -> what it is; columns of one kind share an axis
+KINDS = {
+    "force": "force",
+    "width": "width",
+    "work": "energy",
+    "energy": "energy",
+    "dissipation": "energy",
+    "pressure": "pressure",
+}
+#: columns with a name of their own in a picture
+TEXTS = {"position": "position of the bone", "seconds": "computing time", "min_gap": "smallest gap"}
+#: fields of a frame: unit if it is not MPa, and name where the underscores alone do not make one
+FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
+FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}
+FIELD_TEXTS |= {f"cauchy_stress_{c}": f"Cauchy stress {c}" for c in ("xx", "yy", "zz", "xy")}
+#: last word of a key of a scene file -> its unit
+KEY_UNITS = dict.fromkeys(("gap", "indentation", "thickness", "height", "width", "distance", "y"), "mm")
+KEY_UNITS |= {"force": "N/mm", "voltage": "V", "amplitude": "V", "bias": "V", "E": "MPa", "mu": "MPa"}
+KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "Hz"}
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Text and unit of an axis.
+
+    >>> with_unit("area", "mm2"), with_unit("step", "")
+    ('area (mm²)', 'step')
+    """
+    return f"{text} ({unit.replace('mm2', 'mm²')})" if unit else text
+
+
+def column_text(name: str, unit: str = "") -> str:
+    """A column in words, without its unit: a width over a whole depth is an area.
+
+    >>> column_text("normal_force"), column_text("contact_width", "mm2")
+    ('normal force', 'contact area')
+    """
+    text = TEXTS.get(name, name.replace("_", " "))
+    return text.replace("width", "area") if unit == "mm2" else text
+
+
+def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
+    """Kind and unit of a column.
+
+    >>> kind_of("electrostatic_force_x"), kind_of("contact_width"), kind_of("substeps")
+    (('force per depth', 'N/mm'), ('width', 'mm'), ('substeps', ''))
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> kind_of("stored_energy", WHOLE_UNITS), kind_of("contact_width", WHOLE_UNITS)
+    (('energy', 'mJ'), ('area', 'mm2'))
+    """
+    unit = units[name]
+    kind = KINDS.get(name.removesuffix("_x").rsplit("_", 1)[-1])
+    if kind is None:
+        return column_text(name, unit), unit
+    if kind in ("force", "energy") and unit == UNITS[name]:
+        kind = f"{kind} per depth"
+    return column_text(kind, unit), unit
+
+
+def column_label(name: str, units: Units = UNITS) -> str:
+    """A column with its unit, for an axis of its own.
+
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> column_label("min_gap"), column_label("step"), column_label("real_contact_width", WHOLE_UNITS)
+    ('smallest gap (mm)', 'step', 'real contact area (mm²)')
+    """
+    return with_unit(column_text(name, units[name]), units[name])
+
+
+def axis_label(name: str, units: Units = UNITS) -> str:
+    """The kind of a column with its unit, for an axis that it shares.
+
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> axis_label("normal_force"), axis_label("normal_force", WHOLE_UNITS)
+    ('force per depth (N/mm)', 'force (N)')
+    """
+    return with_unit(*kind_of(name, units))
+
+
+def field_label(field: str) -> str:
+    """A field of a frame with its unit.
+
+    >>> field_label("von_mises"), field_label("contact_pressure")
+    ('von Mises stress (MPa)', 'contact pressure (MPa)')
+    """
+    return with_unit(FIELD_TEXTS.get(field, field.replace("_", " ")), FIELD_UNITS.get(field, "MPa"))
+
+
+def key_label(key: str) -> str:
+    """A dotted key of a scene file, or an output of a sweep, with its unit.
+
+    >>> key_label("motion.0.gap"), key_label("finger.materials.dermis.E")
+    ('gap (mm)', 'dermis E (MPa)')
+    >>> key_label("electrostatic_force.last"), key_label("surface.friction")
+    ('electrostatic force, last (N/mm)', 'friction')
+    """
+    parts = key.split(".")
+    if parts[0] in COLUMNS and parts[0] != "motion":
+        return with_unit(", ".join([column_text(parts[0]), *parts[1:]]), UNITS[parts[0]])
+    short = len(parts) > 1 and len(parts[-1]) <= 2
+    text = " ".join(parts[-2:] if short else parts[-1:]).replace("_", " ")
+    return with_unit(text, KEY_UNITS.get(parts[-1].rsplit("_", 1)[-1], ""))
+
+
+def values_of(result: Result, name: str) -> Any:
+    """A column of the history (steps,).
+
+    Raises InputError for what is no column of numbers.
+    """
+    names = [column for column in COLUMNS if column != "motion"]
+    if name not in names:
+        raise InputError("column", quoted(name), " | ".join(names))
+    return getattr(result, name)
