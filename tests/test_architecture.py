@@ -41,7 +41,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution sense plan",
+        "motion terms scene keys voltage meanings schema file resolution drift sense plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},

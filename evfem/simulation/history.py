@@ -7,7 +7,7 @@ Over a whole depth they are N and mJ, and widths are areas in mm2, under the sam
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,8 @@ from evfem.common.tables import csv_text, frame
 from evfem.errors import readable, unknown
 
 Row = Mapping[str, Any]
+#: a drift of the load that is worth a word
+DRIFT = 0.05
 #: unit per mm of depth -> unit over a depth
 WHOLE = {"N/mm": "N", "N": "mJ"}
 #: columns from which a run goes on
@@ -50,7 +52,7 @@ class History:
     time: Floats = field(metadata=column("s", "at the end of the step"))
     position: Floats = field(metadata=column("mm", "x of the bone"))
     indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
-    voltage: Floats = field(metadata=column("V", "effective"))
+    voltage: Floats = field(metadata=column("V", "effective; of the moment where it is resolved in time"))
     applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
     applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
     normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
@@ -118,6 +120,23 @@ def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
     return {
         name: value if WHOLE_UNITS[name] == UNITS[name] else value * depth for name, value in columns.items()
     }
+
+
+def load_drift(rows: Sequence[Row]) -> float:
+    """Largest relative change of the load, `applied_force`, since the last press to a positive one,
+    in rows that still have its indentation; 0 without such rows.
+
+    >>> held = {"motion": "slide", "indentation": 0.5, "applied_force": 0.06}
+    >>> round(load_drift([held | {"motion": "press", "applied_force": 0.05}, held]), 3)
+    0.2
+    """
+    largest, pressed = 0.0, None
+    for row in rows:
+        if row["motion"] in ("press", "hover"):
+            pressed = row if row["motion"] == "press" and row["applied_force"] > 0.0 else None
+        elif pressed is not None and row["indentation"] == pressed["indentation"]:
+            largest = max(largest, abs(row["applied_force"] / pressed["applied_force"] - 1.0))
+    return largest
 
 
 def csv_line(row: Row) -> str:

@@ -27,13 +27,13 @@ from evfem.mesh.mesh import Mesh
 
 # public in `ev.result`, where they were before
 from evfem.simulation.history import COLUMNS as COLUMNS
+from evfem.simulation.history import DRIFT, History, column_of, load_drift, over_depth
 from evfem.simulation.history import INTEGERS as INTEGERS
 from evfem.simulation.history import MEANINGS as MEANINGS
 from evfem.simulation.history import NEEDED as NEEDED
 from evfem.simulation.history import RESUMED as RESUMED
 from evfem.simulation.history import UNITS as UNITS
 from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
-from evfem.simulation.history import History, column_of, over_depth
 from evfem.simulation.history import Row as Row
 from evfem.simulation.history import csv_header as csv_header
 from evfem.simulation.history import csv_line as csv_line
@@ -144,6 +144,13 @@ class Result(History):
         return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
 
     @property
+    def load_drift(self) -> float:
+        """Largest relative change of the load where the indentation was held after a press; 0 where
+        the load was.
+        """
+        return load_drift(self.rows)
+
+    @property
     def contact_area(self) -> Floats:
         """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without
         one.
@@ -182,6 +189,7 @@ class Result(History):
             "kind": self.mesh.kind,
             "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
             "largest": extremes,
+            "load_drift": self.load_drift,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
             "relaxations": int(self.relaxations.sum()),
@@ -206,6 +214,8 @@ class Result(History):
         parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
+        if (drift := self.load_drift) > DRIFT:
+            lines.append(f"the load drifted by {drift:.1%} while the indentation was held")
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
