@@ -66,6 +66,17 @@ CHANGES                 so many changes of side in one step show that neither si
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
+COARSER                 after a release the next one within the same step comes at a part so many   texture
+                        times as long
+DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
+DRAG_GROWTH             where its speed grows less or more than these factors in one step
+DRAG_REST               drag of a rate below this is nearly none: a body that slows down may be at  snaps
+                        rest
+DRAG_CALMER             what was not at rest is asked again at so much less drag
+DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+DRAG_STEPS              steps of a release, failed ones included, before it is given up
+VERGE                   a step that failed where what takes stability away grows so fast, relative  snaps
+                        to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
 NAMED                   so many of the largest out-of-balance forces are named in a failure
 ======================  ========================================================================  ==========
@@ -109,5 +120,10 @@ HAIR = 1e-9
 SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
+COARSER = 4.0
+DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
+DRAG_REST, DRAG_CALMER = 0.01, 0.1
+DRAG_MOST, DRAG_STEPS = 1e6, 60
+VERGE = 0.9
 STAGGERED_LIMIT = 200
 NAMED = 3
