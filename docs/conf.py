@@ -26,6 +26,6 @@ add_module_names = False
 html_theme = "furo"
 html_title = f"evfem {release}"
 html_static_path = ["_static"]
-html_css_files = ["site.css"]
+html_css_files = ["site.css", "gallery.css"]
 html_show_copyright = False
 html_copy_source = False

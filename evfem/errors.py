@@ -5,26 +5,58 @@ The command line maps them to its exit status: `InputError` 2, `NotConverged` 3,
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from enum import Enum
 from typing import Any
 
 #: most letters of a value, and of a text, in a message
 LONGEST_VALUE, LONGEST_TEXT = 200, 500
+#: letters after which no further mistake is told
+LONGEST_LIST = 800
 
 
 class EvfemError(Exception):
     """Base of every exception that evfem raises on purpose."""
 
 
-def readable(value: object) -> str:
-    """A value as it is shown to the user: on one line, cut to a readable length.
+class Absent(Enum):
+    """What was given where nothing was; an enumeration, so that it is the same in every process."""
 
-    >>> readable("two\\nlines"), len(readable([1.0] * 1000))
-    ("'two\\\\nlines'", 200)
+    ABSENT = "missing"
+
+
+ABSENT = Absent.ABSENT
+
+
+def readable(value: object) -> str:
+    """A value as it is shown to the user: on one line, a text in quotes, cut to a readable length.
+
+    >>> print(readable("two\\nlines"), len(readable([1.0] * 1000)))
+    "two\\nlines" 200
     """
+    if isinstance(value, str):
+        start = value[: LONGEST_VALUE + 1]  # a file of 4 MB may be one text
+        return _cut(json.dumps(start, ensure_ascii=not start.isprintable()), LONGEST_VALUE)
     try:
         return _cut(repr(value), LONGEST_VALUE)
     except (ValueError, RecursionError):  # an integer of too many digits, lists in lists
         return f"{type(value).__name__} too large to show"
+
+
+def quoted(value: object) -> object:
+    """A value of a user's for `InputError`, to which a text is words of ours unless it has quotes.
+
+    >>> raise InputError("finger.width", quoted("500"), "12 to 24 mm")
+    Traceback (most recent call last):
+    evfem.errors.InputError: finger.width: given "500"; allowed: 12 to 24 mm
+    """
+    return readable(value) if isinstance(value, str) else value
+
+
+def _words(given: object) -> str:
+    return _line(given) if isinstance(given, str) else readable(given)
 
 
 def _line(text: str) -> str:
@@ -40,19 +72,108 @@ def _cut(text: str, most: int) -> str:
 class InputError(EvfemError, ValueError):
     """Input that cannot be used: names the key, what was given and what is allowed.
 
+    `given` is a value, or words (`quoted` makes a value of a text), or `ABSENT`.
+
     >>> raise InputError("finger.width", -3.0, "a length between 1 and 200 mm")
     Traceback (most recent call last):
     evfem.errors.InputError: finger.width: given -3.0; allowed: a length between 1 and 200 mm
+    >>> raise InputError("motion[0].speed", ABSENT, "a speed in mm/s")
+    Traceback (most recent call last):
+    evfem.errors.InputError: motion[0].speed: missing; allowed: a speed in mm/s
     """
 
     def __init__(self, key: str, given: object, allowed: str) -> None:
         self.key, self.given, self.allowed = key, given, allowed
-        text = _line(given) if isinstance(given, str) else readable(given)
-        super().__init__(f"{_line(key)}: given {text}; allowed: {allowed}")
+        text = "missing" if given is ABSENT else f"given {_words(given)}"
+        super().__init__(f"{_line(key)}: {text}; allowed: {allowed}")
+
+    @property
+    def mistakes(self) -> tuple[InputError, ...]:
+        """This mistake, as one of those that were found together (`InputErrors`)."""
+        return (self,)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, so that the error reaches another process."""
         return type(self), (self.key, self.given, self.allowed)
+
+
+class InputErrors(InputError):
+    """Several mistakes of one input, numbered; `key`, `given` and `allowed` are the first's."""
+
+    def __init__(self, mistakes: Sequence[InputError]) -> None:
+        first = mistakes[0]
+        super().__init__(first.key, first.given, first.allowed)
+        self._mistakes = tuple(mistakes)
+        text = f"{len(mistakes)} mistakes:"
+        for i, mistake in enumerate(mistakes, 1):
+            if i > 1 and len(text) > LONGEST_LIST:
+                text += f" and {len(mistakes) - i + 1} more"
+                break
+            text += f" ({i}) {mistake}"
+        self.args = (text,)
+
+    @property
+    def mistakes(self) -> tuple[InputError, ...]:
+        """All of them, in the order in which they were found."""
+        return self._mistakes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """For pickle, so that the error reaches another process."""
+        return type(self), (self._mistakes,)
+
+
+def unknown(key: str, name: str, known: Sequence[str], what: str = "an unknown key") -> InputError:
+    """The error for a name that does not exist, with the one that may have been meant.
+
+    >>> raise unknown("surface.frictoin", "frictoin", ["kind", "friction"])
+    Traceback (most recent call last):
+    evfem.errors.InputError: surface.frictoin: given an unknown key; allowed: friction? (kind, friction)
+    """
+    close = near(name, known)
+    return InputError(key, what, f"{close[0]}? ({', '.join(known)})" if close else ", ".join(known))
+
+
+def near(name: str, known: Sequence[str]) -> list[str]:
+    """The name that may have been meant, if there is one."""
+    from difflib import get_close_matches
+
+    return get_close_matches(name[:40], known, n=1)
+
+
+def together(mistakes: Sequence[InputError]) -> InputError:
+    """One error for one mistake or several."""
+    return InputErrors(mistakes) if len(mistakes) > 1 else mistakes[0]
+
+
+class Mistakes:
+    """Collects the mistakes of parts that can be judged apart, to report them at once.
+
+    >>> mistakes = Mistakes()
+    >>> for name, value in {"width": -3.0, "height": 12.0, "bone": "no"}.items():
+    ...     with mistakes.of_a_part():
+    ...         if value != 12.0:
+    ...             raise InputError(name, quoted(value), "12 mm")
+    >>> mistakes.report()
+    Traceback (most recent call last):
+    evfem.errors.InputErrors: 2 mistakes: (1) width: given -3.0; allowed: 12 mm \
+(2) bone: given "no"; allowed: 12 mm
+    """
+
+    def __init__(self) -> None:
+        self.found: list[InputError] = []
+
+    @contextmanager
+    def of_a_part(self) -> Iterator[None]:
+        """Keeps what is raised inside; what follows the raising line inside is left out."""
+        try:
+            yield
+        except InputError as error:
+            self.found += error.mistakes
+
+    def report(self) -> None:
+        """Raise what was found, if anything was."""
+        if self.found:
+            raise together(self.found)
 
 
 class NotConverged(EvfemError, RuntimeError):

@@ -1,4 +1,4 @@
-"""ParaView series: one uncompressed .vtu per step and a .pvd index that is valid after every step.
+"""ParaView series: one .vtu per step and a .pvd index that is valid after every step.
 
 Points are in the reference configuration (mm); displacement has three components, so that "Warp By
 Vector" shows the deformed finger. Cells keep the VTK node order of the mesh.
@@ -7,6 +7,8 @@ Vector" shows the deformed finger. Cells keep the VTK node order of the mesh.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -17,10 +19,87 @@ from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh
+from evfem.scene.scene import Scene
 from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
 
+#: what the files of a run may take (bytes) where the scene does not say how they are to be written
+MOST = 25_000_000
+#: of a file that is compressed, at most this share is left of the numbers; text and tags (bytes) of a file
+COMPRESSED, TAGS = 0.6, 4_000
 #: steps at which neither time nor position advances are told apart by this much (s or mm)
 INSTANT = 1e-9
+
+
+@dataclass(frozen=True)
+class FieldFiles:
+    """How the fields of a run are written, and how much they take.
+
+    Every `every`-th step and the steps `ends`, in `single` or double precision, `compressed` or
+    not: `number` files of `size` bytes in all, with compression at most.
+    """
+
+    every: int
+    ends: frozenset[int]
+    single: bool
+    compressed: bool
+    number: int
+    size: int
+
+    @classmethod
+    def of(cls, scene: Scene, mesh: Mesh) -> FieldFiles:
+        """What a scene says of its output, and for the rest what fits in 25 MB: double precision
+        if it can be, then single, then fewer steps, but always the last one of each motion.
+
+        >>> from evfem.scene.scene import default_scene
+        >>> scene = default_scene()
+        >>> print(FieldFiles.of(scene, scene.finger.mesh()))
+        fields of every 4th step and the last of each motion, single precision: 29 files, 25 MB
+        """
+        output, steps = scene.output, scene.total_steps
+        every, single = output.every or 1, output.precision == "single"
+        lasts = accumulate(motion.steps for motion in scene.motion)
+        ends = frozenset({steps} if output.every else lasts)
+
+        def made() -> FieldFiles:
+            number = len(ends.union(range(every, steps + 1, every)))
+            size = number * frame_size(mesh, single, output.compression)
+            return cls(every, ends, single, output.compression, number, size)
+
+        if output.precision is None:
+            single = made().size > MOST
+        while output.every is None and made().size > MOST and every < steps:
+            every += 1
+        return made()
+
+    def wants(self, step: int) -> bool:
+        """Whether the fields of a step are written."""
+        return step % self.every == 0 or step in self.ends
+
+    def __str__(self) -> str:
+        last = "last one" if len(self.ends) == 1 else "last of each motion"
+        steps = "every step" if self.every == 1 else f"every {ordinal(self.every)} step and the {last}"
+        how = f"{'single' if self.single else 'double'} precision"
+        most = "compressed, at most " if self.compressed else ""
+        return f"fields of {steps}, {how}: {self.number} files, {most}{self.size / 1e6:.0f} MB"
+
+
+def ordinal(number: int) -> str:
+    """The number of a thing in a row.
+
+    >>> [ordinal(n) for n in (2, 3, 4, 11, 21, 112)]
+    ['2nd', '3rd', '4th', '11th', '21st', '112th']
+    """
+    teens = number % 100 in (11, 12, 13)
+    return f"{number}{'th' if teens else {1: 'st', 2: 'nd', 3: 'rd'}.get(number % 10, 'th')}"
+
+
+def frame_size(mesh: Mesh, single: bool = False, compressed: bool = False) -> int:
+    """Bytes of the file of one frame, to within its tags; with compression at most."""
+    real = 4 if single else 8
+    nodes = len(mesh.points) * ((6 + len(POINT_FIELDS) - 1) * real + 1)  # a byte for the contact status
+    cells = len(mesh.cells) * (4 * mesh.cells.shape[1] + 4 + 8 + 4 + 6 * real)  # offset, type, region
+    share = COMPRESSED if compressed else 1.0
+    return round(share * (nodes + cells) * 4 / 3) + TAGS  # base64
 
 
 def paraview(result: Result, path: str | Path) -> Path:
@@ -38,21 +117,29 @@ def paraview(result: Result, path: str | Path) -> Path:
     return series.path
 
 
-def write_frame(mesh: Mesh, frame: Frame, path: str | Path) -> None:
-    """Write one step as a .vtu file: points, displacement and all fields of CONTRACT's names.
+def write_frame(
+    mesh: Mesh, frame: Frame, path: str | Path, *, single: bool = False, compressed: bool = False
+) -> None:
+    """Write one step as a .vtu file: points, displacement and all fields of a `Frame`.
 
     Field data `region:NAME` hold the numbers of the regions, as in the files of `meshfile.write`.
+    `single` precision halves the file.
     """
     import meshio
     from meshio.vtu import write as write_vtu
 
-    point_data = {"displacement": _three(frame.displacement)}
-    point_data |= {name: np.ascontiguousarray(getattr(frame, name)) for name in POINT_FIELDS}
-    cell_data = {"region": [np.asarray(mesh.region)]}
-    cell_data |= {name: [np.ascontiguousarray(getattr(frame, name))] for name in CELL_FIELDS}
-    grid = meshio.Mesh(_three(mesh.points), [(mesh.kind, mesh.cells)], point_data, cell_data)
+    def real(values: np.ndarray) -> np.ndarray:
+        return np.ascontiguousarray(values, dtype=np.float32 if single else np.float64)
+
+    point_data = {"displacement": real(_three(frame.displacement))}
+    point_data |= {name: real(getattr(frame, name)) for name in POINT_FIELDS}
+    point_data["contact_status"] = np.asarray(frame.contact_status, dtype=np.int8)
+    cell_data = {"region": [np.asarray(mesh.region, dtype=np.int32)]}
+    cell_data |= {name: [real(getattr(frame, name))] for name in CELL_FIELDS}
+    cells = np.asarray(mesh.cells, dtype=np.int32)
+    grid = meshio.Mesh(real(_three(mesh.points)), [(mesh.kind, cells)], point_data, cell_data)
     with replacing(path) as temporary:
-        write_vtu(str(temporary), grid, compression=None)
+        write_vtu(str(temporary), grid, compression="zlib" if compressed else None)
         meshfile.add_region_names(temporary, mesh)
 
 
@@ -61,11 +148,20 @@ class ParaViewSeries:
 
     Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the
     time if time passes, else the position; see `instants`. `earlier` rows belong to a run that is
-    continued: their .vtu files, where present, stay in the index.
+    continued: their .vtu files, where present, stay in the index. `single` and `compressed` as in
+    `write_frame`.
     """
 
-    def __init__(self, path: str | Path, earlier: Sequence[Row] = ()) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        earlier: Sequence[Row] = (),
+        *,
+        single: bool = False,
+        compressed: bool = False,
+    ) -> None:
         self.path = Path(path)
+        self.single, self.compressed = single, compressed
         if self.path.suffix != ".pvd":
             raise InputError("path", str(path), "a file name that ends in .pvd")
         self._mesh: Mesh | None = None
@@ -87,7 +183,8 @@ class ParaViewSeries:
 
     def add(self, row: Row, frame: Frame, mesh: Mesh) -> None:
         """Write the fields of one step; the index follows with `write_index`."""
-        write_frame(mesh, frame, self.frame_path(frame.step))
+        path = self.frame_path(frame.step)
+        write_frame(mesh, frame, path, single=self.single, compressed=self.compressed)
         self._rows = [old for old in self._rows if old["step"] < row["step"]] + [row]
 
     def write_index(self) -> None:

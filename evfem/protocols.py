@@ -11,6 +11,7 @@ part                   goes to                                   needs
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
+voltage over time      ``Scene(voltage=...)``                    `TimeSignal`
 weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
 observer               ``simulate(observers=[...])``             any of `Starting`, `Stepping`, `Finishing`
 =====================  ========================================  =======================================
@@ -131,6 +132,24 @@ class CompleteSurface(Surface, Protocol):
 
     def shifted(self, y: float) -> Any:
         """The same surface at the height `y` (mm)."""
+
+
+@runtime_checkable
+class TimeSignal(Protocol):
+    """A voltage over time."""
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude (V)."""
+
+    @property
+    def highest_frequency(self) -> float:
+        """Frequency (Hz) up to which the voltage has content, 0 for a constant; the steps must
+        resolve it.
+        """
+
+    def __call__(self, time: Any) -> Any:
+        """Voltage (V) at times in s (any shape), 0 being the start of the run."""
 
 
 class Starting(Protocol):

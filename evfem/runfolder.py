@@ -17,13 +17,17 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from evfem.common.notices import LOG
 from evfem.common.storage import disk, names_in, refuse_others, replacing, write_names, write_text
 from evfem.errors import InputError
-from evfem.export import ParaViewSeries
+from evfem.export import FieldFiles, ParaViewSeries
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth
 from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
 
+#: bytes of fields that are said before they are written
+WORTH_TELLING = 100_000_000
 MANIFEST = ".evfem-files"
 HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
     "history.csv",
@@ -54,6 +58,7 @@ class RunFolder:
     rows: list[Row] = field(default_factory=list, init=False)
     mesh: Mesh | None = field(default=None, init=False)
     opened: bool = field(default=False, init=False)
+    files: FieldFiles | None = field(default=None, init=False)
     _series: ParaViewSeries | None = field(default=None, init=False)
     _digest: str = field(default="", init=False)
     _lines: list[str] = field(default_factory=list, init=False)
@@ -65,6 +70,12 @@ class RunFolder:
         self.rows = list(self.resume.rows) if self.resume else []
         self._digest = self.scene.digest()
         refuse_others(self.path / MANIFEST, _present(self.path), "evfem")
+
+        if self.fields:
+            self.files = FieldFiles.of(scene, mesh)
+            thinned = self.files.every > 1 and scene.output.every is None
+            if thinned or self.files.size > WORTH_TELLING:
+                LOG.info("%s%s", self.files, "; every = 1 in [output] keeps all" if thinned else "")
 
     def step(self, row: Row, frame: Frame | None, checkpoint: Callable[[], dict[str, Any]]) -> None:
         """A step has converged: fields, checkpoint and history go to disk.
@@ -85,7 +96,7 @@ class RunFolder:
         row, frame, checkpoint = self._pending
         if not self.opened:
             self._open()
-        if frame is not None and self._series is not None and self.mesh is not None:
+        if frame is not None and self._series is not None and self.mesh is not None and self._wants(row):
             self._series.add(row, frame, self.mesh)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
             Checkpoint(self.path / STATE).write(self._digest, checkpoint(), [*self.rows, row])
@@ -94,6 +105,9 @@ class RunFolder:
         if self._series is not None:
             self._series.write_index()
         self._pending = None
+
+    def _wants(self, row: Row) -> bool:
+        return self.files is not None and self.files.wants(row["step"])
 
     def _write_history(self) -> None:
         self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
@@ -108,14 +122,23 @@ class RunFolder:
         if not self.opened:
             self._open()
         self._write_history()
+        if result is not None and self._series is not None:
+            self._write_last(result, self._series)
         if result is None:
             assert self.mesh is not None
             result = Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
         summary = result.summary()
         write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
         if self.plots and self.rows:
-            _picture(result, self.path / PICTURE)
+            _picture(result if result.depth is None else result.total, self.path / PICTURE)
         return summary
+
+    def _write_last(self, result: Result, series: ParaViewSeries) -> None:
+        """The fields of the last good step, where a run ended between two that are written."""
+        last = result.frames[-1] if result.frames else None
+        if last is not None and last.step == self.rows[-1]["step"] and not self._wants(self.rows[-1]):
+            series.add(self.rows[-1], last, result.mesh)
+            series.write_index()
 
     def _open(self) -> None:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
@@ -125,7 +148,10 @@ class RunFolder:
             for name in old if self.resume else [*old, *_present(self.path)]:
                 (self.path / name).unlink()
         steps = range(1, self.scene.total_steps + 1)
-        self._series = ParaViewSeries(self.path / FIELDS, self.rows) if self.fields else None
+        if self.files is not None:
+            single, compressed = self.files.single, self.files.compressed
+            path = self.path / FIELDS
+            self._series = ParaViewSeries(path, self.rows, single=single, compressed=compressed)
         series = [self._series.frame_path(n).name for n in steps] if self._series else []
         names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
         names = sorted({*names, *(names_in(self.path / MANIFEST) if self.resume else ())})
@@ -191,7 +217,7 @@ def _present(path: Path) -> list[str]:
 def _picture(result: Result, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from evfem.plotting import forces
+    from evfem.plotting.curves import forces
 
     with replacing(path) as temporary:
         figure = forces(result).figure
@@ -209,12 +235,12 @@ HEADS = {
     "tangential_force": "tangential",
     "electrostatic_force": "electrost.",
 }
-UNITS = ("mm", "mm", "V", "N/mm", "N/mm", "N/mm", "N/mm")
 WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 
 
-def table(rows: Sequence[Row], most: int = 12) -> str:
-    """At most about `most` rows of a history, always the last of each motion, in 80 columns.
+def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
+    """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
+    a whole `depth` (mm) forces are in N.
 
     >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
     >>> print(table([row]))
@@ -222,8 +248,10 @@ def table(rows: Sequence[Row], most: int = 12) -> str:
                        mm      mm       V      N/mm      N/mm       N/mm       N/mm
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
-    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", UNITS)]
+    units = UNITS if depth is None else WHOLE_UNITS
+    lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
+        row = row if depth is None else over_depth(row, depth)
         numbers = [_number(float(row[name]), _digits(name)) for name in HEADS]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)

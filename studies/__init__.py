@@ -9,7 +9,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 #: every study, in the order in which "all" runs them; it leaves out `APART`
 NAMES = (
@@ -56,7 +56,7 @@ class Sample:
         for key, least in (("scenes", 1), ("seed", 0), ("workers", 1)):
             value = getattr(self, key)
             if value is not None and value < least:
-                raise InputError(key, value, f"a whole number, at least {least}")
+                raise InputError(key, quoted(value), f"a whole number, at least {least}")
 
 
 def run(
@@ -68,7 +68,7 @@ def run(
     assumptions and provenance.
     """
     if name not in NAMES:
-        raise InputError("study", name, ", ".join(NAMES))
+        raise InputError("study", quoted(name), ", ".join(NAMES))
     if sample is not None and name != "campaign":
         raise InputError("study", f"scenes, seed or workers for {name}", "these options with campaign alone")
     main = import_module(f".{MODULES.get(name, name)}", __package__).main

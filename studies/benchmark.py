@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh, raised
 
 #: Semi-axes (A, B) in mm of the bone, the interface and the outer contour.
@@ -34,7 +34,7 @@ def benchmark_mesh(level: int, order: int = 1, *, same_nodes: bool = False) -> M
     ('quad9', 180)
     """
     if level not in LEVELS:
-        raise InputError("level", level, "0, 1, 2 or 3")
+        raise InputError("level", quoted(level), "0, 1, 2 or 3")
     return divided_mesh(LEVELS[level], order, same_nodes=same_nodes)
 
 

@@ -19,15 +19,13 @@ from evfem.common.arrays import Floats
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
-from evfem.mesh.mesh import Mesh
-from evfem.plotting import deformed
+from evfem.plotting import side_by_side
 from evfem.scene.motion import Slide
 from evfem.scene.scene import Output
-from evfem.simulation.model import placed
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.simulation.result import Frame, Result
 
-from .common import COLOURS, Series, Study, make_folder, new_figure
+from .common import Series, Study, make_folder
 from .rendered import (
     ASSUMPTIONS,
     QUICK_TEXTURE,
@@ -39,22 +37,20 @@ from .rendered import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 PAPER = {"voltage_V": 1911.12}
 NEAR = 1.0  # mm from the contact
-#: half width of the close-ups, depth below and height above the surface that they show (mm)
+#: half width of the close-ups, depth below and height above the contact that they show (mm)
 HALF, BELOW, ABOVE = 1.6, 0.25, 1.2
 TITLES = {"reference": "on the sinusoid", "display": "on the display"}
 
 
 @dataclass(frozen=True, eq=False)
 class Instant:
-    """One step of a run: a result with that step's fields alone, and the surface where it lay."""
+    """One step of a run: a result with that step's fields alone."""
 
     result: Result
-    surface: Any
 
     @property
     def frame(self) -> Frame:
@@ -83,9 +79,7 @@ class Instant:
 def _instant(recording: Recording, step: int) -> Instant:
     """The state of a recording after `step` steps, which must be one of its frames."""
     (frame,) = (frame for frame in recording.result.frames if frame.step == step)
-    mesh: Mesh = recording.result.mesh
-    surface, _ = placed(recording.scene.surface, mesh.points[mesh.node_sets["pad"]])
-    return Instant(replace(recording.result, frames=[frame]), surface)
+    return Instant(replace(recording.result, frames=[frame]))
 
 
 def instants(case: Case) -> dict[str, Instant]:
@@ -146,36 +140,15 @@ def _series(found: dict[str, Instant]) -> list[Series]:
 
 def draw(found: dict[str, Instant], numbers: dict[str, float]) -> Figure:
     """Whole pads above, close-ups of the contact below, one scale of stress for all."""
-    figure = new_figure(6.0, 10.0)
-    axes = figure.subplots(2, 2, height_ratios=(1.5, 1.0))
     x, y = found["reference"].touching.mean(axis=0)
-    highest = max(numbers[f"{name}.von_mises_max_MPa"] for name in found)
-    for column, (name, instant) in zip(axes.T, found.items(), strict=True):
-        for ax in column:
-            mapped = _draw_pad(ax, instant, highest)
-        column[1].set_xlim(x - HALF, x + HALF)
-        column[1].set_ylim(y - BELOW, y + ABOVE)
-        column[0].set_title(TITLES[name], fontsize="medium")
-        column[1].set_title(f"bone at x = {instant.frame.position:.2f} mm", fontsize="medium")
-    axes[1, 1].set_title(f"{numbers['voltage_V']:.0f} V (paper {PAPER['voltage_V']:g} V)", fontsize="medium")
-    for ax, letter in zip((axes[0, 0], axes[1, 0], axes[1, 1]), "abc", strict=True):
+    panels = side_by_side(
+        {TITLES[name]: instant.result for name, instant in found.items()},
+        near=(x - HALF, x + HALF, y - BELOW, y + ABOVE),
+        vmax=max(numbers[f"{name}.von_mises_max_MPa"] for name in found),
+    )
+    place = f"bone at x = {numbers['position_mm']:.2f} mm"
+    panels[2].set_title(place, fontsize="medium")
+    panels[3].set_title(f"{numbers['voltage_V']:.0f} V (paper {PAPER['voltage_V']:g} V)", fontsize="medium")
+    for ax, letter in zip((panels[0], panels[2], panels[3]), "abc", strict=True):
         ax.annotate(f"[{letter}]", (0.0, 1.02), xycoords="axes fraction", ha="left", va="bottom")
-    figure.colorbar(mapped, ax=axes, label="von Mises stress (MPa)", shrink=0.7, extend="max")
-    return figure
-
-
-def _draw_pad(ax: Axes, instant: Instant, highest: float) -> Any:
-    """The deformed pad, coloured from 0 to `highest` MPa, over the rigid surface."""
-    deformed(instant.result, ax=ax)
-    mapped = ax.collections[0]
-    mapped.set_clim(0.0, highest)
-    assert mapped.colorbar is not None
-    mapped.colorbar.remove()
-    left, right = instant.position[:, 0].min() - 0.5, instant.position[:, 0].max() + 0.5
-    x = np.linspace(left, right, 3000)
-    height = instant.surface.height(x) + instant.surface.y
-    ax.fill_between(x, height, height.min() - 0.8, color=COLOURS["neutral"], alpha=0.35, linewidth=0)
-    ax.plot(x, height, color="black", linewidth=0.8)
-    ax.set_xlim(left, right)
-    ax.set_ylim(height.min() - 0.8, instant.position[:, 1].max() + 0.3)
-    return mapped
+    return panels.figure

@@ -1,15 +1,15 @@
 """Eleven participants, two laws, three hover cases by finite elements, as one sweep; measurements
 beside it.
 
-Each participant has a finger of his or her own: width and height a_i, b_i of Table 1, bone, nail
-and the layers below the stratum corneum scaled with the width from Table 2's finger; stratum
-corneum, ridges and moduli are Table 2's. The bone is held, the tissue deforms. A plane model gives
-N/mm: the force in mN is that times the width out of the plane over which a rigid, smooth ellipsoid
-of the participant's axes (8a), (8b), (24) has the same force as its cross-section alone. So what
-differs from the closed forms of Fig. 5 is what deformation and ridges do. Expected: together they
-take away 2 to 6 %, about the same for everybody (ridges more, deformation gives some back), so
-that the closed forms' differences from the measured forces, up to a factor of three for fingers of
-the same size, are not theirs to explain.
+Each participant has a finger of his or her own (`FingerPad.participant`): width and height a_i,
+b_i of Table 1, bone, nail and the layers below the stratum corneum scaled with it from Table 2's
+finger; stratum corneum, ridges and moduli are Table 2's. The bone is held, the tissue deforms. A
+plane model gives N/mm: the force in mN is that times the width out of the plane over which a
+rigid, smooth ellipsoid of the participant's axes (8a), (8b), (24) has the same force as its
+cross-section alone. So what differs from the closed forms of Fig. 5 is what deformation and ridges
+do. Expected: together they take away 2 to 6 %, about the same for everybody (ridges more,
+deformation gives some back), so that the closed forms' differences from the measured forces, up to
+a factor of three for fingers of the same size, are not theirs to explain.
 """
 
 from __future__ import annotations
@@ -48,16 +48,6 @@ ASSUMPTIONS = {
     "voltages": "HV = 2000 V, LV = 1414 V",
     "mesh": "coarse, 0.2 % below medium with Kaczmarek's law; quick: the first three participants",
 }
-#: what scales with the width of the finger
-SCALED = (
-    "nail_thickness",
-    "nail_width",
-    "bone_width",
-    "bone_height",
-    "bone_offset",
-    "epidermis_thickness",
-    "dermis_thickness",
-)
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
@@ -97,7 +87,7 @@ def plan(names: list[str]) -> Sweep:
     """The sweep: a coarse finger of Table 2 hovering over its display; laws, cases and
     participants.
     """
-    values, measured = data.load("table2"), participants()
+    values = data.load("table2")
     scene = {
         "version": 1,
         "finger": {"resolution": "coarse"},
@@ -114,19 +104,8 @@ def plan(names: list[str]) -> Sweep:
         case: {"electrostatics.voltage": voltage, "motion.0.gap": gap}
         for case, (voltage, gap) in CASES.items()
     }
-    rows = zip(measured["participant"], measured["a"], measured["b"], strict=True)
-    fingers = {name: _finger(a, b) for name, a, b in rows if name in names}
-    grid = {"electrostatics.law": list(LAWS), "case": cases, "participant": fingers}
+    grid = {"electrostatics.law": list(LAWS), "case": cases, "finger.participant": names}
     return Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
-
-
-def _finger(width: float, height: float) -> dict[str, float]:
-    from evfem.finger.fingerpad import FingerPad
-
-    usual = FingerPad()
-    keys = {f"finger.{name}": getattr(usual, name) * width / usual.width for name in SCALED}
-    keys["finger.bone_height"] = usual.bone_height * height / usual.height
-    return {"finger.width": float(width), "finger.height": float(height)} | keys
 
 
 def widths(count: int) -> dict[tuple[str, str], Floats]:

@@ -7,8 +7,8 @@ import pytest
 
 #: rooms whose tests get the mark `solver`; files elsewhere say it themselves
 SOLVER = {"contact", "fast", "simulation", "solver", "tissue"}
-#: compiled loops are part of evfem[fast]
-collect_ignore = [] if find_spec("numba") else ["tissue/kernels"]
+#: compiled loops are built with a C compiler
+collect_ignore = [] if find_spec("evfem.tissue.kernels.loops") else ["tissue/kernels"]
 
 
 @pytest.hookimpl(tryfirst=True)  # before pytest selects by marks

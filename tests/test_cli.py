@@ -193,6 +193,62 @@ def test_a_file_of_others_in_the_way_stops_the_run_before_it_starts(place, name)
     assert (place / "here" / name).read_text() == "mine"
 
 
+@pytest.mark.parametrize("name", ["display", "texture", "mesh", "hover"])
+def test_each_template_runs(tmp_path, name):
+    """A new folder, three commands: a scene, its plan, its results; a second time nothing is lost."""
+    written = {"mesh": ["mesh.toml", "pad.vtu"]}.get(name, [f"{name}.toml"])
+    status, out, err = called(tmp_path, "init", "--template", name)
+    assert (status, err) == (0, "")
+    assert out == f"{', '.join(written)} written; evfem run {name}.toml runs it\n"
+    assert files(tmp_path) == written
+    assert called(tmp_path, "plan", f"{name}.toml")[0] == 0
+    status, out, err = called(tmp_path, "run", f"{name}.toml", "--no-fields", "--no-plots")
+    assert (status, "warning" in err) == (0, False)
+    rows = history(tmp_path / f"{name}-out")
+    assert f"{len(rows)} of {len(rows)} steps" in out
+    before = contents_of_files(tmp_path)
+    status, out, err = called(tmp_path, "init", "--template", name)
+    assert (status, out) == (2, "")
+    assert err == (f"evfem: FILE: given {name}.toml, which exists; allowed: a file that is not there yet\n")
+    assert contents_of_files(tmp_path) == before
+
+
+def contents_of_files(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
+
+
+def test_a_scene_to_begin_with_goes_where_it_is_wanted(tmp_path):
+    assert called(tmp_path, "init", "mine.toml")[0] == 0
+    assert files(tmp_path) == ["mine.toml"]
+    status, _, err = called(tmp_path, "init", "--template", "dislpay")
+    assert status == 2
+    assert "did you mean display?" in err
+
+
+def test_the_schemas_are_printed_as_json(tmp_path):
+    for more, title in (((), "evfem scene"), (("scene",), "evfem scene"), (("sweep",), "evfem sweep")):
+        status, out, err = called(tmp_path, "schema", *more)
+        assert (status, err) == (0, "")
+        assert json.loads(out)["title"] == title
+        assert called(tmp_path, "schema", *more, "--out", "s.json") == (0, "s.json\n", "")
+        assert (tmp_path / "s.json").read_text() == out
+
+
+def test_the_bare_command_shows_its_help(place, capsys):
+    status, out, err = called(place)
+    assert (status, err) == (0, "")
+    assert called(place, "--help")[1] == out
+    assert out.startswith("usage: evfem")
+
+
+def test_the_package_is_the_command(place):
+    words, environment = process_of("plan", "square.toml")
+    words[1:3] = ["-m", "evfem"]
+    done = subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, timeout=300)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout == called(place, "plan", "square.toml")[1]
+
+
 BAD_SCENES = {
     "unknown key": ("friction = 0.2", "frictoin = 0.2", "surface.frictoin"),
     "wrong type": ("E = 0.05", "E = 'soft'", "finger.materials.soft.E"),
@@ -224,7 +280,6 @@ def test_bad_input_is_one_sentence_and_writes_nothing(place, case):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ([], "COMMAND"),
         (["fly"], "invalid choice"),
         (["run", "none.toml"], "No such file"),
         (["run", "--fast"], "unrecognized"),
@@ -388,7 +443,7 @@ def test_a_study_writes_its_numbers_series_and_picture_where_it_is_told(tmp_path
 def test_an_unknown_study_is_refused_before_any_other_starts(tmp_path):
     status, out, err = called(tmp_path, "study", "section321", "fig99", "--out", "here")
     assert (status, out) == (2, "")
-    assert err.startswith("evfem: study: given fig99; allowed: section321, ")
+    assert err.startswith('evfem: study: given "fig99"; allowed: section321, ')
     assert files(tmp_path) == []
 
 

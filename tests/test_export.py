@@ -1,6 +1,7 @@
 """What ParaView gets: read back with meshio, the index with an XML reader."""
 
 import base64
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import meshio
@@ -9,8 +10,12 @@ import pytest
 from tools.fakes import fake_frame, fake_result, fake_row
 from tools.meshes import KINDS, square_mesh
 
+from evfem.contact.surfaces import Flat
 from evfem.errors import InputError, StorageError
-from evfem.export import ParaViewSeries, instants, paraview
+from evfem.export import FieldFiles, ParaViewSeries, frame_size, instants, paraview, write_frame
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene
 
 POINT_DATA = (
     "displacement",
@@ -64,6 +69,70 @@ def test_files_are_uncompressed_and_name_the_vtk_cell_type(kind, tmp_path):
     assert set(np.frombuffer(raw, dtype=np.dtype(types.attrib["type"].lower())).tolist()) == {
         VTK_NUMBER[kind]
     }
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("compressed", [False, True])
+def test_single_precision_and_compression_keep_what_is_seen(kind, compressed, tmp_path):
+    """Coordinates to 1e-7 of the size, whole numbers exactly, the same arrays and names."""
+    mesh = square_mesh(kind)
+    frame = fake_frame(mesh, 3)
+    write_frame(mesh, frame, tmp_path / "one.vtu", single=True, compressed=compressed)
+    read = meshio.read(tmp_path / "one.vtu")
+    assert set(read.point_data) == set(POINT_DATA)
+    np.testing.assert_allclose(read.points[:, :2], mesh.points, rtol=1e-7, atol=1e-7)
+    np.testing.assert_array_equal(read.point_data["contact_status"], frame.contact_status)
+    np.testing.assert_array_equal(read.cells[0].data, mesh.cells)
+    np.testing.assert_array_equal(read.cell_data["region"][0], mesh.region)
+    for name in ("gap", "contact_pressure", "shear_traction", "electrostatic_traction"):
+        assert read.point_data[name].dtype == np.float32
+        np.testing.assert_allclose(read.point_data[name], getattr(frame, name), rtol=1e-7)
+    np.testing.assert_allclose(read.cell_data["cauchy_stress"][0], frame.cauchy_stress, rtol=1e-7)
+
+
+@pytest.mark.parametrize("single", [False, True])
+def test_the_size_of_a_file_is_known_before(single, tmp_path):
+    mesh = FingerPad(resolution="coarse").mesh(2)
+    write_frame(mesh, fake_frame(mesh, 1), tmp_path / "one.vtu", single=single)
+    size = (tmp_path / "one.vtu").stat().st_size
+    assert abs(frame_size(mesh, single) - size) < 4_000
+    write_frame(mesh, fake_frame(mesh, 1), tmp_path / "small.vtu", single=single, compressed=True)
+    assert (tmp_path / "small.vtu").stat().st_size < frame_size(mesh, single, compressed=True) < size
+
+
+def scene_of(presses, slides, **output):
+    motion = [Press(force=0.05, steps=presses), Slide(1.0, steps=slides)]
+    return Scene(FingerPad(), Flat(), motion=motion, output=Output(**output))
+
+
+def test_a_run_writes_what_fits_and_the_end_of_each_motion():
+    """Medium mesh: 1.53 MB a step in double precision, 0.86 MB in single."""
+    mesh = FingerPad().mesh(2)
+    sizes = {}
+    for presses, slides in ((5, 10), (5, 20), (10, 100), (7, 1000)):
+        files = FieldFiles.of(scene_of(presses, slides), mesh)
+        sizes[slides] = files.every, files.single
+        written = [step for step in range(1, presses + slides + 1) if files.wants(step)]
+        assert len(written) == files.number
+        assert {presses, presses + slides} <= set(written)
+        assert files.size == files.number * frame_size(mesh, files.single) <= 25_000_000
+        more = replace(files, every=files.every - 1) if files.every > 1 else None
+        if more:
+            count = sum(map(more.wants, range(1, presses + slides + 1)))
+            assert count * frame_size(mesh, single=True) > 25_000_000
+    assert sizes == {10: (1, False), 20: (1, True), 100: (4, True), 1000: (36, True)}  # 29 files fit
+
+
+def test_what_a_scene_says_of_its_output_is_done():
+    mesh = FingerPad().mesh(2)
+    one = FieldFiles.of(scene_of(10, 100, every=1, precision="double", compression=True), mesh)
+    assert (one.every, one.single, one.compressed, one.number) == (1, False, True, 110)
+    size = 110 * frame_size(mesh, compressed=True) / 1e6
+    assert str(one) == f"fields of every step, double precision: 110 files, compressed, at most {size:.0f} MB"
+    third = FieldFiles.of(scene_of(10, 100, every=3), mesh)
+    assert (third.every, third.single) == (3, True)
+    assert [step for step in range(1, 111) if third.wants(step)] == [*range(3, 111, 3), 110]
+    assert str(third).startswith("fields of every 3rd step and the last one, single precision: 37 files")
 
 
 def test_instants_are_the_position_on_a_slide_and_always_increase(tmp_path):

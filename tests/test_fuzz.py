@@ -101,7 +101,7 @@ def little_memory(megabytes):
         ),
         (SCENE.replace("force", "f" * 10**6), "an unknown key"),
         (SCENE.replace("'press'", "'" + "p" * 10**6 + "'"), r"motion\[0\].kind"),
-        (SCENE.replace("'press'", '"two\\nlines"'), r"given two\\nlines"),
+        (SCENE.replace("'press'", '"two\\nlines"'), r'given "two\\nlines"'),
         (SCENE.replace("'flat'", "'profile'\nfile = \"a\\u0000b\""), "surface.file"),
         (SCENE.replace("'flat'", "'profile'\nfile = '" + "long/" * 2000 + "'"), "surface.file"),
         (SCENE + "[finger" + ".a" * 3000 + "]\n", "finger"),

@@ -18,6 +18,14 @@ def test_the_table_fits_80_columns_with_long_numbers():
     assert lines[-1].split() == ["2000", "voltage", "-12.346", "-12.346", "-10000"] + ["-12.34568"] * 4
 
 
+def test_over_a_depth_forces_are_in_newtons_and_lengths_as_they_were():
+    row = dict.fromkeys(COLUMNS, 0.02) | {"step": 1, "motion": "press", "motion_index": 0}
+    head, units, numbers = (line.split() for line in table([row], depth=10.0).splitlines())
+    assert units == ["mm", "mm", "V", "N", "N", "N", "N"]
+    assert numbers[2:] == ["0.020", "0.020", "0"] + ["0.20000"] * 4
+    assert head[2:4] == ["position", "indent."]
+
+
 def test_the_last_row_of_each_motion_is_shown():
     for counts in ((10, 100), (1,), (1, 1, 1), (3, 50, 2, 7)):
         ends = {sum(counts[: k + 1]) - 1 for k in range(len(counts))}

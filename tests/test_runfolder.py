@@ -1,6 +1,8 @@
 """The folder of a run is whole after every step, whatever interrupts the writing."""
 
 import json
+import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,13 +10,16 @@ from tools.fakes import fake_frame, fake_row
 from tools.meshes import square_mesh
 
 from evfem import export
+from evfem.common import notices
 from evfem.errors import InputError, StorageError
+from evfem.export import FieldFiles
+from evfem.finger.fingerpad import FingerPad
 from evfem.runfolder import RunFolder, saved
-from evfem.scene.scene import default_scene
+from evfem.scene.scene import Output, default_scene
 from evfem.simulation.result import Checkpoint, Result, csv_line
 
 SCENE = default_scene()
-MESH = square_mesh("quad")
+MESH, FINGER = square_mesh("quad"), FingerPad().mesh(2)
 
 
 def state(step):
@@ -139,3 +144,37 @@ def test_a_path_that_is_no_folder_is_a_storage_error(tmp_path):
         started(tmp_path / "file")
     with pytest.raises(StorageError, match="below"):
         take(started(tmp_path / "file" / "below"), 1)
+
+
+def test_a_run_that_ends_between_two_written_steps_leaves_the_fields_of_its_last(tmp_path, monkeypatch):
+    """As where a step does not converge: the pictures of what went wrong are there."""
+    monkeypatch.setattr(export, "MOST", 40 * export.frame_size(MESH, single=True))
+    folder = started(tmp_path)
+    take(folder, *range(1, 8))
+    written = [3, 6]  # of 110 steps 36 and the two ends of motions are the most that fit
+    assert steps_on_disk(tmp_path)[1:3] == (written, written)
+    rows = [fake_row(step) for step in range(1, 8)]
+    frames = [fake_frame(MESH, step) for step in range(1, 8)]
+    folder.close(Result.from_rows(rows, frames, MESH, {"scene": {"name": "x", "total_steps": 110}}))
+    assert steps_on_disk(tmp_path)[1:3] == ([*written, 7],) * 2
+
+
+def told(tmp_path, scene, **options):
+    """What a folder says at the start of a run."""
+    heard = []
+    handler = logging.Handler()
+    handler.emit = lambda record: heard.append(record.getMessage())
+    with notices.listening(handler, logging.INFO):
+        RunFolder(tmp_path, scene, **options).started(FINGER, scene, scene.total_steps)
+    return heard
+
+
+def test_what_will_take_much_room_is_said_before(tmp_path):
+    """Fields that are left out, or take more than 100 MB."""
+    assert told(tmp_path, SCENE) == [f"{FieldFiles.of(SCENE, FINGER)}; every = 1 in [output] keeps all"]
+    assert told(tmp_path, SCENE, fields=False) == []
+    every = {n: replace(SCENE, output=Output(every=n, precision="double")) for n in (1, 2)}
+    size = 110 * export.frame_size(FINGER) / 1e6
+    assert size > 100.0
+    assert told(tmp_path, every[1]) == [f"fields of every step, double precision: 110 files, {size:.0f} MB"]
+    assert told(tmp_path, every[2]) == []

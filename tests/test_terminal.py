@@ -3,7 +3,6 @@ arrives.
 """
 
 import io
-import logging
 import os
 import pty
 import re
@@ -11,7 +10,6 @@ import struct
 import sys
 import termios
 from fcntl import ioctl
-from importlib.util import find_spec
 from subprocess import Popen
 
 import pytest
@@ -113,7 +111,19 @@ def test_a_refused_scene_leaves_one_wrapped_sentence_and_no_bar(place):
     assert all(line.startswith("  ") for line in shown[1:])
 
 
-@pytest.mark.parametrize("command", ["", "run", "plan", "study", "sweep", "mesh", "signal"])
+def test_several_mistakes_stand_on_lines_of_their_own_in_a_terminal(place):
+    wrong = SCENE.replace("friction = 0.2", "friction = -0.2").replace("steps = 4", "steps = 0")
+    (place / "square.toml").write_text(wrong)
+    status, text = terminal(place, "run", "square.toml")
+    assert status == 2
+    assert [line for line in lines(text) if line.startswith("evfem: ")] == [
+        "evfem: 2 mistakes",
+        "evfem: surface.friction: given -0.2; allowed: a number from 0 to 100, or a",
+        "evfem: motion[0].steps: given 0; allowed: a whole number from 1 to 1000000",
+    ]
+
+
+@pytest.mark.parametrize("command", ["", "run", "init", "plan", "study", "sweep", "mesh", "signal", "schema"])
 def test_help_fits(monkeypatch, capsys, command):
     monkeypatch.setenv("COLUMNS", "80")
     assert cli.main([*command.split(), "--help"]) == 0
@@ -124,7 +134,7 @@ def test_help_fits(monkeypatch, capsys, command):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'signal') (see")],
+    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'schema') (see")],
 )
 def test_a_misspelt_command_is_guessed(capsys, given, words):
     assert cli.main([given]) == 2
@@ -193,40 +203,6 @@ def test_notices_are_shown_once_and_the_logger_is_left_as_it_was(capsys):
         notices.LOG.info("unheard too")
     assert capsys.readouterr().err == "evfem: one line\n"
     assert (notices.LOG.level, notices.LOG.handlers) == before
-
-
-def test_compiling_is_told_once():
-    """A loop of the package says that it is compiled, one of others does not, without numba
-    nobody.
-    """
-    if find_spec("numba") is None:
-        return
-    from evfem.tissue.kernels import lanes
-
-    def ours(x):
-        return x + 1
-
-    def theirs(x):
-        return x - 1
-
-    ours.__module__, theirs.__module__ = "evfem.tissue.kernels.elastic", "elsewhere"
-    heard = []
-    handler = logging.Handler()
-    handler.emit = heard.append
-    from numba import njit
-
-    said, lanes.COMPILING.said = lanes.COMPILING.said, False
-    try:
-        with notices.listening(handler, logging.INFO):
-            njit(theirs)(1)
-            assert heard == []
-            njit(ours)(1)
-            njit(ours)(1.0)
-    finally:
-        lanes.COMPILING.said = said
-    assert [record.getMessage() for record in heard] == [
-        "compiling the element loops, once after an installation: up to a minute"
-    ]
 
 
 def test_shells_can_complete():

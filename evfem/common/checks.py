@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 
-from evfem.errors import InputError
+from evfem.errors import InputError, Mistakes, quoted
 
 MOST_STEPS = 1_000_000
 Values = Any  # a number, or an array of numbers: real, or complex in a complex step
@@ -28,13 +28,13 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     1.0
     """
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise InputError(key, value, allowed)
+        raise InputError(key, quoted(value), allowed)
     try:
         number = float(value)
     except OverflowError:  # an integer beyond all floats
         number = math.inf
     if not (math.isfinite(number) and test(number)):
-        raise InputError(key, value, allowed)
+        raise InputError(key, quoted(value), allowed)
     return number
 
 
@@ -46,14 +46,14 @@ def count(key: str, value: object, most: int = MOST_STEPS) -> int:
     evfem.errors.InputError: steps: given 2.5; allowed: a whole number from 1 to 1000000
     """
     if isinstance(value, bool) or not isinstance(value, Integral) or not 1 <= int(value) <= most:
-        raise InputError(key, value, f"a whole number from 1 to {most}")
+        raise InputError(key, quoted(value), f"a whole number from 1 to {most}")
     return int(value)
 
 
 def choice(key: str, value: object, names: tuple[str, ...]) -> str:
     """`value` if it is one of `names`."""
     if not isinstance(value, str) or value not in names:
-        raise InputError(key, value, " | ".join(names))
+        raise InputError(key, quoted(value), " | ".join(names))
     return value
 
 
@@ -92,9 +92,9 @@ def finite(key: str, given: Values, allowed: str) -> Values:
     try:
         value = np.asarray(given)
     except ValueError as error:  # rows of different length
-        raise InputError(key, given, allowed) from error
+        raise InputError(key, quoted(given), allowed) from error
     if value.dtype.kind not in "iufc" or not np.all(np.isfinite(value)):
-        raise InputError(key, given, allowed)
+        raise InputError(key, quoted(given), allowed)
     return plain(value * 1.0)
 
 
@@ -109,24 +109,58 @@ def set_frozen(target: object, **values: object) -> None:
         object.__setattr__(target, name, value)
 
 
+@dataclass(frozen=True)
+class Within:
+    """The test of a number from `low` to `high`; `low` itself is out where it is `above`, and 0
+    where it is `not_zero`.
+
+    >>> Within(0.0, 200.0)(0.0), Within(0.0, above=True)(0.0), Within(-1.0, 1.0, not_zero=True)(0.0)
+    (True, False, False)
+    """
+
+    low: float = -math.inf
+    high: float = math.inf
+    above: bool = False
+    not_zero: bool = False
+
+    def __call__(self, value: float) -> bool:
+        inside = (self.low < value if self.above else self.low <= value) and value <= self.high
+        return inside and not (self.not_zero and value == 0.0)
+
+
 def number(allowed: str, test: Callable[[float], bool]) -> dict[str, Any]:
     """Metadata of a field that is a finite float and passes `test`; `allowed` says so in words."""
-    return {"allowed": allowed, "check": lambda key, value: real(key, value, allowed, test)}
+    check = lambda key, value: real(key, value, allowed, test)  # noqa: E731
+    return {"allowed": allowed, "check": check, "test": test}
 
 
 def whole(most: int = MOST_STEPS) -> dict[str, Any]:
     """Metadata of a field that is a whole number from 1 to `most`."""
-    return {"allowed": "a whole number, at least 1", "check": lambda key, value: count(key, value, most)}
+    check = lambda key, value: count(key, value, most)  # noqa: E731
+    return {"allowed": f"a whole number from 1 to {most}", "check": check, "test": Within(1, most)}
 
 
 def one_of(*names: str) -> dict[str, Any]:
     """Metadata of a field that is one of `names`."""
-    return {"allowed": " | ".join(names), "check": lambda key, value: choice(key, value, names)}
+    check = lambda key, value: choice(key, value, names)  # noqa: E731
+    return {"allowed": " | ".join(names), "check": check, "names": names}
+
+
+def yes_or_no() -> dict[str, Any]:
+    """Metadata of a field that is True or False."""
+    return {"allowed": "true | false", "check": truth}
+
+
+def truth(key: str, value: object) -> bool:
+    """`value` if it is True or False."""
+    if not isinstance(value, bool):
+        raise InputError(key, quoted(value), "true | false")
+    return value
 
 
 def check_fields(target: Any) -> None:
     """Check and store every field of a frozen dataclass that has a rule; a default None may stay
-    None.
+    None. All mistakes are reported at once.
 
     >>> from dataclasses import dataclass, field
     >>> @dataclass(frozen=True)
@@ -141,7 +175,10 @@ def check_fields(target: Any) -> None:
     Traceback (most recent call last):
     evfem.errors.InputError: gap: given -1; allowed: a gap in mm, not negative
     """
+    mistakes = Mistakes()
     for spec in fields(target):
         value = getattr(target, spec.name)
         if "check" in spec.metadata and not (value is None and spec.default is None):
-            set_frozen(target, **{spec.name: spec.metadata["check"](spec.name, value)})
+            with mistakes.of_a_part():
+                set_frozen(target, **{spec.name: spec.metadata["check"](spec.name, value)})
+    mistakes.report()

@@ -10,6 +10,8 @@ constant                meaning                                                 
 ======================  ========================================================================  ==========
 SMALLEST_FORCE          forces are compared with the largest reaction, N/mm, or with this
 KILOVOLT                squared voltages are counted in kV^2 where they are an unknown
+INCOMPRESSIBLE          tissue that is so many times stiffer against volume than in shear has     incom-
+                        its pressure as an unknown of the iterations                              pressible
 SMALLEST_J              no update shrinks a sampled volume below this ratio                       tissue
 SHORTEST_FRACTION       an update that must be cut below this fails the step                      tissue
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
@@ -65,6 +67,7 @@ NAMED                   so many of the largest out-of-balance forces are named i
 
 SMALLEST_FORCE = 1e-6
 KILOVOLT = 1000.0
+INCOMPRESSIBLE = 100.0
 SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05

@@ -168,6 +168,13 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
                 np.lib.format.write_array(member, array, allow_pickle=False)
 
 
+def format_of(path: str | Path) -> str:
+    """What the array `format` of such a file says; nothing where there is none to be read."""
+    with suppress(*DAMAGE, OSError), zipfile.ZipFile(path) as archive:
+        return str(_array(archive, archive.getinfo("format.npy")))
+    return ""
+
+
 def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
     """All arrays of such a file whose array `format` says `form`.
 

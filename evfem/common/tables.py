@@ -6,14 +6,15 @@ import csv
 import io
 import math
 from array import array
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 #: most rows of a csv file
 MOST_ROWS = 1_000_000
@@ -58,13 +59,29 @@ def numbers(key: str, given: Any, allowed: str, axes: int = 1) -> Floats:
     try:
         array = np.array(given)
     except ValueError:  # rows of unequal length
-        raise InputError(key, given, allowed) from None
+        raise InputError(key, quoted(given), allowed) from None
     if array.dtype.kind not in "iuf" or array.ndim != axes:
-        raise InputError(key, given, allowed)
+        raise InputError(key, quoted(given), allowed)
     if not np.isfinite(array).all():
         place = ", ".join(str(i + 1) for i in np.argwhere(~np.isfinite(array))[0])
         raise InputError(key, f"a value that is not finite, number {place}", allowed)
     return array.astype(float)
+
+
+def frame(columns: Mapping[str, Any]) -> Any:
+    """Columns of equal length as a `pandas.DataFrame`, or where pandas is not installed as a numpy
+    record array.
+    """
+    if find_spec("pandas") is not None:
+        from pandas import DataFrame
+
+        return DataFrame(columns)
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    length = len(next(iter(arrays.values())))
+    records = np.recarray(length, [(name, values.dtype) for name, values in arrays.items()])
+    for name, values in arrays.items():
+        records[name] = values
+    return records
 
 
 def csv_text(rows: Iterable[Iterable[Any]]) -> str:
@@ -103,6 +120,40 @@ def read_columns(path: Path, header: list[str], key: str) -> list[Floats]:
         reason = getattr(error, "strerror", None) or "not a text file"
         raise InputError(key, f"{path} ({reason})", allowed) from None
     return [np.array(column) for column in columns]
+
+
+def read_table(path: Path, key: str) -> dict[str, Any]:
+    """All columns of a csv file by the names in its first line: arrays of numbers, or lists of
+    words.
+
+    Raises `InputError` with `key` for a file that cannot be read, has nothing below its first
+    line, a name twice, or lines of another length.
+    """
+    allowed = "a readable csv file: names in the first line, as many values in each other line"
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
+            rows = [[cell.strip() for cell in row] for row in csv.reader(lines) if row]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise InputError(key, f"{path} ({reason})", allowed) from None
+    names, *body = rows or [[]]
+    odd = [row for row in body if len(row) != len(names)]
+    if odd or not body or len(set(names)) < len(names):
+        reason = f"{','.join(odd[0])[:60]!r}" if odd else "no line of values" if not body else "a name twice"
+        raise InputError(key, f"{path} with {','.join(names)[:60]!r}, then {reason}", allowed)
+    if len(body) > MOST_ROWS:
+        raise InputError(key, f"{path} with more rows", f"at most {MOST_ROWS} rows")
+    return {
+        name: _words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
+    }
+
+
+def _words_or_numbers(words: Iterable[str]) -> Any:
+    words = list(words)
+    try:
+        return np.array([float(word) for word in words])
+    except ValueError:
+        return words
 
 
 def _row(cells: list[str], place: str, columns: int, key: str) -> list[float]:

@@ -13,6 +13,8 @@ from typing import Any
 #: size of a curve in pixels
 WIDTH, HEIGHT = 240, 48
 LONGEST = 160
+#: what is shown as 0, in any of our units
+TINY = 1e-12
 
 
 def changed(value: Any) -> dict[str, Any]:
@@ -43,6 +45,15 @@ def called(name: str, arguments: Mapping[str, Any]) -> str:
     "Slide(distance=5.0, hold='force')"
     """
     return f"{name}({', '.join(f'{key}={value!r}' for key, value in arguments.items())})"
+
+
+def plus(value: float) -> float:
+    """The number itself, with 0 for -0 and for what rounds to it in a table.
+
+    >>> plus(-0.0), plus(-1e-13), plus(-0.5)
+    (0.0, 0.0, -0.5)
+    """
+    return 0.0 if abs(value) < TINY else float(value)
 
 
 def short(value: Any) -> str:

@@ -10,14 +10,15 @@ under a prescribed force, the squared voltage under a prescribed friction force)
 :math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns
 with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
 :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
-nodes near contact, so it is put into their small block alone.
+nodes near contact, so it is put into their small block alone (`evfem.contact.follower`).
 
 Algorithm (`LinearContactStep.solve`)::
 
     free <- candidates' displacements without contact forces, and per unit of each extra unknown
     near <- nodes that touch, would penetrate under the present forces, or are strongly attracted
     repeat
-        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
+        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included;
+            where that has no solution, with as much of it as the body holds
         displacements <- free + C (forces on `near`)
         hit <- other candidates that have penetrated; stop if there are none
         near <- near and hit
@@ -25,6 +26,7 @@ Algorithm (`LinearContactStep.solve`)::
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -32,6 +34,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
+from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import (
     BACKWARD,
@@ -245,14 +248,28 @@ class LinearContactStep:
         """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y
         before x, that move the body, those of the follower stiffness included.
         """
+        own = np.diagonal(self.body.compliance)[0::2]
+        follower = FollowerStiffness.of(self.candidates.follower_rate(own)[near])
+        try:
+            return self._solve_following(near, free, status, follower)
+        except ContactNotSolved as failed:
+            held = self.candidates.axes[near], status, self.candidates.friction[near]
+            for weaker in follower.weaker(self.body.among(near), *held):
+                with suppress(ContactNotSolved):
+                    return self._solve_following(near, free, status, weaker)
+            raise failed
+
+    def _solve_following(
+        self, near: Ints, free: Floats, status: Ints, follower: FollowerStiffness
+    ) -> tuple[ContactSolution, Floats]:
+        """The same with this follower stiffness."""
         known, rows = self.candidates, y_before_x(near)
-        follower = FollowerStiffness.of(known, near, np.diagonal(self.body.compliance)[0::2])
         C, W = follower.apply(self.body.among(near), free[rows])
         axes = known.axes[near]
-        start = _local(axes, W[:, :1])[:, 0] + np.concatenate(
+        start = local(axes, W[:, :1])[:, 0] + np.concatenate(
             [known.surface.normal_gap[near], known.slip[near]]
         )
-        compliance = _local(axes, _local(axes, C).T).T
+        compliance = local(axes, local(axes, C).T).T
         if known.interface_compliance.any():
             compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
@@ -290,50 +307,7 @@ class LinearContactStep:
         floor = UNHELD * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
         own = np.diagonal(pivot)
         pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return ExtraUnknowns(_local(axes, W[:, 1:]), _local(axes, row.T).T, pivot, value)
-
-
-@dataclass(frozen=True, eq=False)
-class FollowerStiffness:
-    """Stiffness of contact forces that turn with the profile: `rate` (k, 2) forces along x and y
-    per x displacement of the loaded nodes. Components of others come y before x.
-    """
-
-    size: int
-    loaded: Ints
-    rate: Floats
-
-    @classmethod
-    def of(cls, candidates: Candidates, near: Ints, own: Floats) -> FollowerStiffness:
-        """Of the `near` nodes, all with their `own` compliance (c,) along x; on a flat surface
-        without slopes of friction no node is loaded.
-        """
-        rate = candidates.follower_rate(own)[near]
-        loaded = np.flatnonzero(rate.any(axis=1))
-        return cls(near.size, loaded, rate[loaded])
-
-    def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
-        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small
-        system, T has few columns.
-        """
-        if not self.loaded.size:
-            return C, W
-        x, y = self.size + self.loaded, self.loaded
-        B = C[:, x] * self.rate[:, 0] + C[:, y] * self.rate[:, 1]
-        gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
-        return C + gain @ C[x], W + gain @ W[x]
-
-    def force(self, moved: Floats) -> Floats:
-        """Change of the forces (2 k,) by displacements (2 k,)."""
-        change = np.zeros((2, self.size))
-        change[:, self.loaded] = self.rate.T[::-1] * moved[self.size + self.loaded]
-        return change.ravel()
-
-    def transposed(self, rows: Floats) -> Floats:
-        """Rows (p, 2 k) times T."""
-        through, x = np.zeros_like(rows), self.size + self.loaded
-        through[:, x] = rows[:, x] * self.rate[:, 0] + rows[:, self.loaded] * self.rate[:, 1]
-        return through
+        return ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, pivot, value)
 
 
 def _inverse(matrix: Floats, symmetric: bool) -> Floats:
@@ -351,14 +325,3 @@ def _inverse(matrix: Floats, symmetric: bool) -> Floats:
 def y_before_x(nodes: Ints) -> Ints:
     """Rows (2 k,) of these nodes among interleaved x and y components."""
     return np.concatenate([2 * nodes + 1, 2 * nodes])
-
-
-def _local(axes: Floats, columns: Floats) -> Floats:
-    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat
-    surface.
-    """
-    if not axes[:, 0, 0].any():
-        return columns
-    y, x = columns.reshape(2, len(axes), -1)
-    normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
-    return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])

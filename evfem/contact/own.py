@@ -10,7 +10,7 @@ import numpy as np
 
 from evfem.common.checks import set_frozen
 from evfem.contact.surfaces import Flat
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import CompleteSurface, Surface
 from evfem.tensor import Array, derivative, difference
 
@@ -34,8 +34,10 @@ def completed(surface: Surface) -> CompleteSurface:
     if isinstance(surface, CompleteSurface):
         return surface
     if isinstance(surface, type) or not isinstance(surface, Surface):
-        allowed = "Flat, Display, Sinusoid, Profile, or an object with a method height(x)"
-        raise InputError("surface", surface, allowed)
+        allowed = (
+            "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
+        )
+        raise InputError("surface", quoted(surface), allowed)
     plain = Flat(
         getattr(surface, "friction", 0.0), getattr(surface, "y", None), getattr(surface, "insulator", None)
     )

@@ -29,7 +29,9 @@ Algorithm (`solve_contact`), a primal-dual active set::
         gaps, slips <- start + C (forces + drops) + e d
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
-        change all violated nodes; only the worst one if these statuses have been met before
+        change all violated nodes; only the worst one if these statuses have been met before, and
+            always after many solves; then, where that goes round in a circle, only the first one;
+            give up where that goes round too
     start again from all nodes sticking, then from all open, before giving up
 
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
@@ -135,7 +137,7 @@ class ContactSolution:
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from
     all nodes sticking or all open; raises `ContactNotSolved` when none of them ends within
-    `ACTIVE_SET_LIMIT` solves and one per node.
+    `ACTIVE_SET_LIMIT` solves and one per node, or the body has lost its stability.
     """
     most, failed = ACTIVE_SET_LIMIT + problem.size, ContactNotSolved("")
     for start in (status, np.full(problem.size, STICK), np.full(problem.size, OPEN)):
@@ -143,6 +145,8 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
             return _active_set(problem, start, most)
         except ContactNotSolved as error:
             failed = error
+            if lost_stability(problem):  # other starts rarely find more, and cost as much
+                break
     raise failed
 
 
@@ -156,7 +160,9 @@ def lost_stability(problem: ContactProblem) -> bool:
 
 def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
     status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
+    many = ACTIVE_SET_LIMIT // 3
     seen: set[bytes] = set()
+    first = False
     for solves in range(1, most + 1):
         force, attraction_drop, extra = problem.solved(status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
@@ -166,9 +172,18 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
         changes = np.flatnonzero(wanted != status)
         if not changes.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        if status.tobytes() in seen or solves > ACTIVE_SET_LIMIT // 3:
-            changes = changes[[np.argmax(violation[changes])]] if solves < ACTIVE_SET_LIMIT else changes[:1]
+        again = status.tobytes() in seen
+        if again and first:  # the next statuses follow from these alone: it would go round for ever
+            break
+        if solves > many and (again or solves >= ACTIVE_SET_LIMIT) and not first:
+            first, seen = True, set()
+        elif solves == many:
+            seen = set()
         seen.add(status.tobytes())
+        if first:
+            changes = changes[:1]
+        elif again or solves > many:
+            changes = changes[[np.argmax(violation[changes])]]
         status = status.copy()
         status[changes] = wanted[changes]
     raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -23,8 +23,8 @@ import numpy as np
 from evfem.common.checks import real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
-from evfem.electrostatics.laws import Layer
-from evfem.errors import InputError
+from evfem.electrostatics.laws import FILM, Layer
+from evfem.errors import InputError, quoted
 from evfem.tensor import Array
 
 Rows = Sequence[Sequence[float]]
@@ -45,7 +45,7 @@ FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
 
 
-class _Surface:
+class RigidSurface:
     """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
     `insulator`.
     """
@@ -61,7 +61,7 @@ class _Surface:
             allowed = "a height within 1e3 mm, or None for first touch at the start"
             set_frozen(self, y=real("surface.y", self.y, allowed, lambda y: abs(y) <= HIGHEST))
         if not (self.insulator is None or isinstance(self.insulator, Layer)):
-            raise InputError("surface.insulator", self.insulator, "Layer(thickness, eps_r), or None")
+            raise InputError("surface.insulator", quoted(self.insulator), "Layer(thickness, eps_r), or None")
 
     @property
     def has_friction(self) -> bool:
@@ -139,7 +139,7 @@ class _Surface:
         raise NotImplementedError
 
 
-class _Level(_Surface):
+class _Level(RigidSurface):
     """A level surface: height, slope and curvature are zero."""
 
     is_flat = True
@@ -169,14 +169,15 @@ class Flat(_Level):
 
 @dataclass(frozen=True)
 class Display(_Level):
-    """A level display: an insulator over an electrode, by default that of Table 2 (0.09 mm, eps_r
-    3.35).
+    """A level display: an insulator over an electrode, by default the film of Table 2 (0.09 mm,
+    eps_r 3.35).
 
-    >>> Display().insulator
-    Layer(thickness=0.09, eps_r=3.35)
+    >>> from evfem.electrostatics.laws import TOUCHSCREEN
+    >>> Display().insulator, Display(TOUCHSCREEN).insulator
+    (Layer(thickness=0.09, eps_r=3.35), Layer(thickness=0.001, eps_r=3.9))
     """
 
-    insulator: Layer | None = field(default_factory=lambda: Layer(thickness=0.09, eps_r=3.35))
+    insulator: Layer | None = FILM
     friction: float | Rows = 0.3
     y: float | None = None
 
@@ -185,7 +186,7 @@ class Display(_Level):
 
 
 @dataclass(frozen=True)
-class Sinusoid(_Surface):
+class Sinusoid(RigidSurface):
     """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
 
     `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the
@@ -205,7 +206,7 @@ class Sinusoid(_Surface):
         terms = EQUATION_25 if self.terms is None else self.terms
         rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
         if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
-            raise InputError("surface.terms", terms, TERMS)
+            raise InputError("surface.terms", quoted(terms), TERMS)
         set_frozen(self, terms=rows)
 
     def _sum(self, x: Array, order: int) -> Array:
@@ -228,7 +229,7 @@ class Sinusoid(_Surface):
 
 
 @dataclass(frozen=True, eq=False, init=False)
-class Profile(_Surface):
+class Profile(RigidSurface):
     """A sampled profile: points x, height (mm), monotone cubics between them (PCHIP), level beyond
     the ends.
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from evfem.common.checks import Values, above, at_least, plain
 from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import ForceLaw
 
 Outline = Literal["rectangle", "ellipse"]
@@ -123,7 +123,7 @@ def pad_force(
     2.947
     """
     if over not in ("rectangle", "ellipse"):
-        raise InputError("over", over, "'rectangle' or 'ellipse'")
+        raise InputError("over", quoted(over), "'rectangle' or 'ellipse'")
     gap = at_least("gap", gap, 0.0, "an air gap in mm, not negative")
     given = (gap, voltage, layers.reduced, layers.thickness, pad.width, pad.height, pad.length)
     columns = np.broadcast_arrays(*given)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import struct
 import zlib
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,18 +22,13 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import count, real, set_frozen
 from evfem.common.storage import replacing, write_text
 from evfem.common.tables import MOST_ROWS
-from evfem.electrostatics import hjif
+from evfem.electrostatics import hjif, timesignals, wav
 from evfem.electrostatics.signals import VoltageProfile, carrier_amplitude
-from evfem.errors import InputError, readable
+from evfem.electrostatics.timesignals import Sampled
+from evfem.errors import ABSENT, InputError, quoted, readable
 
-WAV_FORM, MAP_FORM = "evfem-voltage-1", "evfem-friction-map-1"
-WAV_KEYS = {"full_scale_V", "speed_mm_per_s", "start_mm", "carrier_Hz"}
-LARGEST_SAMPLE = 32_767
-MOST_SAMPLES, MOST_COLUMNS, ROWS = 50_000_000, 100_000, 64
-#: comment and headers of a file on top of its samples
-MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
-PCM, MONO, BITS = 1, 1, 16
-WAV_ALLOWED = f"a 16-bit mono WAV with evfem's comment ({WAV_FORM}) in it"
+MAP_FORM = "evfem-friction-map-1"
+MOST_COLUMNS, ROWS = 100_000, 64
 
 
 @dataclass(frozen=True)
@@ -109,7 +104,7 @@ def write_signal(path: str | Path, profile: VoltageProfile, playback: Playback |
     True
     """
     if not isinstance(profile, VoltageProfile):
-        raise InputError("profile", profile, "a VoltageProfile")
+        raise InputError("profile", quoted(profile), "a VoltageProfile")
     ending = Path(path).suffix.lower()
     if ending not in (".csv", ".wav", ".png", ".hjif"):
         raise InputError("path", str(path), "a file called .csv, .wav, .png or .hjif")
@@ -148,6 +143,17 @@ def read_signal(path: str | Path) -> VoltageProfile:
     return VoltageProfile.from_csv(path)
 
 
+def read_voltage(path: str | Path) -> VoltageProfile | Sampled:
+    """The voltage in a file: over time in a csv file with the header ``time,voltage``, else over
+    the position (`read_signal`).
+    """
+    path = Path(path)
+    with suppress(OSError, UnicodeDecodeError), path.open(encoding="utf-8-sig") as lines:
+        if [cell.strip() for cell in lines.readline(100).split(",")] == timesignals.HEADER:
+            return Sampled.from_csv(path)
+    return read_signal(path)
+
+
 def _check_fit(profile: VoltageProfile, playback: Playback) -> None:
     largest = float(np.max(np.abs(profile.voltage)))
     if largest > playback.full_scale:
@@ -159,7 +165,7 @@ def _too_much(given: str, playback: Playback) -> InputError:
 
 
 def _missing(key: str, what: str, ending: str) -> InputError:
-    return InputError(key, "nothing", f"{what}, needed for {ending}")
+    return InputError(key, ABSENT, f"{what}, needed for {ending}")
 
 
 def _hjif(profile: VoltageProfile, playback: Playback) -> str:
@@ -189,61 +195,35 @@ def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
     if playback.speed is None:
         raise _missing("speed", "a speed in mm/s", ".wav")
     spacing, start = playback.speed / playback.rate, float(profile.position[0])
-    number = _number(profile, spacing, MOST_SAMPLES - 1, "samples") + 1
+    number = _number(profile, spacing, wav.MOST_SAMPLES - 1, "samples") + 1
     volts = profile(_positions(number, start, spacing))
     if playback.carrier is not None:
         volts = carrier_amplitude(volts)
         if np.max(np.abs(volts)) > playback.full_scale:
             raise _too_much(f"{np.max(np.abs(volts)):g} V at the carrier's peaks", playback)
         volts = volts * np.sin(2.0 * np.pi * playback.carrier / playback.rate * np.arange(number))
-    samples = np.rint(volts / playback.full_scale * LARGEST_SAMPLE).astype("<i2").tobytes()
+    samples = np.rint(volts / playback.full_scale * wav.LARGEST_SAMPLE)
     scale = {
-        "format": WAV_FORM,
         "full_scale_V": playback.full_scale,
         "speed_mm_per_s": playback.speed,
         "start_mm": start,
         "carrier_Hz": playback.carrier,
     }
-    comment = json.dumps(scale).encode("ascii") + b"\0"
-    width = MONO * BITS // 8
-    header = struct.pack("<HHIIHH", PCM, MONO, playback.rate, playback.rate * width, width, BITS)
-    body = _part(b"fmt ", header) + _part(b"LIST", b"INFO" + _part(b"ICMT", comment))
-    return _part(b"RIFF", b"WAVE" + body + _part(b"data", samples))
-
-
-def _part(name: bytes, content: bytes) -> bytes:
-    """A RIFF chunk, padded to an even length."""
-    return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
-
-
-def _parts(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """The chunks in `data`; ValueError for one that is longer than what is there."""
-    at = 0
-    while at + 8 <= len(data):
-        (size,) = struct.unpack_from("<I", data, at + 4)
-        content = data[at + 8 : at + 8 + size]
-        if len(content) < size:
-            raise ValueError("cut off")
-        yield data[at : at + 4], content
-        at += 8 + size + size % 2
+    return wav.encoded(samples, playback.rate, scale)
 
 
 def _from_wav(path: Path) -> VoltageProfile:
     try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError("path", f"{path} ({error.strerror or error})", WAV_ALLOWED) from None
-    try:
-        if len(data) > MOST_BYTES:
-            raise ValueError("too long")
-        rate, scale, samples = _decoded(data)
-    except (ValueError, KeyError, TypeError, struct.error, RecursionError):
+        rate, scale, samples = wav.decoded(wav.read_bytes(path))
+    except ValueError as error:
+        if isinstance(error, InputError):
+            raise
         given = f"{path}, cut off, of another kind or without the comment"
-        raise InputError("path", given, WAV_ALLOWED) from None
+        raise InputError("path", given, wav.ALLOWED) from None
     if scale["carrier_Hz"] is not None:
         given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
-        raise InputError("path", given, "a WAV without a carrier: its samples are the voltage itself")
+        allowed = "a WAV without a carrier, or Sampled.from_wav: its samples are the voltage of the moment"
+        raise InputError("path", given, allowed)
     if samples.size > MOST_ROWS:  # before they take four times the memory
         raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
     try:
@@ -254,25 +234,7 @@ def _from_wav(path: Path) -> VoltageProfile:
         given = f"{path}, whose {error.key} is {readable(error.given)}"
         raise InputError("path", given, error.allowed) from None
     position = _positions(samples.size, start, speed / rate)
-    return VoltageProfile(position, samples / LARGEST_SAMPLE * full_scale)
-
-
-def _decoded(data: bytes) -> tuple[int, dict[str, Any], Any]:
-    """Rate, what the comment says, and samples; an error of Python's own for anything unexpected."""
-    ((name, body),) = _parts(data)
-    if name != b"RIFF" or body[:4] != b"WAVE":
-        raise ValueError("not a WAV")
-    parts = dict(_parts(body[4:]))
-    kind, channels, rate, _, _, bits = struct.unpack_from("<HHIIHH", parts[b"fmt "])
-    if (kind, channels, bits) != (PCM, MONO, BITS) or rate == 0 or parts[b"LIST"][:4] != b"INFO":
-        raise ValueError("another kind of WAV")
-    scale = json.loads(dict(_parts(parts[b"LIST"][4:]))[b"ICMT"].rstrip(b"\0"))
-    if scale["format"] != WAV_FORM or not set(scale) >= WAV_KEYS:
-        raise ValueError("another comment")
-    samples = np.frombuffer(parts[b"data"], dtype="<i2")
-    if samples.size == 0:
-        raise ValueError("no samples")
-    return rate, scale, samples
+    return VoltageProfile(position, samples / wav.LARGEST_SAMPLE * full_scale)
 
 
 def _map(profile: VoltageProfile, playback: Playback) -> bytes:

@@ -15,7 +15,7 @@ import numpy as np
 from evfem.common.checks import Values, above, plain
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError
 
 #: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
 APPLIED_TO_EFFECTIVE = 2.0
@@ -195,7 +195,7 @@ class Amplifier:
         if self.slew is None:
             return cut
         if speed is None:
-            raise InputError("speed", "nothing", "a speed in mm/s, needed with a slew")
+            raise InputError("speed", ABSENT, "a speed in mm/s, needed with a slew")
         return _no_steeper(cut, self.slew / above("speed", speed, 0.0, "a speed in mm/s above zero"))
 
     def _clipped(self, profile: VoltageProfile) -> VoltageProfile:

@@ -5,7 +5,7 @@ full model to :math:`q(f) + \delta`. Everything else, contact, friction and attr
 by both, so that :math:`\delta` is all that separates their paths. Algorithm (`stated_error`)::
 
     states <- a few of the path, the shape q of each as far as can be from those before it
-    delta <- at these: solve f_int(u) = f with the tissue, the bone held; the pad's u less q(f)
+    delta <- at these: the equilibrium of the finger under f, the bone held; its pad's u less q(f)
     delta <- at the others: interpolated over the shape
     run the path again, with q(f) + delta
     error <- `MARGIN` times the largest difference of the two runs
@@ -22,21 +22,26 @@ states, and exact at all that are checked and at rest, where nothing has moved.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import SLOW, SMALLEST_FORCE
+from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.pad import Pad
+from evfem.contact.surfaces import Flat
 from evfem.fast.memory import CondensedPad
-from evfem.fast.run import FastRun
+from evfem.fast.run import FastRun, limits_of
 from evfem.fast.step import on_pad
 from evfem.fast.training import Memory
 from evfem.scene.plan import scene_mesh
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Row
 from evfem.simulation.run import Request
-from evfem.solver.condensation import Singular, make_condensation
+from evfem.solver.control import Target
+from evfem.solver.equilibrium import Equilibrium
+from evfem.solver.factorised import FactorisedBody
+from evfem.solver.interface import Interface
 from evfem.solver.state import State, StepFailed
 from evfem.tissue.body import Body
 from evfem.tissue.space import make_space
@@ -45,45 +50,35 @@ from evfem.tissue.space import make_space
 COMPARED = ("normal_force", "tangential_force", "electrostatic_force")
 #: what is found is stated so many times, for the sake of what the interpolation leaves out
 MARGIN = 1.5
+#: the held finger's distance from a surface, in its heights
+FAR = 10.0
 #: shapes that differ by less than this fraction of the largest are one
 SAME = 1e-9
 
 
 class HeldFinger:
-    """The finger of a scene, its bone held, under given forces on the pad."""
+    """The finger of a scene, its bone held, under given forces on the pad: an equilibrium far
+    above any surface.
+    """
 
     def __init__(self, scene: Scene, pad: Pad) -> None:
         mesh, element = scene_mesh(scene)
-        self.pad, self.body = pad, Body(make_space(mesh, element), scene.finger.materials)
-        self._factor = make_condensation(self.body.pattern, self.body.bone, scene.solver.threads)
+        self.pad, self.limits = pad, limits_of(scene)
+        body = Body(make_space(mesh, element), scene.finger.materials)
+        low, high = mesh.points[:, 1].min(), mesh.points[:, 1].max()
+        far = Flat(friction=0.0, y=float(low - FAR * (high - low)))
+        interface = Interface(pad, mesh.points, far, self.limits.tolerance)
+        self._solver = Equilibrium(
+            FactorisedBody(body, interface, None, self.limits), interface, None, self.limits
+        )
 
-    def under(self, force: Floats, start: Floats, tolerance: float, most: int) -> Floats:
-        """Displacements (P, 2) of the pad nodes under forces (P, 2): Newton's iterations from u
-        (N, 2), the tangent kept while it does. Raises `StepFailed` after `most` of them.
+    def under(self, force: Floats, start: Floats) -> Floats:
+        """Displacements (P, 2) of the pad nodes under forces (P, 2), sought from those of all nodes
+        (N, 2). Raises `StepFailed`.
         """
-        given = np.zeros_like(start)
-        given[self.pad.nodes] = force
-        enough = tolerance * max(np.abs(force.sum(axis=0)).max(), SMALLEST_FORCE)
-        u, history = start, [np.inf]
-        for _ in range(most):
-            left = self.body.reduce(given - self.body.forces(u))
-            left[self.body.bone] = 0.0
-            history.append(float(np.abs(left).max()))
-            if not np.isfinite(history[-1]):
-                break
-            if history[-1] <= enough:
-                return np.asarray(u[self.pad.nodes])
-            if len(history) == 2 or history[-1] > SLOW * history[-2]:
-                self._factorise(u, history)
-            state, _ = self._factor.forward(left)
-            u = u + self.body.expand(self._factor.backward(state, np.zeros(self.body.bone.size)))
-        raise StepFailed("the full model finds no equilibrium under the forces of the fast one", history)
-
-    def _factorise(self, u: Floats, history: list[float]) -> None:
-        try:
-            self._factor.factorise(self.body.tangent(u))
-        except Singular as error:
-            raise StepFailed(f"the tangent is singular ({error})", history) from error
+        rest = self._solver.rest(np.zeros(2), 0.0)
+        found = self._solver.step(rest, Target.held(rest.bone, 0.0), force, replace(rest, u=start))
+        return np.asarray(found.u[self.pad.nodes])
 
 
 class CorrectedRun(FastRun):
@@ -124,7 +119,7 @@ def stated_error(
     chosen = farthest(shapes, checks + 1)
     steps = sorted(int(k) for k in chosen[1:])
     try:
-        beside = [missing(memory, finger, run.states[k], run.scene) for k in chosen[1:]]
+        beside = [missing(memory, finger, run.states[k]) for k in chosen[1:]]
         known = np.array([np.zeros_like(shapes[0]), *beside])
         again = CorrectedRun(run, memory.pad, between(shapes, shapes[chosen], known)[1:])
         for request in again.requests():
@@ -134,15 +129,13 @@ def stated_error(
     return differences(run.rows, again.rows, run.scene.solver.tolerance), steps
 
 
-def missing(memory: Memory, finger: HeldFinger, state: State, scene: Scene) -> Floats:
+def missing(memory: Memory, finger: HeldFinger, state: State) -> Floats:
     """How far (P, 2) the pad nodes of the full model are beside the remembered ones under the
     forces of a state; raises `StepFailed`.
     """
     force = on_pad(state)
     start = np.tensordot(memory.pad.weights(force), memory.whole, 1)
-    solver = scene.solver
-    moved = finger.under(force, start, solver.tolerance, solver.strategy.iterations)
-    return moved - memory.pad.under(force)
+    return finger.under(force, start) - memory.pad.under(force)
 
 
 def farthest(points: Floats, most: int) -> Ints:

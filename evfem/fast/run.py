@@ -28,6 +28,12 @@ from evfem.solver.stepping import Stepper
 ADVICE = "a fast model made from a scene with more load or friction may go further"
 
 
+def limits_of(scene: Scene) -> Limits:
+    """What a scene asks of its solver."""
+    solver = scene.solver
+    return Limits(solver.tolerance, solver.strategy, solver.threads)
+
+
 class NoTissue:
     """In place of the body: its forces and its energy are not known."""
 
@@ -61,7 +67,7 @@ class FastRun(Run):
         if scene.law is not None and largest_voltage(scene) != 0.0:
             attraction = make_attraction(scene, mesh, whole, surface)
             attraction = replace(attraction, pad=alone)
-        limits = Limits(scene.solver.tolerance, scene.solver.strategy)
+        limits = limits_of(scene)
         interface = Interface(alone, points, surface, limits.tolerance)
         self.remembered = RememberedPad(pad, interface, attraction, limits)
         equilibrium = Equilibrium(self.remembered, interface, attraction, limits)
@@ -71,7 +77,7 @@ class FastRun(Run):
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(equilibrium, scene.coupling)
         self.rows, self.frames, self.time = [], [], 0.0
-        self.state = equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0))
+        self.state = equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         self.states: list[State] = [self.state]
 
     def advance(self, request: Request) -> None:

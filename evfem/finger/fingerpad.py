@@ -8,7 +8,7 @@ parameters with the defaults given there; every length is in mm.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.checks import choice, real, set_frozen
+from evfem import data
+from evfem.common.checks import Within, choice, real, set_frozen
 from evfem.common.views import called, changed, short, table
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import LAYERS, NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
@@ -53,6 +54,16 @@ RANGES: Mapping[str, tuple[float, float, str]] = {
 #: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
 #: inverse.
 STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
+
+#: What grows with the width of the finger from participant to participant.
+WITH_WIDTH = (
+    "nail_thickness",
+    "nail_width",
+    "bone_width",
+    "bone_offset",
+    "epidermis_thickness",
+    "dermis_thickness",
+)
 
 #: resolution -> divisions in quadratic cells; the rows of each layer stand in `LAYERS`.
 RESOLUTIONS: Mapping[str, Divisions] = {
@@ -154,16 +165,32 @@ class FingerPad:
     viscosity: float = 0.0
 
     def __post_init__(self) -> None:
+        mistakes = Mistakes()
         for name, (low, high, unit) in RANGES.items():
-            allowed = f"{low:g} to {high:g}{unit}"
-            set_frozen(
-                self, **{name: real(f"finger.{name}", getattr(self, name), allowed, _between(low, high))}
-            )
-        if not isinstance(self.ridges, bool):
-            raise InputError("finger.ridges", self.ridges, "true or false")
-        choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+            key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
+            with mistakes.of_a_part():
+                set_frozen(self, **{name: real(key, getattr(self, name), allowed, Within(low, high))})
+        with mistakes.of_a_part():
+            if not isinstance(self.ridges, bool):
+                raise InputError("finger.ridges", quoted(self.ridges), "true or false")
+        with mistakes.of_a_part():
+            choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+        mistakes.report()
         set_frozen(self, materials=_all_materials(self.materials))
         _check_section(self, self._section)
+
+    @classmethod
+    def participant(cls, name: str, resolution: str = "medium") -> FingerPad:
+        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as
+        measured.
+
+        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
+        moduli are Table 2's, because nobody measured them.
+
+        >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
+        (14.04, 5.05)
+        """
+        return cls(resolution=resolution, **participant_sizes(name))
 
     def __repr__(self) -> str:
         """What differs from Table 2."""
@@ -193,7 +220,7 @@ class FingerPad:
         bone.
         """
         if order not in (1, 2):
-            raise InputError("order", order, "1 or 2")
+            raise InputError("order", quoted(order), "1 or 2")
         return self._section.mesh(order)
 
     @property
@@ -217,13 +244,21 @@ class FingerPad:
         )
 
 
-def _between(low: float, high: float) -> Callable[[float], bool]:
-    return lambda value: low <= value <= high
+def participant_sizes(name: str) -> dict[str, Any]:
+    """Parameters of `FingerPad` that a participant of Table 1 has of his or her own (mm)."""
+    measured = data.load("table1")
+    choice("finger.participant", name, tuple(measured["participant"]))
+    width, height = measured.value(name, "a"), measured.value(name, "b")
+    sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
+    sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
+    return {"width": width, "height": height, **sizes}
 
 
 def _all_materials(own: object) -> dict[str, Any]:
     if not isinstance(own, Mapping):
-        raise InputError("finger.materials", own, "a law for each region that is not to have that of Table 2")
+        raise InputError(
+            "finger.materials", quoted(own), "a law for each region that is not to have that of Table 2"
+        )
     laws: dict[str, Any] = {
         layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in (*LAYERS, NAIL)
     }
@@ -310,7 +345,7 @@ class MeshedFinger:
     regions: Mapping[str, int] | None = None
 
     def __post_init__(self) -> None:
-        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", _between(0.0, 1e3))
+        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", Within(0.0, 1e3))
         set_frozen(self, viscosity=viscosity, materials=dict(self.materials))
         if not isinstance(self.source, Mesh):
             set_frozen(self, source=Path(self.source))
@@ -318,7 +353,7 @@ class MeshedFinger:
         for name in names:
             if name not in self.materials:
                 raise InputError(
-                    f"finger.materials.{name}", "nothing", "a material for every region of the mesh"
+                    f"finger.materials.{name}", ABSENT, "a material for every region of the mesh"
                 )
         for name in self.materials:
             if name not in names:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 
 class CellKind(NamedTuple):
@@ -63,6 +63,11 @@ class Mesh:
     region: Ints
     region_names: Mapping[str, int]
     node_sets: Mapping[str, Ints] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        """Its size, regions and sets."""
+        names = f"regions {', '.join(self.region_names)}; sets {', '.join(self.node_sets) or 'none'}"
+        return f"Mesh of {len(self.points)} nodes, {len(self.cells)} cells ({self.kind}); {names}"
 
     @property
     def dim(self) -> int:
@@ -156,14 +161,14 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     such region or interface.
     """
     if region not in mesh.region_names:
-        raise InputError("region", region, " | ".join(mesh.region_names))
+        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
     inside = mesh.region == mesh.region_names[region]
     edges, of_cell = mesh.edges
     own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(edges)) for cells in (inside, ~inside))
     shared = (own > 0) & (other > 0)
     interface = mesh.cell_edges[inside][shared[of_cell[inside]]]
     if not len(interface):
-        raise InputError("region", region, "a region that has another one below it")
+        raise InputError("region", quoted(region), "a region that has another one below it")
     curves = _parabolas(mesh.points[interface])
     points = mesh.points[nodes]
     chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)

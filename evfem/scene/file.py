@@ -12,7 +12,9 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from dataclasses import fields
+from os import PathLike
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import tomli_w
@@ -20,11 +22,11 @@ import tomli_w
 from evfem.common.checks import MOST_STEPS
 from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
-from evfem.electrostatics.signalfile import read_signal
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.errors import InputError, StorageError
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
+from evfem.contact.textures import Grating, SelfAffine
+from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
+from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
+from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
@@ -39,12 +41,15 @@ from evfem.scene.keys import (
     StrategyTable,
     Table,
     at,
+    check_size,
+    columns,
+    kind_of,
     parse,
     shown,
-    unknown,
 )
 from evfem.scene.motion import Motion, VoltageRamp
-from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Scene, Solver
+from evfem.scene.scene import DEPTH, Output, Scene, Solver
+from evfem.scene.voltage import voltage_keys, voltage_of
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LAWS, from_table
 
@@ -52,6 +57,7 @@ VERSION = 1
 #: largest files in bytes, and most steps of all motions together
 LARGEST_SCENE = 4 * 2**20
 LARGEST_TABLE = 64 * 2**20
+TEXTURES: Mapping[str, type] = {"grating": Grating, "self_affine": SelfAffine}
 FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
@@ -64,9 +70,16 @@ def load(path: str | Path) -> Scene:
     return loads(read_text("scene", path), path.parent, path.stem)
 
 
+def scene_at(path: object) -> Scene:
+    """The scene in the file at a path, where a scene or a path was asked for."""
+    if not isinstance(path, (str, PathLike)):
+        raise InputError("scene", path, "a Scene, or the path of a scene file")
+    return load(Path(path))
+
+
 def read_text(key: str, path: Path) -> str:
     """The text of a TOML file; errors call the file `key`."""
-    _check_size(key, path, LARGEST_SCENE)
+    check_size(key, path, LARGEST_SCENE)
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
@@ -82,7 +95,7 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML") from error
     if tables.get("version") != VERSION or isinstance(tables["version"], bool):
-        given = shown(tables["version"]) if "version" in tables else "nothing"
+        given = shown(tables["version"]) if "version" in tables else ABSENT
         raise InputError("version", given, f"version = {VERSION}")
     return tables
 
@@ -90,32 +103,35 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
 def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     """The scene in a TOML text; relative paths in it start at `folder`.
 
+    Mistakes in different tables, or at different keys of one, are reported at once.
+
     >>> text = "version = 1\\n[surface]\\nkind = 'flat'\\n[[motion]]\\nkind = 'press'\\nforce = 0.05\\n"
     >>> loads(text).motion
     (Press(force=0.05, indentation=None, steps=10, speed=None),)
     """
     tables = tables_of("scene", text)
     top = parse(SceneTable, tables, "")
-    folder = Path(folder)
-    table = top.electrostatics
-    electrostatics = None if table is None else parse(ElectrostaticsTable, table, "electrostatics")
-    motion = [_motion(table, f"motion[{i}]") for i, table in enumerate(top.motion)]
-    if (total := sum(one.steps for one in motion)) > MOST_STEPS:
-        raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
-    law, voltage = _law_and_voltage(electrostatics, motion, folder)
-    return Scene(
-        finger=_finger(top.finger, folder),
-        surface=_surface(top.surface, folder, electrostatics),
-        law=law,
-        voltage=voltage,
-        motion=motion,
-        air_layer=electrostatics.air_layer if electrostatics else True,
-        direction=electrostatics.direction if electrostatics else DIRECTIONS[0],
-        coupling=electrostatics.coupling if electrostatics else COUPLINGS[0],
-        solver=_solver(parse(SolverTable, top.solver, "solver")),
-        output=_build(Output, parse(OutputTable, top.output, "output"), "output"),
-        name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")),
-    )
+    folder, mistakes, electrostatics = Path(folder), Mistakes(), None
+    parts: dict[str, Any] = {}
+    with mistakes.of_a_part():
+        parts["finger"] = _finger(top.finger, folder)
+    with mistakes.of_a_part(), at("finger"):
+        if "depth" in top.finger:
+            parts["depth"] = DEPTH["check"]("depth", top.finger["depth"])
+    with mistakes.of_a_part():
+        if top.electrostatics is not None:
+            electrostatics = parse(ElectrostaticsTable, top.electrostatics, "electrostatics")
+            parts |= _attraction(electrostatics, top.motion, folder)
+    with mistakes.of_a_part():
+        parts["surface"] = _surface(top.surface, folder, electrostatics)
+    with mistakes.of_a_part():
+        parts["motion"] = _motions(top.motion)
+    with mistakes.of_a_part():
+        parts["solver"] = _solver(parse(SolverTable, top.solver, "solver"))
+    with mistakes.of_a_part():
+        parts["output"] = _build(Output, parse(OutputTable, top.output, "output"), "output")
+    mistakes.report()
+    return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 
 
 def _solver(table: Any) -> Solver:
@@ -130,90 +146,73 @@ def _build(cls: type, table: Table, prefix: str) -> Any:
         return cls(**values)
 
 
-def _check_size(key: str, path: Path, most: int) -> None:
-    try:
-        size = path.stat().st_size
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
-        reason = getattr(error, "strerror", None) or "no path"
-        given = f"{shown(str(path))} ({reason})"
-        raise InputError(key, given, "a file that exists and can be read") from error
-    if not path.is_file():
-        raise InputError(key, f"{path}, which is no file", "a file")
-    if size > most:
-        raise InputError(key, f"{path} with {size / 2**20:.0f} MB", f"a file of at most {most // 2**20} MB")
-
-
-def _motion(table: Mapping[str, Any], prefix: str) -> Motion:
-    kind = table.get("kind", "nothing")
-    if not isinstance(kind, str) or kind not in MOTIONS:
-        raise InputError(f"{prefix}.kind", _plain(kind), " | ".join(MOTIONS))
-    model, cls = MOTIONS[kind]
-    return _build(cls, parse(model, table, prefix), prefix)
-
-
-def _plain(value: object) -> str:
-    return value if isinstance(value, str) else shown(value)
+def _motions(tables: list[dict[str, Any]]) -> list[Motion]:
+    mistakes, motions = Mistakes(), []
+    for i, table in enumerate(tables):
+        with mistakes.of_a_part():
+            model, cls = MOTIONS[kind_of(table, f"motion[{i}]", MOTIONS)]
+            motions.append(_build(cls, parse(model, table, f"motion[{i}]"), f"motion[{i}]"))
+    mistakes.report()
+    if (total := sum(one.steps for one in motions)) > MOST_STEPS:
+        raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
+    return motions
 
 
 def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any:
-    kind = table.get("kind", "nothing")
-    if not isinstance(kind, str) or kind not in SURFACES:
-        raise InputError("surface.kind", _plain(kind), " | ".join(SURFACES))
+    kind = kind_of(table, "surface", SURFACES)
     parsed: Any = parse(SURFACES[kind], table, "surface")
-    insulator = None
-    if electrostatics is not None:
-        prefix = "electrostatics.insulator_"
-        with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
-            insulator = Layer(electrostatics.insulator_thickness, electrostatics.insulator_eps_r)
+    insulator = None if electrostatics is None else _insulator(electrostatics)
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
     with at("surface"):
         if kind == "flat":
             return Flat(**common) if insulator is None else Display(**common)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
+        if kind in TEXTURES:
+            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
-            given = "nothing" if parsed.file is None else "file and points"
+            given = ABSENT if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
         if parsed.points is not None:
-            return Profile(*_columns("surface.points", parsed.points), **common)
+            return Profile(*columns("surface.points", parsed.points), **common)
         path = folder / parsed.file
-        _check_size("surface.file", path, LARGEST_TABLE)
+        check_size("surface.file", path, LARGEST_TABLE)
         return Profile.from_csv(path, **common)
 
 
-def _columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]]:
-    for i, row in enumerate(rows):
-        if len(row) != 2:
-            raise InputError(f"{key}[{i}]", shown(row), "a row of two numbers")
-    return [row[0] for row in rows], [row[1] for row in rows]
+def _insulator(table: ElectrostaticsTable) -> Layer:
+    """The insulator by its name, or by its thickness and permittivity."""
+    own = {name: getattr(table, name) for name in ("insulator_thickness", "insulator_eps_r")}
+    if table.insulator is not None:
+        for name, value in own.items():
+            if value is not None:
+                given = f"{value:g} beside insulator = {table.insulator}"
+                raise InputError(f"electrostatics.{name}", given, "one of the two")
+        return INSULATORS[table.insulator]
+    mistakes = Mistakes()
+    for name, value in own.items():
+        with mistakes.of_a_part():
+            if value is None:
+                allowed = ElectrostaticsTable.model_fields[name].description
+                others = " | ".join(INSULATORS)
+                raise InputError(f"electrostatics.{name}", ABSENT, f"{allowed}; or insulator = {others}")
+    mistakes.report()
+    prefix = "electrostatics.insulator_"
+    with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
+        return Layer(*own.values())
 
 
-def _law_and_voltage(table: Any, motion: list[Motion], folder: Path) -> tuple[Any, Any]:
-    if table is None:
-        return None, 0.0
+def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
+    """What a table [electrostatics] says of a scene."""
     with at("electrostatics"):
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
-    given = [
-        name for name in ("voltage", "voltage_file", "voltage_profile") if getattr(table, name) is not None
-    ]
-    ramped = any(isinstance(one, VoltageRamp) for one in motion)
-    if len(given) > 1 or not (given or ramped):
-        allowed = "exactly one of voltage (V) and voltage_file"
-        raise InputError("electrostatics.voltage", " and ".join(given) or "nothing", allowed)
-    if table.voltage_file is not None:
-        path = folder / table.voltage_file
-        _check_size("electrostatics.voltage_file", path, LARGEST_TABLE)
-        key = "electrostatics.voltage_file"
-        with at(key, voltage_file=key, path=key):
-            return law, read_signal(path)
-    if table.voltage_profile is not None:
-        with at("electrostatics.voltage_profile"):
-            return law, VoltageProfile(*_columns("electrostatics.voltage_profile", table.voltage_profile))
-    return law, table.voltage or 0.0
+    ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
+    same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
+    return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:
-    parts: dict[str, Any] = dict(table)
+    parts = {name: value for name, value in table.items() if name != "depth"}  # the scene's
     electrical = parts.pop("electrical", {})
     if not isinstance(electrical, dict):
         raise InputError("finger.electrical", shown(electrical), "a table [finger.electrical]")
@@ -222,15 +221,21 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     if "mesh" in parts:
         return _meshed_finger(parts, skin, folder)
     known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
-    for name in parts:
-        if name not in known:
-            raise unknown(f"finger.{name}", name, [*known, "mesh"])
-    if "materials" in parts:
-        parts["materials"] = _materials(parts["materials"])
-    if electrical:
-        parts["electrical"] = skin
-    with at("finger"):
-        return FingerPad(**parts)
+    mistakes = Mistakes()
+    mistakes.found += [
+        unknown(f"finger.{name}", name, [*known, "participant", "mesh", "depth"])
+        for name in parts
+        if name not in (*known, "participant")
+    ]
+    laws, given = parts.pop("materials", {}), {name: parts[name] for name in parts if name in known}
+    with mistakes.of_a_part():
+        given["materials"] = _materials(laws, TABLE_2)
+    with mistakes.of_a_part(), at("finger"):
+        if "participant" in parts:
+            given = participant_sizes(parts["participant"]) | given
+        pad = FingerPad(**given, **({"electrical": skin} if electrical else {}))
+    mistakes.report()
+    return pad
 
 
 def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) -> MeshedFinger:
@@ -240,22 +245,28 @@ def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) 
         raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")
     parsed = parse(MeshTable, table, "finger")
     path = folder / parsed.mesh
-    _check_size("finger.mesh", path, LARGEST)
+    check_size("finger.mesh", path, LARGEST)
     with at("finger"):
         materials = _materials(parsed.materials)
         return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)
 
 
-def _materials(tables: object) -> dict[str, Any]:
+def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({})) -> dict[str, Any]:
+    """The laws of the regions; one of `usual` whose table names no law is neo-Hookean, and keeps
+    the moduli that its table does not name.
+    """
     if not isinstance(tables, dict):
         raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
-    laws = {}
+    laws, mistakes = {}, Mistakes()
     for name, table in tables.items():
         key = f"finger.materials.{name}"
-        if not isinstance(table, dict):
-            raise InputError(key, shown(table), "a table with a law and its parameters")
-        with at("finger"):
+        with mistakes.of_a_part(), at("finger"):
+            if not isinstance(table, dict):
+                raise InputError(key, shown(table), "a table with a law and its parameters")
+            if name in usual and "law" not in table:
+                table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
             laws[name] = from_table(table, key)
+    mistakes.report()
     return laws
 
 
@@ -269,7 +280,7 @@ def dump(scene: Scene) -> str:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
     tables = {
         "version": VERSION,
-        "finger": _finger_table(scene.finger),
+        "finger": _finger_table(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
         "surface": _surface_table(scene.surface),
     }
     if scene.law is not None:
@@ -321,8 +332,9 @@ def _law_table(region: str, law: Any) -> dict[str, Any]:
 
 
 def _surface_table(surface: Any) -> dict[str, Any]:
-    if type(surface) not in (Flat, Display, Sinusoid, Profile):
-        raise InputError("surface", type(surface).__name__, "Flat, Display, Sinusoid or Profile, for a file")
+    if type(surface) not in (Flat, Display, Sinusoid, Profile, *TEXTURES.values()):
+        allowed = "Flat, Display, Sinusoid, Profile, Grating or SelfAffine, for a file"
+        raise InputError("surface", type(surface).__name__, allowed)
     friction = (
         surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
     )
@@ -331,6 +343,10 @@ def _surface_table(surface: Any) -> dict[str, Any]:
         return {"kind": "flat", **table}
     if type(surface) is Sinusoid:
         return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
+    for kind, cls in TEXTURES.items():
+        if type(surface) is cls:
+            own = {name: value for name, value in _changed(surface).items() if name != "insulator"}
+            return {"kind": kind, **own, **table}
     rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
     return {"kind": "profile", **table, "points": [list(row) for row in rows]}
 
@@ -342,15 +358,7 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
             "electrostatics.law", type(scene.law).__name__, f"{' | '.join(FORCE_LAWS)}, for a file"
         )
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
-    if isinstance(scene.voltage, FollowForce):
-        raise InputError(
-            "electrostatics.voltage", "FollowForce", "a number or a VoltageProfile in a scene file"
-        )
-    if isinstance(scene.voltage, VoltageProfile):
-        rows = zip(scene.voltage.position.tolist(), scene.voltage.voltage.tolist(), strict=True)
-        table["voltage_profile"] = [list(row) for row in rows]
-    else:
-        table["voltage"] = scene.voltage
+    table |= voltage_keys(scene.voltage)
     insulator = scene.ground.insulator
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}

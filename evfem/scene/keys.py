@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
+from pathlib import Path
 from typing import Any, Literal, TypeVar, get_type_hints
 
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
-from evfem.errors import InputError, readable
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
+from evfem.electrostatics.laws import INSULATORS
+from evfem.errors import ABSENT, InputError, near, readable, together, unknown
+from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
 from evfem.solver.strategy import Strategy
 
@@ -26,11 +27,13 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
 
-def _optional(allowed: str, default: Any = None) -> Any:
+def optional(allowed: str, default: Any = None) -> Any:
+    """A key that may be left out."""
     return Key(default=default, description=allowed)
 
 
-def _required(allowed: str) -> Any:
+def required(allowed: str) -> Any:
+    """A key that must be there."""
     return Key(description=allowed)
 
 
@@ -41,7 +44,7 @@ def derived(cls: type, **own: Any) -> type[Table]:
     chosen by that key, which the caller has looked at.
     """
     types = get_type_hints(cls)
-    keys: dict[str, Any] = {"kind": (str, _required("a kind"))} if hasattr(cls, "kind") else {}
+    keys: dict[str, Any] = {"kind": (str, required("a kind"))} if hasattr(cls, "kind") else {}
     for spec in fields(cls):
         default = ... if spec.default is MISSING else spec.default
         keys[spec.name] = types[spec.name], Key(default=default, description=spec.metadata.get("allowed"))
@@ -52,29 +55,31 @@ class SceneTable(Table):
     """The whole file."""
 
     version: int
-    finger: dict[str, Any] = _optional("a table [finger]", {})
-    surface: dict[str, Any] = _required("a table [surface] with a kind: flat | sinusoid | profile")
-    electrostatics: dict[str, Any] | None = _optional("a table [electrostatics]")
-    solver: dict[str, Any] = _optional("a table [solver]", {})
-    output: dict[str, Any] = _optional("a table [output]", {})
+    finger: dict[str, Any] = optional("a table [finger]", {})
+    surface: dict[str, Any] = required(
+        "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"
+    )
+    electrostatics: dict[str, Any] | None = optional("a table [electrostatics]")
+    solver: dict[str, Any] = optional("a table [solver]", {})
+    output: dict[str, Any] = optional("a table [output]", {})
     motion: list[dict[str, Any]] = Key(min_length=1, description="one or more tables [[motion]]")
 
 
 class MeshTable(Table):
     """[finger] with a mesh of the user's own."""
 
-    mesh: str = _required("the path of a mesh file")
-    regions: dict[str, int] | None = _optional("a table name = number")
-    materials: dict[str, dict[str, Any]] = _required("a table [finger.materials.NAME] for every region")
-    electrical: dict[str, Any] = _optional("a table [finger.electrical]", {})
-    viscosity: float = _optional("a relaxation time in s, not negative", 0.0)
+    mesh: str = required("the path of a mesh file")
+    regions: dict[str, int] | None = optional("a table name = number")
+    materials: dict[str, dict[str, Any]] = required("a table [finger.materials.NAME] for every region")
+    electrical: dict[str, Any] = optional("a table [finger.electrical]", {})
+    viscosity: float = optional("a relaxation time in s, not negative", 0.0)
 
 
 class ElectricalTable(Table):
     """[finger.electrical]."""
 
-    stratum_corneum_thickness: float | None = _optional("a thickness in mm, up to 10")
-    stratum_corneum_eps_r: float = _optional("a relative permittivity, at least 1", 1650.0)
+    stratum_corneum_thickness: float | None = optional("a thickness in mm, up to 10")
+    stratum_corneum_eps_r: float = optional("a relative permittivity, at least 1", 1650.0)
 
 
 _FRICTION = "a number, not negative, or rows [[x, coefficient], ...]"
@@ -84,41 +89,68 @@ class FlatTable(Table):
     """[surface] of the kind flat; the other kinds have its keys too."""
 
     kind: Literal["flat"]
-    friction: float | list[list[float]] = _optional(_FRICTION, 0.3)
-    y: float | None = _optional("a height in mm")
+    friction: float | list[list[float]] = optional(_FRICTION, 0.3)
+    y: float | None = optional("a height in mm")
 
 
 class SinusoidTable(FlatTable):
     """[surface] of the kind sinusoid."""
 
     kind: Literal["sinusoid"]  # type: ignore[assignment]
-    terms: list[list[float]] | None = _optional("rows [[amplitude in mm, wavenumber in 1/mm, phase], ...]")
+    terms: list[list[float]] | None = optional("rows [[amplitude in mm, wavenumber in 1/mm, phase], ...]")
 
 
 class ProfileTable(FlatTable):
     """[surface] of the kind profile."""
 
     kind: Literal["profile"]  # type: ignore[assignment]
-    file: str | None = _optional("the path of a csv file with the header x,height")
-    points: list[list[float]] | None = _optional("rows [[x, height], ...] in mm")
+    file: str | None = optional("the path of a csv file with the header x,height")
+    points: list[list[float]] | None = optional("rows [[x, height], ...] in mm")
+
+
+class GratingTable(FlatTable):
+    """[surface] of the kind grating."""
+
+    kind: Literal["grating"]  # type: ignore[assignment]
+    period: float = required("a length in mm, larger than 0")
+    groove_depth: float = required("a depth in mm, larger than 0")
+    groove_width: float | None = optional("a width in mm at half depth, below the period")
+    wall_width: float | None = optional("a width in mm up to that of ridge and groove")
+    phase: float = optional("a part of the period, -1 to 1", 0.0)
+
+
+class SelfAffineTable(FlatTable):
+    """[surface] of the kind self_affine."""
+
+    kind: Literal["self_affine"]  # type: ignore[assignment]
+    hurst: float = required("a Hurst exponent from 0 to 1")
+    rms: float = required("a root mean square height in mm, larger than 0")
+    period: float = optional("a length in mm after which it repeats", 10.0)
+    shortest: float = optional("a wavelength in mm up to the longest", 0.2)
+    longest: float | None = optional("a wavelength in mm up to the period")
+    seed: int = optional("a whole number, not negative", 0)
 
 
 class ElectrostaticsTable(Table):
     """[electrostatics]."""
 
-    law: Literal["strong_troxel", "kaczmarek"] = _required("strong_troxel | kaczmarek")
-    voltage: float | None = _optional("a voltage in V")
-    voltage_file: str | None = _optional("the path of a csv file (header: position,voltage) or of a .wav")
-    voltage_profile: list[list[float]] | None = _optional("rows [[position, voltage], ...] in mm and V")
-    insulator_thickness: float = _required("a thickness in mm, not negative")
-    insulator_eps_r: float = _required("a relative permittivity, at least 1")
-    gap_eps_r: float = _optional("a relative permittivity, at least 1", 1.0)
-    air_layer: bool = _optional("true | false", True)
-    direction: Literal[DIRECTIONS] = _optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
-    coupling: Literal[COUPLINGS] = _optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
+    law: Literal["strong_troxel", "kaczmarek"] = required("strong_troxel | kaczmarek")
+    voltage: float | None = optional("a voltage in V")
+    voltage_file: str | None = optional(
+        "the path of a csv file (header: position,voltage or time,voltage) or of a .wav"
+    )
+    voltage_profile: list[list[float]] | None = optional("rows [[position, voltage], ...] in mm and V")
+    signal: dict[str, Any] | None = optional("a table [electrostatics.signal] with a kind")
+    insulator: Literal[tuple(INSULATORS)] | None = optional(" | ".join(INSULATORS))  # type: ignore[valid-type]
+    insulator_thickness: float | None = optional("a thickness in mm, not negative")
+    insulator_eps_r: float | None = optional("a relative permittivity, at least 1")
+    gap_eps_r: float = optional("a relative permittivity, at least 1", 1.0)
+    air_layer: bool = optional("true | false", True)
+    direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
+    coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
 
 
-SolverTable = derived(Solver, strategy=(dict[str, Any], _optional("a table [solver.strategy]", {})))
+SolverTable = derived(Solver, strategy=(dict[str, Any], optional("a table [solver.strategy]", {})))
 StrategyTable = derived(Strategy)
 OutputTable = derived(Output)
 
@@ -126,36 +158,69 @@ SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
     "sinusoid": SinusoidTable,
     "profile": ProfileTable,
+    "grating": GratingTable,
+    "self_affine": SelfAffineTable,
 }
 MOTIONS: Mapping[str, tuple[type[Table], type]] = {
-    cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp)
+    cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp, Wait)
 }
 
 T = TypeVar("T", bound=Table)
 
 
 def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
-    """The checked table, or the first mistake in it; an unknown key comes before what it may stand
-    for.
+    """The checked table, or all mistakes in it, one of each key: first unknown keys, then others but
+    the lack of what an unknown one may stand for.
     """
     try:
         return model.model_validate(table)
     except ValidationError as error:
         found = error.errors(include_url=False, include_context=False)
-    first = min(found, key=lambda e: e["type"] != "extra_forbidden")
-    name, *deeper = first["loc"]
-    key = _join(prefix, str(name)) + "".join(f"[{part}]" for part in deeper if isinstance(part, int))
-    if first["type"] == "extra_forbidden":
-        raise unknown(key, str(name), list(model.model_fields))
-    allowed = model.model_fields[str(name)].description or "another value"
-    raise InputError(key, "nothing" if first["type"] == "missing" else shown(first["input"]), allowed)
+    known = list(model.model_fields)
+    mistakes: dict[str, InputError] = {}
+    meant: set[str] = set()
+    for one in sorted(found, key=lambda e: e["type"] != "extra_forbidden"):
+        name, *deeper = map(str, one["loc"])
+        key = _join(prefix, name) + "".join(f"[{part}]" for part in deeper if part.isdecimal())
+        if one["type"] == "extra_forbidden":
+            mistakes[name] = unknown(key, name, known)
+            meant |= {*near(name, known)}
+        elif name not in mistakes and not (one["type"] == "missing" and name in meant):
+            given = ABSENT if one["type"] == "missing" else shown(one["input"])
+            allowed = model.model_fields[name].description or "another value"
+            mistakes[name] = InputError(key, given, allowed)
+    raise together(list(mistakes.values()))
 
 
-def unknown(key: str, name: str, known: list[str]) -> InputError:
-    """The error for a key that does not exist, with the one that may have been meant."""
-    close = difflib.get_close_matches(name[:40], known, n=1)
-    hint = f"{close[0]}? (" if close else ""
-    return InputError(key, "an unknown key", hint + ", ".join(known) + (")" if close else ""))
+def check_size(key: str, path: Path, most: int) -> None:
+    """Raise InputError for a path that is no file, or a file of more than `most` bytes."""
+    try:
+        size = path.stat().st_size
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the path
+        reason = getattr(error, "strerror", None) or "no path"
+        given = f"{shown(str(path))} ({reason})"
+        raise InputError(key, given, "a file that exists and can be read") from error
+    if not path.is_file():
+        raise InputError(key, f"{path}, which is no file", "a file")
+    if size > most:
+        raise InputError(key, f"{path} with {size / 2**20:.0f} MB", f"a file of at most {most // 2**20} MB")
+
+
+def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]]:
+    """Rows of two numbers as two columns."""
+    for i, row in enumerate(rows):
+        if len(row) != 2:
+            raise InputError(f"{key}[{i}]", shown(row), "a row of two numbers")
+    return [row[0] for row in rows], [row[1] for row in rows]
+
+
+def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any]) -> str:
+    """The kind that a table says it is, one of `kinds`."""
+    kind = table.get("kind", ABSENT)
+    if not isinstance(kind, str) or kind not in kinds:
+        given = ABSENT if kind is ABSENT else shown(kind)
+        raise InputError(f"{prefix}.kind", given, " | ".join(kinds))
+    return kind
 
 
 def _join(prefix: str, name: str) -> str:
@@ -178,7 +243,13 @@ def at(prefix: str, **renamed: str) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        key = renamed.get(error.key.replace(" ", "_").replace(".", "_"), error.key)
-        key = key if _table_of(key) == _table_of(prefix) else _join(prefix, key)
-        given = error.given if isinstance(error.given, str) else shown(error.given)
-        raise InputError(key, given, error.allowed) from error
+        raise together([_moved(one, prefix, renamed) for one in error.mistakes]) from error
+
+
+def _moved(mistake: InputError, prefix: str, renamed: Mapping[str, str]) -> InputError:
+    key = renamed.get(mistake.key.replace(" ", "_").replace(".", "_"), mistake.key)
+    key = key if _table_of(key) == _table_of(prefix) else _join(prefix, key)
+    given = (
+        mistake.given if mistake.given is ABSENT or isinstance(mistake.given, str) else shown(mistake.given)
+    )
+    return InputError(key, given, mistake.allowed)

@@ -1,5 +1,5 @@
-"""What the finger does: press, slide, hover, and voltage ramps; frozen and validated (mm, N/mm, V,
-s).
+"""What the finger does: press, slide, hover, wait, and voltage ramps; frozen and validated (mm,
+N/mm, V, s).
 """
 
 from __future__ import annotations
@@ -7,19 +7,20 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
-from evfem.common.checks import check_fields, number, one_of, whole
-from evfem.errors import InputError
+from evfem.common.checks import Within, check_fields, number, one_of, whole
+from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
 
 # What a field may be, in words and as a check. Scene files take their keys from these fields too
 # (`evfem.scene.keys`).
-_FORCE = number("a force in N/mm, not negative", lambda f: f >= 0)
-_INDENTATION = number("an indentation in mm between -200 and 200", lambda d: abs(d) <= 200)
-_DISTANCE = number("a distance in mm, not 0, at most 1000 either way", lambda d: 0 < abs(d) <= 1000)
-_SPEED = number("a speed in mm/s, larger than 0", lambda v: v > 0)
-_GAP = number("a gap in mm from 0 to 200", lambda g: 0 <= g <= 200)
-_VOLTAGE = number("a voltage in V between -1e6 and 1e6", lambda u: abs(u) <= 1e6)
+_FORCE = number("a force in N/mm, not negative", Within(0.0))
+_INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0))
+_DISTANCE = number("a distance in mm, not 0, at most 1000 either way", Within(-1000.0, 1000.0, not_zero=True))
+_SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True))
+_GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0))
+_VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6))
+_DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
 _STEPS, _HOLD = whole(), one_of(*get_args(Hold))
 
 
@@ -50,7 +51,7 @@ class Press:
             raise InputError("force", given, "exactly one of the two")
         if self.force is not None and self.speed is not None:
             allowed = "no speed with a press to a force, only to an indentation"
-            raise InputError("speed", self.speed, allowed)
+            raise InputError("speed", quoted(self.speed), allowed)
         check_fields(self)
 
 
@@ -107,4 +108,33 @@ class VoltageRamp:
         check_fields(self)
 
 
-Motion = Press | Slide | Hover | VoltageRamp
+@dataclass(frozen=True)
+class Wait:
+    """Stay where it is for `duration` (s), in `steps` equal parts: for a voltage that changes with
+    time, and for tissue that creeps.
+
+    `hold` keeps the indentation or the applied force of the moment before.
+
+    >>> Wait(duration=0.1).steps
+    100
+    """
+
+    duration: float = field(metadata=_DURATION)
+    steps: int = field(default=100, metadata=_STEPS)
+    hold: Hold = field(default="indentation", metadata=_HOLD)
+    kind = "wait"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+Motion = Press | Slide | Hover | VoltageRamp | Wait
+
+
+def takes_time(motion: Motion) -> bool:
+    """Whether any time passes in a motion.
+
+    >>> takes_time(Slide(1.0)), takes_time(Slide(1.0, speed=20.0)), takes_time(Wait(0.1))
+    (False, True, True)
+    """
+    return isinstance(motion, Wait) or getattr(motion, "speed", None) is not None

@@ -10,19 +10,22 @@ import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.util import find_spec
+from os import PathLike
 from typing import Any
 
 import numpy as np
 
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.motion import Hover, VoltageRamp
-from evfem.scene.resolution import unresolved
+from evfem.protocols import TimeSignal
+from evfem.scene.motion import Hover, VoltageRamp, Wait
+from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
 from evfem.scene.terms import Boundary
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
+from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
 from evfem.tissue.userforms import Trial, tried
 
@@ -92,8 +95,9 @@ def _wrapped(begin: str, text: str) -> list[str]:
     return textwrap.wrap(text, WIDTH, initial_indent=begin, subsequent_indent=indent, break_long_words=False)
 
 
-def plan(scene: Scene) -> Plan:
-    """Which terms, unknowns and solver a scene needs, and why; builds the mesh, solves nothing.
+def plan(scene: Scene | str | PathLike[str]) -> Plan:
+    """Which terms, unknowns and solver a scene needs (`Scene`, or the path of a scene file), and why;
+    builds the mesh, solves nothing.
 
     >>> from evfem import Flat, FingerPad, Press, Scene
     >>> smooth = FingerPad(ridges=False, resolution="coarse")
@@ -101,6 +105,10 @@ def plan(scene: Scene) -> Plan:
     >>> [term.name for term in needed.terms if not term.needed]
     ['friction', 'electricity', 'time', 'user forms']
     """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
     mesh, element = scene_mesh(scene)
     return plan_on(scene, mesh, element)
 
@@ -124,7 +132,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    rough = unresolved(scene, mesh)
+    rough, fast = unresolved(scene, mesh), too_fast(scene)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
@@ -143,7 +151,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
-        warnings=(*doubts(scene, mesh, moduli), *([] if rough is None else [rough])),
+        warnings=(*doubts(scene, mesh, moduli), *(text for text in (rough, fast) if text is not None)),
     )
 
 
@@ -153,6 +161,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     # a modulus in kPa is seen here
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
+    deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
     share = rigid_share(scene, mesh)
     if share is not None and share < RIGID_BELOW:
         return Term(
@@ -161,7 +170,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     return Term(
         "tissue",
         True,
-        f"{laws}, plane strain, {stiffness}"
+        f"{laws}, plane strain{deep}, {stiffness}"
         + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
     )
 
@@ -173,7 +182,7 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
     hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
     if (
         not hovers
-        or not all(isinstance(motion, (Hover, VoltageRamp)) for motion in scene.motion)
+        or not all(isinstance(motion, (Hover, VoltageRamp, Wait)) for motion in scene.motion)
         or scene.forms
     ):
         return None
@@ -205,19 +214,23 @@ def _electricity(scene: Scene) -> Term:
     if scene.law is None or largest_voltage(scene) == 0.0:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
+    signal = scene.voltage
+    over_time = (
+        f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
+    )
+    law = type(scene.law).__name__
     return Term(
-        "electricity",
-        True,
-        f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling",
+        "electricity", True, f"{law}, {air}, {scene.direction} traction, {scene.coupling} coupling{over_time}"
     )
 
 
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
+    clock = ", the clock sets the voltage alone" if isinstance(scene.voltage, TimeSignal) else ""
     return Term(
         "time",
         dynamics != "quasistatic",
-        "quasi-static" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
+        f"quasi-static{clock}" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
     )
 
 
@@ -250,9 +263,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         if find_spec("pypardiso")
         else "SuperLU (install evfem[fast] for PARDISO)"
     )
-    kernels = "numba" if find_spec("numba") else "numpy (install evfem[fast] for numba)"
+    cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
-        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {kernels}",
+        f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

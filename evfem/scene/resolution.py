@@ -1,23 +1,34 @@
 """Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
-enough.
+enough; and whether the steps are short enough to follow a voltage over time.
+
+Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
+node to node: five nodes miss a fifth.
 """
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
+from evfem.contact.textures import SelfAffine
+from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
-from evfem.scene.motion import Slide
+from evfem.protocols import TimeSignal
+from evfem.scene.motion import Motion, Slide, Wait
 from evfem.scene.scene import Scene
 
 #: share of a profile's height that may lie between two neighbouring nodes and be missed by both
 MISSED = 0.2
 #: share of a profile's slope (root mean square) that may be too fine for the nodes
 ROUGH = 0.5
+#: nodes that the shortest wave of roughness needs
+PER_WAVE = 5.0
 #: samples of the profile per node spacing, and at most
 PER_SPACING, MOST = 8, 200_000
+#: steps in a period of the voltage, at least: 10 in one of its square, which the attraction follows
+PER_PERIOD = 20.0
 
 
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
@@ -33,6 +44,12 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
         return None
     ends = mesh.points[mesh.edges_of("pad")[:, :2]]
     spacing = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T))) / mesh.order
+    if isinstance(scene.surface, SelfAffine) and scene.surface.shortest < PER_WAVE * spacing:
+        return (
+            f"the shortest waves of the surface ({scene.surface.shortest:g} mm) have fewer than "
+            f"{PER_WAVE:g} nodes of the pad each, which are {spacing:.2g} mm apart; use a finer mesh, or a "
+            f"shortest wave of {PER_WAVE * spacing:.2g} mm"
+        )
     x = way(scene, mesh, spacing / PER_SPACING)
     before, height, after = (surface.height(x + shift) for shift in (-0.5 * spacing, 0.0, 0.5 * spacing))
     missed, whole = float(np.abs(height - 0.5 * (before + after)).max()), float(np.ptp(height))
@@ -50,6 +67,45 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             "or expect small steps and a long run"
         )
     return None
+
+
+def too_fast(scene: Scene) -> str | None:
+    """A sentence if a motion's steps are too long for the highest frequency of a voltage over
+    time, else None.
+
+    The attraction goes with the square of the voltage, so with up to twice that frequency; what
+    lies above half the rate of the steps appears below it (aliasing).
+    """
+    signal = scene.voltage
+    if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
+        return None
+    steps = {i: _seconds(motion) / motion.steps for i, motion in enumerate(scene.motion)}
+    longest = max(steps, key=lambda i: steps[i])
+    step, f = steps[longest], signal.highest_frequency
+    found = 1.0 / (f * step) if step > 0.0 else math.inf
+    if found >= PER_PERIOD * (1.0 - 1e-9):
+        return None
+    few = f"motion {longest} has {found:.3g} steps in a period of the voltage ({f:g} Hz)"
+    alias = ""
+    if 2.0 * f > 0.5 / step:
+        alias = f", and shows what the attraction does above {0.5 / step:.4g} Hz at a lower frequency"
+    needed = math.ceil(PER_PERIOD * f * _seconds(scene.motion[longest]) * (1.0 - 1e-9))
+    return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{_instead(signal)}"
+
+
+def _seconds(motion: Motion) -> float:
+    """Seconds that a slide or wait takes."""
+    if isinstance(motion, Wait):
+        return motion.duration
+    if isinstance(motion, Slide) and motion.speed is not None:
+        return abs(motion.distance) / motion.speed
+    return 0.0
+
+
+def _instead(signal: TimeSignal) -> str:
+    if isinstance(signal, Carrier) and signal.resolved:
+        return ", or resolved=False for the mean over the carrier's cycles"
+    return ""
 
 
 def way(scene: Scene, mesh: Mesh, step: float) -> Any:

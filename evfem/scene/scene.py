@@ -12,14 +12,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, runtime_checkable
 
-from evfem.common.checks import check_fields, choice, number, one_of, real, set_frozen, whole
+from evfem.common.checks import (
+    Within,
+    check_fields,
+    choice,
+    number,
+    one_of,
+    real,
+    set_frozen,
+    whole,
+    yes_or_no,
+)
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.errors import InputError
-from evfem.protocols import CompleteSurface, ForceLaw, Surface
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.errors import ABSENT, InputError, Mistakes, quoted
+from evfem.protocols import CompleteSurface, ForceLaw, Surface, TimeSignal
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -28,9 +38,13 @@ from evfem.tissue.forms import Form
 DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
+PRECISIONS = ("single", "double")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
-_PENALTY = number("a penalty in N/mm3, larger than 0", lambda p: p > 0)
-_TOLERANCE = number("a relative residual from 1e-13 to 1e-3", lambda t: 1e-13 <= t <= 1e-3)
+#: voltages that are no number
+SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
+DEPTH = number("a depth in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True))
+_PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True))
+_TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3))
 
 
 @runtime_checkable
@@ -73,14 +87,14 @@ class Solver:
 
     def __post_init__(self) -> None:
         if not isinstance(self.strategy, Strategy):
-            raise InputError("strategy", self.strategy, "a Strategy")
+            raise InputError("strategy", quoted(self.strategy), "a Strategy")
         for key in ("penalty_normal", "penalty_tangential"):
             if self.contact == "exact" and getattr(self, key) is not None:
-                raise InputError(key, getattr(self, key), 'only with contact = "penalty"')
+                raise InputError(key, quoted(getattr(self, key)), 'only with contact = "penalty"')
         check_fields(self)
         if self.contact == "penalty" and self.penalty_normal is None:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
-            raise InputError("penalty_normal", "nothing", allowed)
+            raise InputError("penalty_normal", ABSENT, allowed)
 
     def element_on(self, corners: int) -> str:
         """The element used on cells with that many corners (3 or 4).
@@ -102,9 +116,16 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output:
-    """Fields are kept of every `every`-th step, and of the last one."""
+    """Fields are kept of every `every`-th step, and of the last one; None keeps all.
 
-    every: int = field(default=1, metadata=whole())
+    What is left open `evfem run` chooses so that its files of fields stay small
+    (`evfem.export.FieldFiles`): with `every` None it may write fewer of them, with `precision`
+    None in single precision. `compression` makes them smaller still, and slower to write.
+    """
+
+    every: int | None = field(default=None, metadata=whole())
+    precision: str | None = field(default=None, metadata=one_of(*PRECISIONS))
+    compression: bool = field(default=False, metadata=yes_or_no())
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -124,16 +145,18 @@ class Motions:
 class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
-    `voltage` in V: a number, acting in full from the first step, or a `VoltageProfile` over the
-    position of the bone. `law` None and `voltage` 0: no electrostatics. The insulator belongs to
-    the surface. `air_layer` False: only touching nodes carry electrostatic force. Raises
-    InputError for anything that does not fit together.
+    `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
+    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
+    `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
+    touching nodes carry electrostatic force. `depth` (mm) is how deep the plane finger is meant to
+    be; it changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything
+    that does not fit together.
     """
 
     finger: Finger
     surface: Surface
     law: ForceLaw | None = None
-    voltage: float | VoltageProfile | FollowForce = 0.0
+    voltage: float | VoltageProfile | FollowForce | TimeSignal = 0.0
     motion: Motions = Motions()
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
@@ -141,14 +164,17 @@ class Scene:
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
+    depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
 
     def __post_init__(self) -> None:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
-        _check_electrostatics(self)
-        _check_motion(self)
-        _check_dynamics(self)
+        mistakes = Mistakes()
+        for check in (_check_electrostatics, _check_motion, _check_time, _check_dynamics):
+            with mistakes.of_a_part():
+                check(self)
+        mistakes.report()
 
     def __repr__(self) -> str:
         """Finger, surface and attraction; what happens; and what is not as usual."""
@@ -187,9 +213,9 @@ class Scene:
         boundary `on`.
         """
         if not isinstance(form, Form):
-            raise InputError("form", form, "a function marked with @evfem.form")
+            raise InputError("form", quoted(form), "a function marked with @evfem.form")
         if not isinstance(on, (Region, Boundary)):
-            raise InputError("on", on, "evfem.Region(name) or evfem.Boundary(name)")
+            raise InputError("on", quoted(on), "evfem.Region(name) or evfem.Boundary(name)")
         return replace(self, forms=(*self.forms, Term(form, on)))
 
     def digest(self) -> str:
@@ -203,31 +229,33 @@ def _volts(voltage: object) -> str:
 
 def _check_parts(scene: Scene) -> None:
     if not isinstance(scene.finger, Finger):
-        raise InputError("finger", scene.finger, "a FingerPad or a MeshedFinger")
+        raise InputError("finger", quoted(scene.finger), "a FingerPad or a MeshedFinger")
     real("finger.viscosity", scene.finger.viscosity, "a relaxation time in s, not negative", lambda t: t >= 0)
     completed(scene.surface)
     if not isinstance(scene.solver, Solver):
-        raise InputError("solver", scene.solver, "a Solver")
+        raise InputError("solver", quoted(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
-        raise InputError("output", scene.output, "an Output")
+        raise InputError("output", quoted(scene.output), "an Output")
+    if scene.depth is not None:
+        set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
-        raise InputError("name", scene.name, "a name that can be part of a file name")
+        raise InputError("name", quoted(scene.name), "a name that can be part of a file name")
     if not all(isinstance(term, Term) for term in scene.forms):
-        raise InputError("forms", scene.forms, "terms as made by Scene.with_term")
+        raise InputError("forms", quoted(scene.forms), "terms as made by Scene.with_term")
     if not scene.motion:
-        raise InputError("motion", "nothing", "at least one of Press, Slide, Hover, VoltageRamp")
+        raise InputError("motion", ABSENT, "at least one of Press, Slide, Hover, VoltageRamp, Wait")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
-            raise InputError(f"motion[{i}]", motion, "Press, Slide, Hover or VoltageRamp")
+            raise InputError(f"motion[{i}]", quoted(motion), "Press, Slide, Hover, VoltageRamp or Wait")
 
 
 def _check_electrostatics(scene: Scene) -> None:
     choice("electrostatics.direction", scene.direction, DIRECTIONS)
     choice("electrostatics.coupling", scene.coupling, COUPLINGS)
     if not isinstance(scene.air_layer, bool):
-        raise InputError("electrostatics.air_layer", scene.air_layer, "true or false")
-    if not isinstance(scene.voltage, (VoltageProfile, FollowForce)):
-        allowed = "a voltage in V between -1e6 and 1e6"
+        raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
+    if not isinstance(scene.voltage, SIGNALS):
+        allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
@@ -236,7 +264,7 @@ def _check_electrostatics(scene: Scene) -> None:
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
         allowed = "StrongTroxel(), Kaczmarek() or an object with a method traction(gap, voltage, layers)"
-        raise InputError("electrostatics.law", scene.law, allowed)
+        raise InputError("electrostatics.law", quoted(scene.law), allowed)
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
         raise InputError("electrostatics.direction", "normal with a law without a potential", allowed)
@@ -252,9 +280,9 @@ def _check_motion(scene: Scene) -> None:
         pressed = (pressed or isinstance(motion, Press)) and not isinstance(motion, Hover)
         if isinstance(motion, VoltageRamp) and scene.law is None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
-        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, (VoltageProfile, FollowForce)):
-            raise InputError(key, "a voltage ramp beside a voltage profile", "one of the two")
-        if isinstance(motion, (Slide, VoltageRamp)) and motion.hold == "force" and not pressed:
+        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, SIGNALS):
+            raise InputError(key, "a voltage ramp beside a voltage profile or signal", "one of the two")
+        if isinstance(motion, (Slide, VoltageRamp, Wait)) and motion.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
@@ -262,17 +290,23 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
 
 
+def _check_time(scene: Scene) -> None:
+    if isinstance(scene.voltage, TimeSignal) and not any(takes_time(motion) for motion in scene.motion):
+        given = "a signal over time, and no motion that takes any"
+        raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
+
+
 def _check_dynamics(scene: Scene) -> None:
     solver = scene.solver
     if solver.contact == "penalty" and scene.ground.has_friction and solver.penalty_tangential is None:
         allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
-        raise InputError("solver.penalty_tangential", "nothing", allowed)
+        raise InputError("solver.penalty_tangential", ABSENT, allowed)
     if solver.dynamics == "quasistatic":
         return
     for i, motion in enumerate(scene.motion):
         if isinstance(motion, Slide) and motion.speed is None:
             allowed = f"a speed in mm/s, needed with dynamics = {solver.dynamics}"
-            raise InputError(f"motion[{i}].speed", "nothing", allowed)
+            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
     own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
     if solver.dynamics == "viscous" and not max([scene.finger.viscosity, *own]) > 0.0:
         allowed = "a relaxation time in s, larger than 0, with dynamics = viscous"

@@ -21,6 +21,7 @@ from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
+from evfem.protocols import TimeSignal
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
@@ -186,6 +187,8 @@ def largest_voltage(scene: Scene) -> float:
         own = own.voltage
     elif isinstance(own, FollowForce):
         own = own.largest_voltage
+    elif isinstance(own, TimeSignal):
+        own = own.largest
     ramps = [abs(motion.voltage) for motion in scene.motion if isinstance(motion, VoltageRamp)]
     return float(max([np.abs(own).max(), *ramps]))
 

@@ -21,10 +21,12 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Saved
 from evfem.simulation.works import SUMS, Books
-from evfem.solver.state import Reusable, State, TangentPoint
+from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
 
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
+#: arrays whose size a run that has just been set up does not know
+OF_ANY_SIZE = ("candidates", "factor_pressure")
 
 
 def state_arrays(state: State) -> dict[str, Any]:
@@ -46,6 +48,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
         "factor_duration": np.array(0.0 if at is None else at.duration),
         "factor_frozen": np.array(False if at is None else at.frozen),
         "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
+        "factor_pressure": NO_PRESSURE if at is None else at.pressure,
         "duration": np.array(carried.duration),
     }
 
@@ -61,6 +64,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             frozen=bool(arrays["factor_frozen"]),
             begin=arrays["factor_begin"],
             duration=float(arrays["factor_duration"]),
+            pressure=arrays["factor_pressure"],
         )
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
@@ -96,7 +100,7 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
         given, fits = saved.arrays.get(name), np.asarray(expected)
         if given is None or given.dtype.kind != fits.dtype.kind:
             raise _unusable(name)
-        if given.ndim != fits.ndim or (name != "candidates" and given.shape != fits.shape):
+        if given.ndim != fits.ndim or (name not in OF_ANY_SIZE and given.shape != fits.shape):
             raise _unusable(name)
         if not np.isfinite(given).all():
             raise _unusable(name)

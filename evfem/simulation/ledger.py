@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.simulation.model import Model
@@ -42,7 +43,9 @@ class Ledger:
         position = model.equilibrium.positions(state.u)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
-        width, real = model.pad.contact_widths(position[:, 0], state.status != OPEN)
+        touching = state.status != OPEN
+        width, real = model.pad.contact_widths(position[:, 0], touching)
+        pressing = state.contact_force[:, 0]
         return {
             "step": step,
             "motion_index": motion_index,
@@ -60,19 +63,25 @@ class Ledger:
             "contact_width": width,
             "real_contact_width": real,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
+            "peak_contact_pressure": float((pressing / shares(model, position)).max()),
+            "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
         }
 
 
+def shares(model: Model, position: Floats) -> Floats:
+    """Current tributary lengths of the pad nodes (P,) in mm; infinite where there is none."""
+    length = model.pad.length(position[:, 0])
+    return np.where(length > 0, length, np.inf)
+
+
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes = model.body.space.size, model.pad.nodes
     position = model.equilibrium.positions(state.u)
-    length = model.pad.length(position[:, 0])
-    surface = surface_state(model.surface, position)
-    share = np.where(length > 0, length, np.inf)
+    surface, share = surface_state(model.surface, position), shares(model, position)
 
     def on_pad(values: Any, off: float) -> Any:
         field = np.full(size, off)

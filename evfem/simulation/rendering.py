@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.views import plus
 from evfem.contact.signorini import OPEN, STICK
 from evfem.electrostatics.encoding import Encoding, share_not_renderable
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile, carrier_amplitude
@@ -80,6 +81,12 @@ class ApparentFriction:
         if not np.all(self.normal_force > 0.0):
             lowest = float(self.normal_force.min())
             raise InputError("normal_force", lowest, "an applied force above zero all along the slide")
+
+    def __repr__(self) -> str:
+        """Its size and range."""
+        x, mu = self.position, self.friction
+        span = f"{len(x)} positions, {plus(x[0]):.4g} to {plus(x[-1]):.4g} mm"
+        return f"ApparentFriction({span}, friction {plus(mu.min()):.4g} to {plus(mu.max()):.4g})"
 
     @property
     def friction(self) -> Array:
@@ -252,6 +259,12 @@ class Comparison:
     pearson: float
     relative_l2: float
     voltage_difference: float
+
+    def __repr__(self) -> str:
+        """How good it is."""
+        good = f"pearson {self.pearson:.4g}, relative L2 error {self.relative_l2:.4g}"
+        most = f"at most {self.largest_error:.4g} N/mm and {self.voltage_difference:.4g} V apart"
+        return f"Comparison({len(self.position)} positions: {good}, {most})"
 
     @property
     def largest_error(self) -> float:

@@ -1,8 +1,8 @@
 """What a run leaves behind: a history with one row per step, fields of some steps, and how it came
 about.
 
-Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth). Files are .npz without pickled
-objects.
+Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth); N, mm2 and mJ in `Result.total`.
+Files are .npz without pickled objects.
 """
 
 from __future__ import annotations
@@ -10,12 +10,8 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
-from datetime import UTC, datetime
-from functools import cache
-from importlib import metadata
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from platform import python_version
 from typing import Any
 
 import numpy as np
@@ -23,25 +19,39 @@ import numpy as np
 import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import plain
-from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
-from evfem.common.tables import csv_text
-from evfem.common.views import called, curves, table
-from evfem.errors import InputError
-from evfem.mesh.mesh import CELLS, KINDS, Mesh
-from evfem.scene.scene import Scene
+from evfem.common.views import curves, plus, table
+from evfem.errors import ABSENT, InputError
+from evfem.mesh.archive import mesh_arrays, mesh_of
+from evfem.mesh.mesh import Mesh
 
-Row = Mapping[str, Any]
+# public in `ev.result`, where they were before
+from evfem.simulation.history import COLUMNS as COLUMNS
+from evfem.simulation.history import INTEGERS as INTEGERS
+from evfem.simulation.history import MEANINGS as MEANINGS
+from evfem.simulation.history import NEEDED as NEEDED
+from evfem.simulation.history import RESUMED as RESUMED
+from evfem.simulation.history import UNITS as UNITS
+from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
+from evfem.simulation.history import History, column_of, over_depth
+from evfem.simulation.history import Row as Row
+from evfem.simulation.history import csv_header as csv_header
+from evfem.simulation.history import csv_line as csv_line
+from evfem.simulation.provenance import origin as origin
+from evfem.simulation.provenance import provenance as provenance
+from evfem.simulation.provenance import versions as versions
+
+#: key of the provenance of a total, with its depth (mm)
+WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-4"
-#: columns from which a run goes on
-RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-#: what is shown of the last step, with units
-SHOWN = {"position": "mm", "indentation": "mm", "voltage": "V", "normal_force": "N/mm"}
-SHOWN |= {"tangential_force": "N/mm", "electrostatic_force": "N/mm", "contact_width": "mm"}
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
-#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
-NEEDED = ("motion", *INTEGERS, *RESUMED)
+#: what is shown of the last step
+SHOWN = (
+    *("position", "indentation", "voltage"),
+    *("normal_force", "tangential_force", "electrostatic_force", "contact_width"),
+)
+#: what is shown of it over a whole depth
+SHOWN_WHOLE = SHOWN[3:]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +75,11 @@ class Frame:
     cauchy_stress: Floats
     J: Floats
 
+    def __repr__(self) -> str:
+        """Which step it is, where, and its size."""
+        size = f"{len(self.displacement)} nodes, {len(self.J)} cells"
+        return f"Frame of step {self.step} at {plus(self.position):.4g} mm, {plus(self.time):.4g} s: {size}"
+
 
 POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
 CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
@@ -76,47 +91,16 @@ _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
 
 
 @dataclass(frozen=True, eq=False)
-class Result:
+class Result(History):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the
     provenance.
 
-    A field before `frames` is a column of the history: of `COLUMNS`, of rows and `history.csv`, of
-    saved results and checkpoints. `Ledger.row` computes its value; a whole number also stands in
-    `INTEGERS`.
-
+    Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
     `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
     the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
     the downward attraction.
     """
 
-    step: Ints
-    motion_index: Ints
-    motion: list[str]
-    time: Floats
-    position: Floats
-    indentation: Floats
-    voltage: Floats
-    applied_force: Floats
-    applied_tangential_force: Floats
-    normal_force: Floats
-    tangential_force: Floats
-    electrostatic_force: Floats
-    electrostatic_force_x: Floats
-    contact_width: Floats
-    real_contact_width: Floats
-    min_gap: Floats
-    external_work: Floats
-    electrostatic_work: Floats
-    stored_energy: Floats
-    friction_dissipation: Floats
-    viscous_dissipation: Floats
-    kinetic_energy: Floats
-    integrator_dissipation: Floats
-    snap_dissipation: Floats
-    substeps: Ints
-    newton_iterations: Ints
-    seconds: Floats
-    # a field before this line is a column of the history
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
@@ -132,14 +116,53 @@ class Result:
             if set(row) != set(COLUMNS):
                 odd = sorted(set(row) ^ set(COLUMNS))
                 raise InputError("row", f"missing or unknown {odd}", ", ".join(COLUMNS))
-        columns = {name: _column(name, [row[name] for row in rows]) for name in COLUMNS}
+        columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
         return cls(**columns, frames=list(frames), mesh=mesh, provenance=provenance)
 
     @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The history as one dictionary per step, plain Python numbers."""
-        columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
-        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+    def units(self) -> Mapping[str, str]:
+        """The unit of each column."""
+        return WHOLE_UNITS if WHOLE in self.provenance else UNITS
+
+    @property
+    def depth(self) -> float | None:
+        """The scene's depth (mm), None without one."""
+        return self.provenance.get("scene", {}).get("depth")
+
+    @property
+    def total(self) -> Result:
+        """This result over the whole `depth`: under the same names forces in N, widths as areas in
+        mm2, works and energies in mJ; lengths, pressures and fields are as they were.
+
+        `result.total.rows`, `.table()`, `.to_csv(path)` and the plots then have these units too.
+        Raises InputError where the scene says no depth.
+        """
+        depth = self._known_depth
+        if WHOLE in self.provenance:
+            return self
+        columns = over_depth({name: self[name] for name in COLUMNS}, depth)
+        return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
+
+    @property
+    def contact_area(self) -> Floats:
+        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without
+        one.
+        """
+        return self.total.contact_width
+
+    @property
+    def real_contact_area(self) -> Floats:
+        """Real contact area (mm2): `real_contact_width` over the depth. Raises InputError without
+        one.
+        """
+        return self.total.real_contact_width
+
+    @property
+    def _known_depth(self) -> float:
+        if self.depth is None:
+            allowed = "a depth in mm, by Scene(depth=...) or depth in [finger]"
+            raise InputError("depth", ABSENT, allowed)
+        return self.depth
 
     def summary(self) -> dict[str, Any]:
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
@@ -147,9 +170,9 @@ class Result:
         steps = len(self.step)
         extremes = {}
         if steps:
-            peaks = ("normal_force", "tangential_force", "electrostatic_force", "contact_width")
+            peaks = (*SHOWN_WHOLE, "peak_contact_pressure")
             extremes = {name: float(np.max(np.abs(getattr(self, name)))) for name in peaks}
-        return {
+        found = {
             "scene": scene.get("name", "scene"),
             "complete": steps == scene.get("total_steps", steps),
             "steps": steps,
@@ -162,14 +185,26 @@ class Result:
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
             "seconds": float(self.seconds.sum()),
-            "units": {"length": "mm", "force": "N/mm", "stress": "MPa", "voltage": "V", "energy": "N"},
+            "units": {
+                "length": "mm",
+                "force": self.units["normal_force"],
+                "stress": "MPa",
+                "voltage": "V",
+                "energy": self.units["stored_energy"],
+            },
             "provenance": self.provenance,
         }
+        if self._shows_total:
+            whole = self.total.summary()
+            found["total"] = {"depth": self.depth} | {key: whole[key] for key in ("last", "largest", "units")}
+        return found
 
     def __repr__(self) -> str:
         """How far the run came, where it ended and with what forces."""
         last = self._last
-        lines = ["; ".join(f"{key} {text}" for key, text in row) for row in (last[:3], last[3:5], last[5:])]
+        parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
+        lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
+        lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
@@ -191,10 +226,19 @@ class Result:
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [
-            (name.replace("_", " "), f"{getattr(self, name)[-1] + 0.0:.4g} {unit}")
-            for name, unit in SHOWN.items()
-        ]
+        return [*self._ends(SHOWN), *(self.total._ends(SHOWN_WHOLE) if self._shows_total else [])]
+
+    @property
+    def _shows_total(self) -> bool:
+        return self.depth is not None and WHOLE not in self.provenance
+
+    def _ends(self, names: Sequence[str]) -> list[tuple[str, str]]:
+        """Columns of the last row, in words."""
+        found = []
+        for name in names:
+            words = name.replace("_width", "_area") if self.units[name] == "mm2" else name
+            found.append((words.replace("_", " "), f"{plus(self[name][-1]):.4g} {self.units[name]}"))
+        return found
 
     def save(self, path: str | Path) -> None:
         """Write everything to one .npz file, in one step. Raises StorageError when the disk
@@ -206,13 +250,9 @@ class Result:
             values = [getattr(frame, spec.name) for frame in self.frames]
             if values:
                 arrays[f"frames/{spec.name}"] = np.stack([np.asarray(value) for value in values])
-        arrays |= _mesh_arrays(self.mesh)
+        arrays |= mesh_arrays(self.mesh)
         arrays["provenance"] = np.array(json.dumps(self.provenance))
         save_arrays(path, arrays)
-
-
-_NAMES = [spec.name for spec in fields(Result)]
-COLUMNS = tuple(_NAMES[: _NAMES.index("frames")])
 
 
 def load(path: str | Path) -> Result:
@@ -229,7 +269,7 @@ def load(path: str | Path) -> Result:
         raise InputError("result", given, f"a file written by Result.save of evfem {evfem.__version__}")
     try:
         columns = {name: _column_of(arrays, name) for name in COLUMNS}
-        mesh = _mesh_from(arrays)
+        mesh = mesh_of(arrays)
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
         if len({len(column) for column in columns.values()}) > 1:
@@ -253,79 +293,9 @@ def _checked_column(name: str, column: np.ndarray) -> Any:
     return [str(kind) for kind in column] if name == "motion" else column
 
 
-def csv_line(row: Row) -> str:
-    """One row of history.csv with its line end; floats with every digit that counts.
-
-    >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
-    '1,0,press,0.0,0.0,0.0,0.1'
-    """
-    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
-
-
-def csv_header() -> str:
-    """The first line of history.csv."""
-    return csv_text([COLUMNS])
-
-
-def _plain_value(name: str, value: Any) -> str | int | float:
-    if name == "motion":
-        return str(value)
-    return int(value) if name in INTEGERS else float(value)
-
-
-def _column(name: str, values: list[Any]) -> Any:
-    if name == "motion":
-        return [str(value) for value in values]
-    return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)
-
-
 def _json(value: Any) -> Any:
     """The value itself, or None for a number that JSON does not know."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-@cache
-def versions() -> dict[str, str]:
-    """Versions of evfem, Python and the packages that compute, as far as they are installed."""
-    found = {"evfem": evfem.__version__, "python": python_version()}
-    for package in ("numpy", "scipy", "scikit-fem", "meshio", "numba", "pypardiso"):
-        try:
-            found[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
-
-
-def origin() -> dict[str, Any]:
-    """Versions and date, for the provenance of whatever is computed now."""
-    return {"versions": dict(versions()), "date": datetime.now(UTC).isoformat(timespec="seconds")}
-
-
-def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
-    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
-    JSON.
-
-    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
-    user's own.
-    """
-    from evfem.scene.file import dump
-
-    try:
-        parameters = dump(scene)
-    except InputError:
-        parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
-    return {
-        **origin(),
-        "scene": {"name": scene.name, "digest": scene.digest(), "total_steps": scene.total_steps},
-        "parameters": parameters,
-        "mesh": {
-            "digest": digest(mesh),
-            "nodes": len(mesh.points),
-            "cells": len(mesh.cells),
-            "kind": mesh.kind,
-        },
-        "solver": dict(solver),
-    }
 
 
 @dataclass(frozen=True)
@@ -392,35 +362,6 @@ def _check_rows(rows: Any) -> None:
             raise ValueError(f"row {step}")
         if not all(math.isfinite(row[name]) for name in RESUMED):
             raise ValueError(f"row {step}")
-
-
-def _mesh_arrays(mesh: Mesh) -> dict[str, np.ndarray]:
-    arrays = {"mesh/points": mesh.points, "mesh/cells": mesh.cells, "mesh/region": mesh.region}
-    arrays |= {f"mesh/set/{name}": np.asarray(nodes) for name, nodes in mesh.node_sets.items()}
-    return arrays | {
-        "mesh/kind": np.array(mesh.kind),
-        "mesh/region_names": np.array(json.dumps({name: int(i) for name, i in mesh.region_names.items()})),
-    }
-
-
-def _mesh_from(arrays: Mapping[str, np.ndarray]) -> Mesh:
-    kind = str(arrays["mesh/kind"])
-    if kind not in KINDS:
-        raise ValueError("cells of an unknown kind")
-    points, cells, region = (arrays[f"mesh/{name}"] for name in ("points", "cells", "region"))
-    prefix = "mesh/set/"
-    sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
-    names = json.loads(str(arrays["mesh/region_names"]))
-    if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
-        raise ValueError("points of the mesh")
-    if region.ndim != 1 or cells.shape != (len(region), CELLS[kind].nodes) or region.dtype.kind not in "iu":
-        raise ValueError("cells of the mesh")
-    if not isinstance(names, dict) or not all(type(number) is int for number in names.values()):
-        raise ValueError("names of regions")
-    for nodes in (cells, *sets.values()):
-        if nodes.dtype.kind not in "iu" or (nodes.size and not 0 <= nodes.min() <= nodes.max() < len(points)):
-            raise ValueError("nodes that do not exist")
-    return Mesh(points, cells, kind, region, names, sets)
 
 
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:

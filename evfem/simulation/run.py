@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from os import PathLike
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,8 @@ from evfem.common import notices
 from evfem.common.notices import LOG
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import NotConverged, StopRun
-from evfem.protocols import Observer
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
+from evfem.protocols import Observer, TimeSignal
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import (
     ledger_arrays,
@@ -42,6 +43,7 @@ from evfem.solver.control import (
 )
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
+from evfem.tissue.kernels.blocks import loops
 
 ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
 
@@ -60,10 +62,14 @@ class Request:
 
 
 def simulate(
-    scene: Scene, *, progress: bool = False, observers: Sequence[Observer] = (), resume: Saved | None = None
+    scene: Scene | str | PathLike[str],
+    *,
+    progress: bool = False,
+    observers: Sequence[Observer] = (),
+    resume: Saved | None = None,
 ) -> Result:
-    """Press, slide and attract as the scene says; returns the history, the fields of every n-th
-    step and how they came about.
+    """Press, slide and attract as the scene says (`Scene`, or the path of a scene file); returns the
+    history, the fields of every n-th step and how they came about.
 
     `observers` are objects with any of `started(mesh, scene, total_steps)`,
     `step(row, frame, checkpoint)` after every converged step (`frame` is None on steps without
@@ -75,6 +81,10 @@ def simulate(
     `NotConverged`, with the result so far, and leaves everything up to the last good step with the
     observers.
     """
+    if not isinstance(scene, Scene):
+        from evfem.scene.file import scene_at
+
+        scene = scene_at(scene)
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
@@ -118,16 +128,23 @@ class Run:
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
-        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0))
+        self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         if resume is not None:
             self._restore(resume)
 
-    def voltage_at(self, position: float) -> float:
-        """The scene's own voltage when the bone is at `position` (mm)."""
+    def voltage_at(self, position: float, time: float) -> float:
+        """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
         voltage = self.scene.voltage
         if isinstance(voltage, FollowForce):
             return 0.0
-        return float(voltage(position)) if isinstance(voltage, VoltageProfile) else float(voltage)
+        if isinstance(voltage, VoltageProfile):
+            return float(voltage(position))
+        return float(voltage(time)) if isinstance(voltage, TimeSignal) else float(voltage)
+
+    def _follows(self, seconds: float) -> bool:
+        """Whether a step of so many seconds follows the scene's voltage on the way."""
+        voltage = self.scene.voltage
+        return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     # -- from motions to targets
 
@@ -141,12 +158,14 @@ class Run:
                 continue
             start = self._start_of(first)
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
-                begin, end = (self._target(motion, start, j / motion.steps) for j in (k - 1, k))
-                if first + k == 1 and not isinstance(self.scene.voltage, VoltageProfile):
+                seconds, now = _duration(motion, start), self.time
+                begin = self._target(motion, start, (k - 1) / motion.steps, now)
+                end = self._target(motion, start, k / motion.steps, now + seconds)
+                if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
-                seconds = _duration(motion, start)
-                yield Request(first + k, index, motion.kind, self._path(begin, end, seconds), seconds)
+                path = self._path(begin, end, now, seconds)
+                yield Request(first + k, index, motion.kind, path, seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
         """Bone position, indentation, force and voltage at which a motion starts."""
@@ -155,13 +174,13 @@ class Run:
                 "position": 0.0,
                 "indentation": 0.0,
                 "applied_force": 0.0,
-                "voltage": self.voltage_at(0.0),
+                "voltage": self.voltage_at(0.0, 0.0),
             }
         row = self.rows[rows_before - 1]
         return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
 
-    def _target(self, motion: Motion, start: dict[str, float], fraction: float) -> Target:
-        """The target at `fraction` (0 to 1) of a motion."""
+    def _target(self, motion: Motion, start: dict[str, float], fraction: float, time: float) -> Target:
+        """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
 
         def towards(name: str, end: float) -> float:
             return end if fraction == 1.0 else start[name] + fraction * (end - start[name])
@@ -180,8 +199,10 @@ class Run:
         elif isinstance(motion, VoltageRamp):
             voltage = towards("voltage", motion.voltage)
             force = start["applied_force"] if motion.hold == "force" else None
-        if isinstance(self.scene.voltage, VoltageProfile):
-            voltage = self.voltage_at(position)
+        elif isinstance(motion, Wait):
+            force = start["applied_force"] if motion.hold == "force" else None
+        if isinstance(self.scene.voltage, (VoltageProfile, TimeSignal)):
+            voltage = self.voltage_at(position, time)
         bone = self.model.bone(position, indentation)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
         drive: VoltageControl = GivenVoltage(voltage)
@@ -193,9 +214,9 @@ class Run:
     def _following(wish: FollowForce, position: float) -> FollowFriction:
         return FollowFriction(float(wish(position)), wish.largest_voltage)
 
-    def _path(self, start: Target, end: Target, seconds: float) -> Path:
-        """Straight from one target to the next; a voltage profile or wished force is followed on
-        the way.
+    def _path(self, start: Target, end: Target, begin: float, seconds: float) -> Path:
+        """Straight from one target, at the time `begin`, to the next; a voltage profile, signal or
+        wished force is followed on the way.
         """
 
         def target(done: float, fraction: float) -> Target:
@@ -209,8 +230,8 @@ class Run:
             wanted = self.scene.voltage
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
-            if isinstance(wanted, VoltageProfile):
-                return GivenVoltage(self.voltage_at(x))
+            if self._follows(seconds):
+                return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
             first, last = start.drive.voltage, end.drive.voltage
             return GivenVoltage(first + fraction * (last - first))
 
@@ -234,7 +255,7 @@ class Run:
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
-        if request.step % self.scene.output.every and request.step != self.scene.total_steps:
+        if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
             return None
         self.frames.append(frame_of(self.model, self.state, row))
         return self.frames[-1]
@@ -256,6 +277,7 @@ class Run:
             "cuts": self.stepper.cuts,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
+            "cell_loops": "numpy" if loops() is None else "compiled",
         }
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
@@ -283,7 +305,9 @@ class Run:
 
 
 def _duration(motion: Motion, start: dict[str, float]) -> float:
-    """Seconds that one step of a motion takes: 0 without a speed."""
+    """Seconds that one step of a motion takes: 0 without a speed or duration."""
+    if isinstance(motion, Wait):
+        return motion.duration / motion.steps
     speed = getattr(motion, "speed", None)
     if speed is None:
         return 0.0

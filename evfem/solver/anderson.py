@@ -53,17 +53,18 @@ class Anderson:
 
 def _vector(state: State) -> Floats:
     squared = (state.voltage / KILOVOLT) ** 2
-    return np.concatenate([state.u.ravel(), state.contact_force.ravel(), state.bone, [squared]])
+    parts = (state.u, state.contact_force, state.bone, state.pressure)
+    return np.concatenate([*(part.ravel() for part in parts), [squared]])
 
 
 def _state(state: State, vector: Floats) -> State:
-    u, force, bone, squared = np.split(
-        vector, np.cumsum([state.u.size, state.contact_force.size, state.bone.size])
-    )
+    sizes = [state.u.size, state.contact_force.size, state.bone.size, state.pressure.size]
+    u, force, bone, pressure, squared = np.split(vector, np.cumsum(sizes))
     return replace(
         state,
         u=u.reshape(state.u.shape),
         contact_force=force.reshape(state.contact_force.shape),
         bone=bone,
+        pressure=pressure.reshape(state.pressure.shape),
         voltage=KILOVOLT * float(np.sqrt(max(squared[0], 0.0))),
     )

@@ -221,7 +221,7 @@ class Equilibrium(Statics):
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
             reached = target.reached(state.bone)
-            history.append(balance.residual if reached else max(balance.residual, 1.0))
+            history.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
             if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):

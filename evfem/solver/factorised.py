@@ -49,7 +49,8 @@ from evfem.solver.control import Drive, DrivenStep, Target
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
-from evfem.solver.state import Balance, Limits, Reusable, State, StepFailed
+from evfem.solver.pressure import Pressure
+from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
 from evfem.tissue.body import Body
 
 
@@ -75,6 +76,7 @@ class FactorisedBody:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
         self.linearisation = Linearisation(body, interface, attraction, limits)
+        self.pressure = Pressure(body.tissue, self.linearisation)
         self.record = self.linearisation.record
         self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self._anderson = Anderson()
@@ -89,7 +91,7 @@ class FactorisedBody:
     def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
         """Prepare everything for a step, and say where its iterations start."""
         self.linearisation.begin(old, frozen)
-        state = self._first_guess(start, target)
+        state = replace(self._first_guess(start, target), pressure=self.pressure.begin(start.u))
         travel = abs(target.bone(old.bone)[1] - old.bone[1])
         self.linearisation.choose_candidates(state, REACH * travel)
         self.linearisation.start_clock(old, target.duration)
@@ -130,6 +132,22 @@ class FactorisedBody:
         nodal = self.body.forces(state.u)
         nodal[self.pad.nodes] -= attraction + self.interface.contact_forces(state)
         forces = self.body.reduce(nodal)
+        state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
+        residual, mixed = self._largest(state, target, forces), self._mixed(state, target, forces)
+        return state, Balance(forces, residual, attraction, mixed)
+
+    def _mixed(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
+        """The balance with the pressure as an unknown, where it is one; `forces` (n,) without."""
+        if not self.pressure.active:
+            return None
+        misfit = self.pressure.misfit(state)
+        further = self.pressure.further_forces(state, misfit)
+        if further is not None:
+            forces = forces + self.body.reduce(further)
+        return MixedBalance(forces, self._largest(state, target, forces), misfit)
+
+    def _largest(self, state: State, target: Target, forces: Floats) -> float:
+        """The largest of the out-of-balance forces (n,), relative to the reaction in them."""
         reaction = forces[self.body.bone]
         rounding = self._rounding(state) / self.limits.tolerance
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
@@ -137,8 +155,7 @@ class FactorisedBody:
         sums = np.abs(forces[:-dim].reshape(-1, dim).sum(axis=0)).max()
         missing = (target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        state = replace(state, attraction=attraction, reaction=reaction)
-        return state, Balance(forces, float(free / largest), attraction)
+        return float(free / largest)
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding of displacements that contain the
@@ -177,7 +194,7 @@ class FactorisedBody:
         for.
         """
         factor = self.linearisation.factor
-        saved, residual = factor.forward(-balance.forces)
+        saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
         try:
             driven = self._driven(step, state, target)
@@ -191,7 +208,11 @@ class FactorisedBody:
             saved = saved + driven.change * driven.unit
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
         update = Update(found, bone, delta, driven.change, self._largest_fraction(state.u, delta))
-        return self._moved(state, target, update)
+        moved = self._moved(state, target, update)
+        if balance.mixed is None:
+            return moved
+        pressure = self.pressure.after(state, balance.mixed.misfit, delta, update.fraction)
+        return replace(moved, pressure=pressure)
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
@@ -320,7 +341,8 @@ class FactorisedBody:
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""
-        return replace(state, velocity=self.body.velocity(state.u), last_increment=state.u - old.u)
+        velocity, increment = self.body.velocity(state.u), state.u - old.u
+        return replace(state, velocity=velocity, last_increment=increment, pressure=NO_PRESSURE)
 
     def admit(self, state: State, gap: float) -> None:
         """A node that was no candidate has penetrated by `gap` (mm, negative): it becomes one."""
@@ -343,7 +365,8 @@ class FactorisedBody:
     def resume(self, state: State, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
         self.linearisation.candidates = carried.candidates
-        if carried.tangent_point is not None:
-            self.linearisation.restore(state, carried.tangent_point)
+        if (at := carried.tangent_point) is not None:
+            self.pressure.check(at.pressure)
+            self.linearisation.restore(state, at)
         if self.body.dynamics is not None:
             self.body.dynamics.step = carried.duration

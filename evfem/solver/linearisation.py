@@ -115,7 +115,8 @@ class Linearisation:
             kept = np.concatenate([unknowns, self.body.bone])
             self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
             self.record.backend = type(self.factor).__name__
-        upper = self.body.tangent(state.u)
+        pressure = state.pressure if state.pressure.size else None
+        upper = self.body.tangent(state.u, pressure)
         try:
             self.factor.factorise(upper)
         except Singular as error:
@@ -124,7 +125,8 @@ class Linearisation:
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         dynamics = self.body.dynamics
         begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        self._made_at = TangentPoint(state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds, state.pressure)
+        self._made_at = TangentPoint(*at)
         self.record.factorisations += 1
 
     def made_at(self, state: State) -> bool:
@@ -141,7 +143,7 @@ class Linearisation:
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage))
+        self.factorise(replace(state, u=at.u, voltage=at.voltage, pressure=at.pressure))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:

@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
 from evfem.solver.strategy import Strategy
+
+#: the pressure where it is no unknown of the iterations
+NO_PRESSURE: Floats = np.zeros((0, 0))
 
 
 class StepFailed(ArithmeticError):
@@ -27,7 +32,9 @@ class State:
     Displacements u (N, 2) in mm, contact forces on the pad nodes along the profile's normal and
     tangent (P, 2) in N/mm and their statuses (P,), the bone's translation (2,), the voltage in V,
     the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
-    mm/s, and the increment of the displacements in the step that led here (N, 2).
+    mm/s, and the increment of the displacements in the step that led here (N, 2). While an
+    equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
+    too (`evfem.solver.pressure`).
     """
 
     u: Floats
@@ -39,6 +46,7 @@ class State:
     reaction: Floats
     velocity: Floats
     last_increment: Floats
+    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
 
     @property
     def touching(self) -> Any:
@@ -49,8 +57,8 @@ class State:
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
     """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,),
-    whether the attraction was frozen, and the time step's displacements at its beginning (N, 2)
-    and its seconds.
+    whether the attraction was frozen, the time step's displacements at its beginning (N, 2) and
+    its seconds, and the pressure (E, Q) if that is an unknown.
     """
 
     u: Floats
@@ -59,6 +67,7 @@ class TangentPoint:
     frozen: bool
     begin: Floats
     duration: float
+    pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +102,34 @@ class Record:
 
 
 @dataclass(frozen=True)
+class MixedBalance:
+    """The same of displacements and pressure as two unknowns (`evfem.solver.pressure`): the forces
+    (n,) as the older tangent takes them, the largest of them, and how far the pressure of the laws
+    is from the iterate's (E, Q) in MPa.
+    """
+
+    forces: Floats
+    residual: float
+    misfit: Floats
+
+
+@dataclass(frozen=True)
 class Balance:
     """How far an iterate is from equilibrium: its out-of-balance forces (n,) of the reduced
     unknowns in N/mm, the largest of them relative to the reaction, and the attraction (P, 2) at
-    its positions.
+    its positions; and what the iterations have left to do where the pressure is an unknown.
     """
 
     forces: Floats
     residual: float
     attraction: Floats
+    mixed: MixedBalance | None = None
+
+    @property
+    def remaining(self) -> float:
+        """The residual of the unknowns that are iterated."""
+        return self.residual if self.mixed is None else self.mixed.residual
+
+    def seen(self, here: bool) -> Floats:
+        """The forces (n,) that a tangent has to remove which was made `here`, or elsewhere."""
+        return self.forces if here or self.mixed is None else self.mixed.forces

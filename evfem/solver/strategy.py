@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from evfem.common.checks import check_fields, number, whole
+from evfem.common.checks import Within, check_fields, number, whole
 
-_PATIENCE = number("a number of iterations, not negative", lambda n: n >= 0)
-_PART = number("a share of a step, above 0, at most 1", lambda s: 0.0 < s <= 1.0)
-_GROWTH = number("a factor from 1 to 10", lambda f: 1.0 <= f <= 10.0)
-_REACH = number("a factor from 0 to 10", lambda f: 0.0 <= f <= 10.0)
+_PATIENCE = number("a number of iterations, not negative", Within(0.0))
+_PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
+_GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
+_REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
 
 @dataclass(frozen=True)

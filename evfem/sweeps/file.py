@@ -21,9 +21,9 @@ import tomli_w
 from pydantic import Field as Key
 
 from evfem.common.checks import set_frozen
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted, unknown
 from evfem.scene.file import VERSION, dump, read_text, tables_of
-from evfem.scene.keys import SceneTable, Table, at, parse, shown, unknown
+from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
@@ -82,9 +82,9 @@ class Sweep:
         set_frozen(self, grid=grid, outputs=tuple(self.outputs), folder=Path(self.folder).resolve())
         motions = len(self.tables.get("motion", ()))
         for output in self.outputs:
-            _check_output(output, motions)
+            check_output(output, motions)
         for key in self.samples.parameters if self.samples else ():
-            _check_key(f"samples.parameters.{key}", key)
+            check_key(f"samples.parameters.{key}", key)
         count = prod(len(axis) for axis in self._axes) * (self.samples.count if self.samples else 1)
         if not self.grid and self.samples is None:
             raise InputError("sweep", "nothing that varies", "a grid or samples")
@@ -98,8 +98,7 @@ class Sweep:
     @property
     def tables(self) -> dict[str, Any]:
         """The base scene as the tables of a scene file."""
-        scene = self.scene
-        return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
+        return scene_tables(self.scene)
 
     @property
     def labels(self) -> list[str]:
@@ -136,8 +135,13 @@ class Sweep:
             parameters |= sample
             scene = deepcopy(tables)
             for key, value in parameters.items():
-                _put_in(scene, key, value)
+                put_in(scene, key, value)
             yield Point(index, labels, parameters, tomli_w.dumps(scene))
+
+
+def scene_tables(scene: Scene | Mapping[str, Any]) -> dict[str, Any]:
+    """A scene as the tables of a scene file, to be changed."""
+    return tomllib.loads(dump(scene)) if isinstance(scene, Scene) else deepcopy(dict(scene))
 
 
 def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
@@ -150,11 +154,11 @@ def _entry(name: str, entry: Any) -> list[Any] | dict[str, Row]:
 def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
     """One entry of the grid: (label, keys and values) of each of its rows."""
     if not isinstance(entry, (Mapping, Sequence)) or isinstance(entry, str) or not entry:
-        given = "nothing" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
+        given = "no values" if isinstance(entry, (Mapping, Sequence)) and not entry else shown(entry)
         raise InputError(f"grid.{name}", given, "a list of values, or a table of named rows {key = value}")
     if not isinstance(entry, Mapping):
-        _check_key(f"grid.{name}", name)
-        return [({}, {name: _plain(f"grid.{name}", value)}) for value in entry]
+        check_key(f"grid.{name}", name)
+        return [({}, {name: plain_value(f"grid.{name}", value)}) for value in entry]
     rows: list[tuple[dict[str, str], Row]] = []
     for label, row in entry.items():
         key = f"grid.{name}.{label}"
@@ -163,27 +167,28 @@ def _axis(name: str, entry: Any) -> list[tuple[dict[str, str], Row]]:
         if rows and list(row) != list(rows[0][1]):
             raise InputError(key, ", ".join(row), f"the keys of the first row: {', '.join(rows[0][1])}")
         for one in row:
-            _check_key(key, one)
-        rows.append(({name: str(label)}, {one: _plain(key, value) for one, value in row.items()}))
+            check_key(key, one)
+        rows.append(({name: str(label)}, {one: plain_value(key, value) for one, value in row.items()}))
     return rows
 
 
-def _check_key(place: str, key: str) -> None:
+def check_key(place: str, key: str) -> None:
+    """InputError unless `key` may be a dotted key of a scene file."""
     if key.split(".")[0] not in TABLES or "." not in key:
         raise InputError(place, shown(key), f"TABLE.KEY of a scene file, TABLE one of {', '.join(TABLES)}")
 
 
-def _plain(place: str, value: Any) -> Any:
+def plain_value(place: str, value: Any) -> Any:
     """The value in Python's own types, as a scene file can hold it."""
     value = value.tolist() if hasattr(value, "tolist") else value  # numpy
     if isinstance(value, (tuple, list)):
-        return [_plain(place, one) for one in value]
+        return [plain_value(place, one) for one in value]
     if not isinstance(value, (bool, int, float, str)):
-        raise InputError(place, value, "numbers, text, true or false, and lists of them")
+        raise InputError(place, quoted(value), "numbers, text, true or false, and lists of them")
     return value
 
 
-def _put_in(tables: dict[str, Any], key: str, value: Any) -> None:
+def put_in(tables: dict[str, Any], key: str, value: Any) -> None:
     """Replace one dotted key of the tables of a scene; tables that are not there are made."""
     *path, last = key.split(".")
     here: Any = tables
@@ -204,7 +209,10 @@ def _put_in(tables: dict[str, Any], key: str, value: Any) -> None:
             here = here.setdefault(place, {}) if isinstance(here, dict) else here[place]
 
 
-def _check_output(output: Any, motions: int) -> None:
+def check_output(output: Any, motions: int) -> None:
+    """InputError unless `output` is COLUMN.STATISTIC or COLUMN.STATISTIC.N of a scene with so many
+    motions.
+    """
     words = output.split(".") if isinstance(output, str) else []
     columns = [name for name in COLUMNS if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"
@@ -213,7 +221,7 @@ def _check_output(output: Any, motions: int) -> None:
     if words[0] not in columns:
         raise unknown(f"outputs: {output}", words[0], columns)
     if len(words) == 3 and not (words[2].isdecimal() and int(words[2]) < motions):
-        raise InputError("outputs", output, f"motions from 0 to {motions - 1}")
+        raise InputError("outputs", quoted(output), f"motions from 0 to {motions - 1}")
 
 
 class SweepTable(Table):

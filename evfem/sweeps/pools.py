@@ -22,7 +22,7 @@ from typing import Any, Protocol
 from threadpoolctl import threadpool_limits
 
 from evfem.common.checks import count
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 
 
 class Worker(Protocol):
@@ -56,7 +56,7 @@ def open_pool(workers: int | None, scheduler: str | None) -> Open:
     if scheduler is not None:
         if workers is not None and scheduler != "local":
             allowed = "no workers beside the address of a scheduler, which has its own"
-            raise InputError("workers", workers, allowed)
+            raise InputError("workers", quoted(workers), allowed)
         _need_dask(scheduler)
         return lambda: _dask(scheduler, workers)
     if workers == 1:
@@ -135,7 +135,7 @@ def _need_dask(scheduler: str) -> None:
         import distributed  # noqa: F401
     except ModuleNotFoundError as error:
         allowed = 'no scheduler without Dask: pip install "evfem[dask]"'
-        raise InputError("scheduler", scheduler, allowed) from error
+        raise InputError("scheduler", quoted(scheduler), allowed) from error
 
 
 @contextmanager
@@ -156,7 +156,7 @@ def _dask(scheduler: str, workers: int | None) -> Iterator[Pool]:
         client = Client(scheduler)
     except (OSError, ValueError) as error:
         allowed = "the address of a running Dask scheduler, like tcp://HOST:8786, or local"
-        raise InputError("scheduler", scheduler, allowed) from error
+        raise InputError("scheduler", quoted(scheduler), allowed) from error
     with client:
         yield _cluster(client)
 

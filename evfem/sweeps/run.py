@@ -22,9 +22,9 @@ from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
 from evfem.common.storage import alone_in
-from evfem.errors import InputError, NotConverged
+from evfem.errors import InputError, NotConverged, readable, unknown
 from evfem.scene.file import loads
-from evfem.simulation.result import origin
+from evfem.simulation.result import Result, origin
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder
@@ -48,7 +48,7 @@ class SweepResult:
     def __getitem__(self, column: str) -> Any:
         """A column (points,): numbers as an array, NaN where there is none, else a list."""
         if column not in self.columns:
-            raise InputError("column", column, ", ".join(self.columns))
+            raise unknown("column", str(column), self.columns, readable(column))
         values = [row[column] for row in self.rows]
         if all(value is None or type(value) in (int, float) for value in values):
             return np.array([math.nan if value is None else value for value in values])
@@ -221,13 +221,17 @@ class _Run:
 
 def evaluate(job: Job) -> Answer:
     """Run one point; whatever happens to it is in the answer."""
+    text, folder, names = job
+    return answered(text, folder, lambda result: {name: output(result, name) for name in names})
+
+
+def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | None]]) -> Answer:
+    """Run the scene in a text and `ask` its result; whatever happens is in the answer."""
     began = clock.perf_counter()
     outputs: dict[str, float | None] = {}
     status, message = "done", ""
     try:
-        text, folder, names = job
-        result = simulate(loads(text, folder))
-        outputs = {name: _output(result, name) for name in names}
+        outputs = ask(simulate(loads(text, folder)))
     except NotConverged as error:
         status, message = "not_converged", str(error)
     except InputError as error:
@@ -237,7 +241,10 @@ def evaluate(job: Job) -> Answer:
     return Answer(status, clock.perf_counter() - began, message, outputs)
 
 
-def _output(result: Any, name: str) -> float | None:
+def output(result: Result, name: str) -> float | None:
+    """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no
+    number.
+    """
     column, statistic, *motion = name.split(".")
     values = np.asarray(getattr(result, column), dtype=float)
     if motion:

@@ -16,7 +16,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice, count, real, set_frozen
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError, quoted
 
 METHODS = ("latin_hypercube", "random")
 MOST_SAMPLES = 100_000
@@ -58,7 +58,7 @@ class Normal:
     def __post_init__(self) -> None:
         set_frozen(self, mean=_number("normal", self.mean), sd=_number("normal", self.sd))
         if not self.sd > 0.0:
-            raise InputError("normal", self.sd, "a mean and a standard deviation larger than 0")
+            raise InputError("normal", quoted(self.sd), "a mean and a standard deviation larger than 0")
         if self.between is None:
             return
         low, high = (_number("between", value) for value in self.between)
@@ -105,12 +105,12 @@ class Samples:
         )
         choice("samples.method", self.method, METHODS)
         if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
-            raise InputError("samples.seed", self.seed, "a whole number, not negative")
+            raise InputError("samples.seed", quoted(self.seed), "a whole number, not negative")
         if not self.parameters:
-            raise InputError("samples.parameters", "nothing", "at least one parameter with a distribution")
+            raise InputError("samples.parameters", ABSENT, "at least one parameter with a distribution")
         for name, distribution in self.parameters.items():
             if not isinstance(distribution, Distribution):
-                raise InputError(f"samples.parameters.{name}", distribution, "Uniform or Normal")
+                raise InputError(f"samples.parameters.{name}", quoted(distribution), "Uniform or Normal")
 
     def draw(self) -> dict[str, Floats]:
         """The values of every parameter, (count,) each, in the order of `parameters`."""

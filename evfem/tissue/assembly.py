@@ -21,6 +21,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.tensor import Array, cofactor, complex_step, det, identity, trace, transpose
 from evfem.tissue.fields import Field, Integrand, Parts, fluxes, fluxes_at_once
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space, scatter
 
 
@@ -70,6 +71,13 @@ class VolumeMeasure:
         """d ln J by the nodal displacements, (C, S, n, dim)."""
         return self.gradient @ np.ascontiguousarray(self.slope(H).transpose(2, 3, 1, 0))
 
+    def pull(self, H: Floats, q: Floats) -> Floats:
+        """Nodal forces (C, n, dim) of q dtheta(v), with grad u (dim, dim, C, S) at the samples and
+        the weighted q (C, Q).
+        """
+        stress = (self.at_samples(q) * transpose(self.slope(H))).transpose(2, 3, 0, 1)
+        return np.swapaxes(self.to_gradient, 1, 2) @ stress.reshape(len(q), -1, len(H))
+
     def rows(self, push: Floats) -> Floats:
         """d theta by the nodal displacements, (C, Q, n dim)."""
         flat = push.reshape(*push.shape[:2], -1)
@@ -113,12 +121,12 @@ class Points:
 def points_of(space: Space, cells: Ints, small_strain: bool = False) -> Points:
     """The quadrature points of a space in some of its cells."""
     gradient = space.gradient[cells]
-    sample = gradient if space.sample is space.gradient else space.sample[cells]
+    sample = gradient if space.sampled is space.at else space.sample[cells]
     projection = None if space.projection is None else space.projection[cells]
     return Points(
         cells,
         space.nodes[cells],
-        space.value[cells],
+        np.broadcast_to(space.value, (len(cells), *space.value.shape)),
         gradient,
         space.weight[cells],
         space.points[:, cells],
@@ -168,13 +176,18 @@ class Integral:
         assert self.points.volume is not None, "no volume measure on facets"
         return self.points.volume
 
+    def _linear_parts(self, ue: Floats) -> Floats:
+        """Value and gradient (m dim, C, Q) of displacements (C, n, dim) of the cells' nodes."""
+        C, Q, m, n = self._rows.shape
+        values = (self._rows.reshape(C, Q * m, n) @ ue).reshape(C, Q, m, -1)
+        return values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
+
     def state(self, u: Floats) -> State:
         """What the form sees of the displacements u (N, dim)."""
         ue, parts = u[self.points.nodes], self.parts
-        C, Q, m, n = self._rows.shape
-        values = (self._rows.reshape(C, Q * m, n) @ ue).reshape(C, Q, m, parts.dim)
+        C, Q, m, _ = self._rows.shape
         x = np.empty((parts.size, C, Q))
-        x[: m * parts.dim] = values.transpose(2, 3, 0, 1).reshape(-1, C, Q)
+        x[: m * parts.dim] = self._linear_parts(ue)
         if not parts.theta:
             return State(x, np.empty((parts.dim, parts.dim, C, 0)))
         volume = self._volume
@@ -219,14 +232,15 @@ class Integral:
         flux = s[: m * self.parts.dim].reshape(m, -1, C, Q).transpose(2, 3, 0, 1)
         fe = np.swapaxes(self._rows.reshape(C, Q * m, n), 1, 2) @ flux.reshape(C, Q * m, -1)
         if self.parts.theta:
-            volume = self._volume
-            pull = volume.at_samples(s[-1]) * transpose(volume.slope(state.sampled))
-            pull = pull.transpose(2, 3, 0, 1).reshape(C, -1, self.parts.dim)
-            fe += np.swapaxes(volume.to_gradient, 1, 2) @ pull
+            fe += self._volume.pull(state.sampled, s[-1])
         return fe
 
-    def cell_tangents(self, u: Floats) -> Floats:
-        """Derivatives of the cells' forces, (C, n dim, n dim), unknowns ordered (node, component)."""
+    def cell_tangents(self, u: Floats, pressure: Floats | None = None) -> Floats:
+        """Derivatives of the cells' forces, (C, n dim, n dim), unknowns ordered (node, component).
+
+        With a `pressure` (C, Q) of the iterations (`evfem.solver.pressure`), the curvature of ln J
+        is weighted with it instead of the form's own flux of theta.
+        """
         state, dim = self.state(u), self.parts.dim
         C, _, m, n = self._rows.shape
         D = self.derivatives(state.x) * self.points.weight
@@ -236,8 +250,29 @@ class Integral:
             push = volume.push(state.sampled)
             K += self._theta_products(D, volume.rows(push)).reshape(K.shape)
             if not volume.small_strain:
-                K += volume.curvature(push, self.fluxes(state.x)[-1] * self.points.weight)
+                q = self.fluxes(state.x)[-1] if pressure is None else pressure
+                K += volume.curvature(push, q * self.points.weight)
         return K.reshape(C, n * dim, n * dim)
+
+    # -- the pressure: the flux of theta
+    # ------------------------------------------------------------------------------
+
+    def pressure(self, u: Floats) -> Floats:
+        """Flux q of theta at the points (C, Q)."""
+        return self.fluxes(self.state(u).x)[-1]
+
+    def pressure_change(self, u: Floats, du: Floats) -> Floats:
+        """Derivative of q at u along du (N, dim), (C, Q)."""
+        state, volume = self.state(u), self._volume
+        C = len(self.points.nodes)
+        D, along = self.derivatives(state.x)[-1], du[self.points.nodes]
+        theta = (volume.rows(volume.push(state.sampled)) @ along.reshape(C, -1, 1))[..., 0]
+        change: Floats = D[-1] * theta
+        return change + (D[:-1] * self._linear_parts(along)).sum(axis=0)
+
+    def cell_pressure_forces(self, u: Floats, q: Floats) -> Floats:
+        """What q (C, Q) alone does on the nodes of each cell: q dtheta(v) at u, (C, n, dim)."""
+        return self._volume.pull(self.state(u).sampled, q * self.points.weight)
 
     def _gradient_products(self, D: Floats) -> Floats:
         """B^T D B of value and gradient, D (m dim, m dim, C, Q), as (C, n, dim, n, dim)."""
@@ -271,12 +306,9 @@ class Integral:
         """Nodal forces (N, dim)."""
         return scatter(self.points.nodes, self.cell_forces(u), len(u))
 
-    def add_tangent(self, u: Floats, cells: Floats) -> None:
-        """Add the tangents to the cell matrices (E, n dim, n dim) of the whole mesh."""
-        if self.points.normal is None:
-            cells[self.points.cells] += self.cell_tangents(u)
-        else:  # a cell may have several facets
-            np.add.at(cells, self.points.cells, self.cell_tangents(u))
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangents to the `data` of a pattern."""
+        pattern.add(self.cell_tangents(u), self.points.cells, data)
 
 
 class UserIntegral(Integral):
@@ -284,7 +316,7 @@ class UserIntegral(Integral):
     are symmetric already if the form has a potential: the solver factorises a symmetric matrix.
     """
 
-    def cell_tangents(self, u: Floats) -> Floats:
+    def cell_tangents(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """(C, n dim, n dim), unknowns ordered (node, component)."""
-        exact = super().cell_tangents(u)
+        exact = super().cell_tangents(u, pressure)
         return 0.5 * (exact + np.swapaxes(exact, 1, 2))

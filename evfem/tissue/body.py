@@ -12,45 +12,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
 from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
-
-
-class Pattern:
-    """Where the entries of the cell matrices (E, d, d) go in the upper triangle of a symmetric CSR
-    matrix of size n.
-    """
-
-    def __init__(self, unknowns: Ints, size: int) -> None:
-        self.size = size
-        rows = np.broadcast_to(unknowns[:, :, None], (*unknowns.shape, unknowns.shape[1])).ravel()
-        columns = np.broadcast_to(unknowns[:, None, :], (*unknowns.shape, unknowns.shape[1])).ravel()
-        self.kept = np.flatnonzero(rows <= columns)
-        keys = rows[self.kept].astype(np.int64) * size + columns[self.kept]
-        diagonal = np.arange(size, dtype=np.int64) * (size + 1)
-        entries, position = np.unique(np.concatenate([keys, diagonal]), return_inverse=True)
-        self.position = position[: keys.size]
-        self.diagonal = position[keys.size :]
-        self.indices = (entries % size).astype(np.int32)
-        self.indptr = np.searchsorted(entries, np.arange(size + 1, dtype=np.int64) * size).astype(np.int32)
-
-    def upper(self, cells: Floats, diagonal: Floats | None = None) -> Floats:
-        """CSR data of the upper triangle from cell matrices, with an optional diagonal (n,) added."""
-        data: Floats = np.bincount(self.position, cells.ravel()[self.kept], self.indices.size).astype(
-            float, copy=False
-        )
-        if diagonal is not None:
-            data[self.diagonal] += diagonal
-        return data
-
-    def full(self, upper: Floats) -> Any:
-        """Both triangles as a scipy CSR matrix."""
-        half = sparse.csr_matrix((upper, self.indices, self.indptr), shape=(self.size, self.size))
-        return (half + half.T - sparse.diags(upper[self.diagonal])).tocsr()
 
 
 class Body:
@@ -75,7 +42,7 @@ class Body:
         self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)
         self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
         self.unknowns[bone] = self.bone
-        self.pattern = Pattern(self.unknowns[space.nodes].reshape(len(space.nodes), -1), self.size)
+        self.pattern = Pattern(self.unknowns[space.nodes, 0] // dim, dim)
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
@@ -100,14 +67,16 @@ class Body:
             total += term.forces(u)
         return total
 
-    def tangent(self, u: Floats) -> Floats:
+    def tangent(self, u: Floats, pressure: Floats | None = None) -> Floats:
         """Upper triangle of the reduced tangent, in the order of `pattern` (all of it: the
-        built-in terms are symmetric, a user's form gives its symmetric part).
+        built-in terms are symmetric, a user's form gives its symmetric part); `pressure` (E, Q)
+        takes the place of the tissue's own in its curvature.
         """
-        cells = self.tissue.tangent(u)
+        data = self.pattern.zeros()
+        self.tissue.add_tangent(u, self.pattern, data, pressure)
         for term in self.terms:
-            term.add_tangent(u, cells)
-        return self.pattern.upper(cells)
+            term.add_tangent(u, self.pattern, data)
+        return self.pattern.finish(data)
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""

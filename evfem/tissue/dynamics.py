@@ -26,9 +26,10 @@ from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
 from evfem.tissue.fields import Parts
 from evfem.tissue.forms import deformation_gradient, green_strain, kelvin_voigt, mass
+from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
+from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space
-from evfem.tissue.weakform import compiled_kernels
 
 
 class Dynamics:
@@ -42,9 +43,9 @@ class Dynamics:
         """
         self.space = space
         self.viscosity = viscosity
-        self.mass = None if density is None else mass_matrices(space) * density[:, None, None]
-        self._inertia = None if self.mass is None else assembled(space, self.mass)
-        self.kernels = compiled_kernels("viscous") if viscosity is not None else None
+        self.mass = None if density is None else Componentwise(mass_matrices(space) * density[:, None, None])
+        self._inertia = None if self.mass is None else assembled(space, self.mass.matrices)
+        self.loops = loops() if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
         self._strain0: Any = None
@@ -56,7 +57,7 @@ class Dynamics:
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
             self._strain0 = self._strain(u)
-            if self.kernels is None:
+            if self.loops is None:
                 self._damping.w.step, self._damping.w.strain0 = step, self._strain0
 
     @cached_property
@@ -81,25 +82,24 @@ class Dynamics:
         total = np.zeros_like(u)
         if self.step == 0.0:
             return total
-        if self.viscosity is not None and self.kernels is not None:
-            total += self.kernels.forces(u, *self._blocks())
+        if self.viscosity is not None and self.loops is not None:
+            self.loops.viscous(*self._request(u), total)
         elif self.viscosity is not None:
             total += self._damping.forces(u)
         if self._inertia is not None:
             total += self._inertia @ ((u - self._u0) / self.step**2 - self._v0 / self.step)
         return total
 
-    def add_tangent(self, u: Floats, cells: Floats) -> None:
-        """Add the terms' tangents to the cell matrices (E, 2 n, 2 n)."""
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the terms' tangents to the `data` of a pattern."""
         if self.step == 0.0:
             return
-        if self.viscosity is not None and self.kernels is not None:
-            self.kernels.add_tangent(u, *self._blocks(), cells)
+        if self.viscosity is not None and self.loops is not None:
+            self.loops.add_viscous(*self._request(u), pattern.blocks, data)
         elif self.viscosity is not None:
-            self._damping.add_tangent(u, cells)
+            self._damping.add_tangent(u, pattern, data)
         if self.mass is not None:
-            for i in range(self.space.dim):
-                cells[:, i :: self.space.dim, i :: self.space.dim] += self.mass / self.step**2
+            data += self.mass.data(pattern) / self.step**2
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, 2) in mm/s at the end of the step; zero when no time passes."""
@@ -109,12 +109,9 @@ class Dynamics:
         """What the viscous stress dissipates in the step, N mm per mm of depth."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
-        change = self._strain(u) - self._strain0
-        if self.kernels is not None:
-            rate, cells, _ = self._blocks()
-            squares = np.einsum("bqjl,bqjl,j->bql", change, change, np.array([1.0, 1.0, 2.0]))
-            return float(np.einsum("bl,bql,bql->", 2.0 * rate, squares, cells.weight))
-        damping = self._damping
+        if self.loops is not None:
+            return float(self.loops.viscous(*self._request(u), np.zeros_like(u)))
+        damping, change = self._damping, self._strain(u) - self._strain0
         power = 2.0 * damping.w.eta / self.step * ddot(change, change)[0]
         return float(np.sum(power * damping.points.weight))
 
@@ -128,18 +125,20 @@ class Dynamics:
         """Green strain of every damped point: (dim, dim, 1, C, Q) as the form takes it, or in
         blocks where the compiled loops read it.
         """
-        if self.kernels is not None:
-            return self.kernels.strains(u, self.space.cells)
+        if self.loops is not None:
+            blocks, points = self.space.cells.weight.shape[:2]
+            strain = np.empty((blocks, points, 3, LANES))
+            self.loops.strains(self.space.cells, np.ascontiguousarray(u), strain)
+            return strain
         return green_strain(deformation_gradient(self._damping.field(u)))[:, :, None]
 
-    def _blocks(self) -> tuple[Any, ...]:
-        """What the compiled loops read: viscosity over the step (B, L), cells, strains before the
-        step.
+    def _request(self, u: Floats) -> tuple[Any, ...]:
+        """What the compiled loops read: the cells, u, viscosity over the step (B, L), strains before
+        the step.
         """
-        from evfem.tissue.kernels.lanes import blocked
-
         assert self.viscosity is not None
-        return blocked(self.viscosity / self.step), self.space.cells, self._strain0
+        rate = padded(self.viscosity / self.step)
+        return self.space.cells, np.ascontiguousarray(u), rate, self._strain0
 
 
 def assembled(space: Space, matrices: Floats) -> Any:

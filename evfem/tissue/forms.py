@@ -6,7 +6,7 @@ tensor axes first, then those of the points. Its nodal forces and their tangent 
 `evfem.tissue.assembly`.
 
 `neo_hookean`, `hyperelastic`, `kelvin_voigt` and `mass` below are what runs where no compiled loop
-of evfem[fast] does; those loops are tested against them. The attraction's form stands beside its
+does; those loops are tested against them. The attraction's form stands beside its
 nodal rule, in `evfem.contact.attraction`.
 """
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.protocols import WeakForm
 from evfem.tensor import Array, ddot, dot, identity, mul, transpose
 
@@ -50,7 +50,9 @@ def form(function: WeakForm) -> Form:
     'nail_bed'
     """
     if not callable(function):
-        raise InputError("form", function, "a function (u, v, w) that returns the integrand of a residual")
+        raise InputError(
+            "form", quoted(function), "a function (u, v, w) that returns the integrand of a residual"
+        )
     return Form(function)
 
 

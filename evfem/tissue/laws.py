@@ -28,7 +28,7 @@ from typing import Any, Literal
 import numpy as np
 
 from evfem.common.checks import choice, real
-from evfem.errors import InputError
+from evfem.errors import ABSENT, InputError
 from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
 from evfem.tissue.moduli import Isotropic, bulk_modulus, check_rates, check_volumetric
 from evfem.tissue.ogden import Ogden
@@ -258,7 +258,9 @@ def from_table(table: Mapping[str, Any], key: str = "material") -> Any:
     NeoHookean(E=0.05, nu=0.48, viscosity=None, density=1e-09)
     """
     values = dict(table)
-    name = values.pop("law", "missing")
+    name = values.pop("law", None)
+    if name is None:
+        raise InputError(f"{key}.law", ABSENT, " | ".join(LAWS))
     choice(f"{key}.law", name, tuple(LAWS))
     parameters = [f for f in fields(LAWS[name]) if f.init]
     allowed = f"{name} has the parameters " + ", ".join(f.name for f in parameters)
@@ -267,7 +269,7 @@ def from_table(table: Mapping[str, Any], key: str = "material") -> Any:
             raise InputError(f"{key}.{given}", "an unknown key", allowed)
     for f in parameters:
         if f.name not in values and f.default is MISSING:
-            raise InputError(f"{key}.{f.name}", "nothing", "a value; " + allowed)
+            raise InputError(f"{key}.{f.name}", ABSENT, f"a value; {allowed}")
     try:
         return LAWS[name](**values)
     except InputError as error:

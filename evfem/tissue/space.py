@@ -27,12 +27,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
+from evfem.tensor import det
 from evfem.tissue.elements import ELEMENTS
+from evfem.tissue.kernels.blocks import Cells, blocked
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -69,25 +70,50 @@ def nodes_at(points: Floats, places: Floats) -> Ints:
     """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its
     unknowns.
 
-    Raises `RuntimeError` where none lies within 1e-9 of the mesh's size: then the two meshes
-    differ.
+    Equally many are paired in their order along an oblique line, which is theirs unless two lie
+    at one place of it; a search tree finds the others. Raises `RuntimeError` where no point lies
+    within 1e-9 of the mesh's size: then the two meshes differ.
     """
+    allowed = 1e-9 * float(np.ptp(points, axis=0).max())
+    if len(points) == len(places):
+        oblique = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
+        number = np.empty(len(points), dtype=np.int64)
+        number[np.argsort(places @ oblique)] = np.argsort(points @ oblique)
+        if np.abs(points[number] - places).max() <= allowed:
+            return number
+    from scipy.spatial import cKDTree
+
     distance, number = cKDTree(points).query(places)
-    farthest, allowed = float(np.max(distance)), 1e-9 * float(np.ptp(points, axis=0).max())
+    farthest = float(np.max(distance))
     if not farthest <= allowed:
         raise RuntimeError(f"a node of scikit-fem's mesh is {farthest:g} mm away from the nearest of ours")
     return number
 
 
 @dataclass(frozen=True, eq=False)
+class Gradients:
+    """Shape gradients at some points of every cell: in the reference cell, `reference` (Q, n, dim),
+    and `inverse` (E, Q, dim, dim) = d xi / dX of the map to the mesh.
+    """
+
+    reference: Floats
+    inverse: Floats
+
+    @property
+    def of_mesh(self) -> Floats:
+        """Gradients with respect to the reference configuration (E, Q, n, dim)."""
+        return np.matmul(self.reference, self.inverse)
+
+
+@dataclass(frozen=True, eq=False)
 class Space:
     """Displacement space on a mesh: nodes of every cell, shape functions and their gradients,
-    weights and ln J samples.
+    weights, and the element's measure of volume.
 
-    `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (E, Q, n); `gradient` (E,
-    Q, n, dim) with respect to the reference; `weight` (E, Q); `sample` (E, S, n, dim) gradients
-    where ln J is sampled, the same array as `gradient` where those are the quadrature points;
-    `projection` (E, Q, S), or None where theta is simply ln J of the quadrature point.
+    `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (Q, n); `weight` (E, Q);
+    `at` the gradients there; `sampled` those where ln J is, the same object if it is there.
+    Without `modes` theta is simply ln J of the quadrature point; else theta = `modes` `psi` ln J
+    with M functions `modes` (E, Q, M), orthonormal in each cell, and `psi` (E, M, S).
     """
 
     mesh: Mesh
@@ -95,10 +121,11 @@ class Space:
     nodes: Ints
     points: Floats
     value: Floats
-    gradient: Floats
     weight: Floats
-    sample: Floats
-    projection: Floats | None
+    at: Gradients
+    sampled: Gradients
+    modes: Floats | None = None
+    psi: Floats | None = None
 
     @property
     def size(self) -> int:
@@ -110,16 +137,54 @@ class Space:
         """Number of space dimensions."""
         return self.mesh.points.shape[1]
 
-    @cached_property
-    def cells(self) -> Any:
-        """The same arrays in blocks, for the compiled loops."""
-        from evfem.tissue.kernels.lanes import Cells, blocked
+    @property
+    def samples(self) -> int:
+        """Number of points in a cell where ln J is sampled."""
+        return len(self.sampled.reference)
 
-        pointwise = np.zeros((len(self.nodes), 0, 0))
-        sample = self.gradient[:, :0] if self.sample is self.gradient else self.sample
-        projection = pointwise if self.projection is None else self.projection
-        arrays = (self.nodes, self.gradient, self.weight, sample, projection)
-        return Cells(*(blocked(array) for array in arrays))
+    @property
+    def gradient(self) -> Floats:
+        """Shape gradients at the quadrature points (E, Q, n, dim)."""
+        return self.at.of_mesh
+
+    @property
+    def sample(self) -> Floats:
+        """Shape gradients where ln J is sampled (E, S, n, dim)."""
+        return self.sampled.of_mesh
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The same in blocks, for the compiled loops."""
+        return cells_of(self)
+
+    @cached_property
+    def projection(self) -> Floats | None:
+        """Pi (E, Q, S), or None where theta is ln J of the quadrature point."""
+        return None if self.modes is None or self.psi is None else self.modes @ self.psi
+
+
+def cells_of(space: Space) -> Cells:
+    """A space in blocks; what the loops read lies together."""
+    pointwise = space.modes is None or space.psi is None
+    E, n = space.nodes.shape
+    sampled = space.sampled
+    reference = sampled.reference[:0] if pointwise else sampled.reference
+    inverse = sampled.inverse[:, :0] if pointwise else sampled.inverse
+    psi = np.zeros((E, 0, 0)) if space.psi is None else space.psi
+    mean = np.zeros((E, 0)) if space.modes is None else np.einsum("eq,eqm->em", space.weight, space.modes)
+    nodes = blocked(space.nodes.astype(np.int32))
+    Q, S, M = space.weight.shape[1], len(reference), mean.shape[1]
+    return Cells(
+        (space.size, len(nodes), n, Q, S, M),
+        nodes,
+        blocked(space.weight),
+        space.at.reference,
+        blocked(space.at.inverse.reshape(E, Q, 4)),
+        np.ascontiguousarray(reference),
+        blocked(inverse.reshape(E, S, 4)),
+        blocked(psi),
+        blocked(mean),
+    )
 
 
 def make_space(mesh: Mesh, element: str) -> Space:
@@ -131,32 +196,35 @@ def make_space(mesh: Mesh, element: str) -> Space:
         raise InputError("solver.element", element, f"cells of kind {kind}, the mesh has {mesh.kind}")
     shape = shape_functions(kind)
     grid = scikit_mesh(mesh)
-    basis = skfem.Basis(grid, shape, intorder=intorder)
-    nodes = nodes_at(mesh.points, basis.doflocs.T)[basis.element_dofs].T
-    gradient = shape_gradients(basis)
-    check_orientation(mesh, basis)
-    projection = None
-    sample = gradient
+    X, W = skfem.quadrature.get_quadrature(shape.refdom, intorder)
+    mapping = grid.mapping()
+    determinant = det(np.asarray(mapping.DF(X)))
+    check_orientation(mesh, determinant)
+    weight = np.abs(determinant) * W
+    points = np.ascontiguousarray(mapping.F(X))
+    at = sampled = _gradients(shape, mapping, X)
+    modes = psi = None
     if sampling == "centroid":
-        centre = skfem.Basis(grid, shape, quadrature=(np.array([[0.5], [0.5]]), np.array([1.0])))
-        sample = shape_gradients(centre)
-        projection = np.ones((len(nodes), gradient.shape[1], 1))
+        sampled = _gradients(shape, mapping, np.array([[0.5], [0.5]]))
+        modes, psi = _constant(weight)
     elif sampling == "linear":
-        projection = _linear_projection(np.asarray(basis.global_coordinates()), basis.dx)
+        modes = _linear(points, weight)
+        psi = np.swapaxes(modes * weight[..., None], 1, 2)
     elif sampling != "point":
         raise ValueError(f"no such sampling of the volume: {sampling}")
-    points, weight = np.asarray(basis.global_coordinates()), np.ascontiguousarray(basis.dx)
-    return Space(
-        mesh,
-        element,
-        np.ascontiguousarray(nodes),
-        points,
-        shape_values(basis),
-        gradient,
-        weight,
-        sample,
-        projection,
-    )
+    # one point is enough for the numbers of the unknowns
+    dofs = skfem.Basis(grid, shape, mapping=mapping, quadrature=(X[:, :1], W[:1]))
+    nodes = np.ascontiguousarray(nodes_at(mesh.points, dofs.doflocs.T)[dofs.element_dofs].T)
+    value = np.stack([shape.lbasis(X, i)[0] for i in range(nodes.shape[1])], axis=1)
+    return Space(mesh, element, nodes, points, value, weight, at, sampled, modes, psi)
+
+
+def _gradients(shape: Any, mapping: Any, X: Floats) -> Gradients:
+    """Gradients of scikit-fem's shape functions at the points X (dim, Q) of the reference cell."""
+    count = shape.doflocs.shape[0]
+    reference = np.stack([np.broadcast_to(shape.lbasis(X, i)[1], X.shape).T for i in range(count)], axis=1)
+    inverse = mapping.invDF(X).transpose(2, 3, 0, 1)
+    return Gradients(np.ascontiguousarray(reference), np.ascontiguousarray(inverse))
 
 
 def shape_functions(kind: str) -> Any:
@@ -184,11 +252,11 @@ def shape_gradients(basis: Any) -> Floats:
     return np.ascontiguousarray(np.stack([np.broadcast_to(f, shape) for f in fields]).transpose(2, 3, 0, 1))
 
 
-def check_orientation(mesh: Mesh, basis: Any) -> None:
-    """Refuse inverted cells: scikit-fem takes the absolute determinant, so they would pass
-    silently.
+def check_orientation(mesh: Mesh, determinant: Floats) -> None:
+    """Refuse inverted cells by the sign of det dX/dxi (E, Q): scikit-fem takes its absolute value,
+    so they would pass silently.
     """
-    sign = np.sign(np.linalg.det(np.moveaxis(np.asarray(basis.mapping.DF(basis.X)), (0, 1), (2, 3))))
+    sign = np.sign(determinant)
     bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
     if bad.size:
         centre = mesh.points[mesh.cells[bad[0]]].mean(axis=0)
@@ -199,13 +267,17 @@ def check_orientation(mesh: Mesh, basis: Any) -> None:
         )
 
 
-def _linear_projection(x: Floats, weight: Floats) -> Floats:
-    """Per cell the (Q, Q) matrix that takes point values to their L2 projection onto {1, X, Y[,
-    Z]}, at the same points x (dim, E, Q).
-    """
+def _constant(weight: Floats) -> tuple[Floats, Floats]:
+    """The constant as the only mode (E, Q, 1) and its psi (E, 1, 1), for one sample in each cell."""
+    root = np.sqrt(weight.sum(axis=1))[:, None, None]
+    return np.broadcast_to(1.0 / root, (*weight.shape, 1)), root
+
+
+def _linear(x: Floats, weight: Floats) -> Floats:
+    """{1, X, Y[, Z]} at the points x (dim, E, Q), made orthonormal in each cell, (E, Q, dim + 1)."""
     centred = x - x.mean(axis=2, keepdims=True)
     centred = centred / np.abs(centred).max(axis=(0, 2), keepdims=True)
     phi = np.stack([np.ones_like(weight), *centred], axis=-1)
-    weighted = phi * weight[..., None]
-    mass = np.swapaxes(phi, 1, 2) @ weighted
-    return np.ascontiguousarray(phi @ np.linalg.solve(mass, np.swapaxes(weighted, 1, 2)))
+    mass = np.swapaxes(phi, 1, 2) @ (phi * weight[..., None])
+    lower = np.linalg.cholesky(mass)
+    return np.ascontiguousarray(np.swapaxes(np.linalg.solve(lower, np.swapaxes(phi, 1, 2)), 1, 2))

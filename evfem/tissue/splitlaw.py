@@ -18,7 +18,7 @@ from typing import Any, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.tensor import (
     Array,
     cofactor,
@@ -174,7 +174,7 @@ def split(law: Any) -> SplitLaw:
         return cast(SplitLaw, FormLaw(law))
     if not (hasattr(law, "P") or hasattr(law, "psi")):
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
-        raise InputError("material", law, allowed)
+        raise InputError("material", quoted(law), allowed)
     return cast(SplitLaw, UserLaw(law))
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import Array, complex_step
 from evfem.tissue.assembly import Points, UserIntegral, points_of
@@ -94,7 +94,9 @@ def _watched(field: Field, boundary: bool, used: set[str]) -> _Watched:
 def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
     """Centres (dim, C, 1) of a few cells of a region."""
     if name not in mesh.region_names:
-        raise InputError("region", name, f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}")
+        raise InputError(
+            "region", quoted(name), f"one of the mesh's regions: {', '.join(sorted(mesh.region_names))}"
+        )
     centres = mesh.points[_few(mesh.cells[mesh.cells_of(name)])].mean(axis=1)
     return centres.T[..., None], None
 
@@ -122,10 +124,10 @@ def named_edges(mesh: Mesh, name: str) -> Ints:
     """
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
-        raise InputError("boundary", name, allowed)
+        raise InputError("boundary", quoted(name), allowed)
     edges = mesh.edges_of(name)
     if not len(edges):
-        raise InputError("boundary", name, "a boundary with at least one outer edge")
+        raise InputError("boundary", quoted(name), "a boundary with at least one outer edge")
     return edges
 
 

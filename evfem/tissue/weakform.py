@@ -14,19 +14,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from importlib import import_module
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.common.constants import INCOMPRESSIBLE
+from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, points_of
 from evfem.tissue.fields import Field, Parts
 from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
+from evfem.tissue.kernels.blocks import LANES, loops, padded, unblocked
+from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
 
 #: what the tissue's forms use: F, S by the gradient, and the volume measure
@@ -36,8 +38,8 @@ PARTS = Parts(2, grad=True, theta=True)
 class Tissue:
     """Internal forces, tangent and stored energy of the regions' laws on a space.
 
-    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses
-    compiled kernels when numba is there.
+    `laws` maps region names to laws (`evfem.tissue.laws`); built-in neo-Hookean tissue uses the
+    compiled loops where they were built.
     """
 
     def __init__(self, space: Space, laws: Mapping[str, Any]) -> None:
@@ -48,42 +50,83 @@ class Tissue:
             (split(law), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.kernels = compiled_kernels("elastic") if self.mu is not None else None
+        self.loops = loops() if self.mu is not None else None
 
     @cached_property
     def regions(self) -> list[tuple[Any, Integral]]:
         """Law and form of each group."""
         return [make_region(self.space, law, cells) for law, cells in self.groups]
 
+    @cached_property
+    def nearly_incompressible(self) -> bool:
+        """Whether a region resists a change of volume so much more than shear that its pressure is
+        worth an unknown of its own.
+        """
+        return any(volume_stiffness(law) > INCOMPRESSIBLE for law, _ in self.groups)
+
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
-        if self.kernels is not None:
-            return self.kernels.smallest_J(u, self.space.cells)
+        if self.loops is not None:
+            return float(self.loops.smallest_J(self.space.cells, np.ascontiguousarray(u)))
         return min(integral.smallest_J(u) for _, integral in self.regions)
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
-        if self.kernels is not None:
-            return self.kernels.forces(u, *self._blocks)
+        if self.loops is not None:
+            return self._looped(self.loops, u)[0]
         fe = np.empty((*self.space.nodes.shape, self.space.dim))
         for _, integral in self.regions:
             fe[integral.points.cells] = integral.cell_forces(u)
         return scatter(self.space.nodes, fe, self.space.size)
 
-    def tangent(self, u: Floats) -> Floats:
-        """Tangents of all cells, (E, 2 n, 2 n), unknowns ordered (node, component)."""
-        if self.kernels is not None:
-            return self.kernels.tangent(u, *self._blocks, len(self.space.nodes))
-        E, n = self.space.nodes.shape
-        K = np.empty((E, self.space.dim * n, self.space.dim * n))
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats, pressure: Floats | None = None) -> None:
+        """Add the tangents of all cells to the `data` of a pattern; with the curvature of ln J
+        weighted by a `pressure` (E, Q) of the iterations if one is given.
+        """
+        if self.loops is not None:
+            pull = None if pressure is None else self._pull(pressure)
+            data += self._shear.data(pattern)
+            self.loops.add_tangent(*self._request(u), pull, pattern.blocks, data)
+            return
         for _, integral in self.regions:
-            K[integral.points.cells] = integral.cell_tangents(u)
-        return K
+            cells = integral.points.cells
+            tangents = integral.cell_tangents(u, None if pressure is None else pressure[cells])
+            pattern.add(tangents, cells, data)
+
+    def pressure(self, u: Floats) -> Floats:
+        """q = dW/dtheta (E, Q) in MPa of the regions' laws, positive in tension."""
+        if self.loops is not None:
+            return self.lmbda[:, None] * self._theta(self.loops, u, None) - self.mu[:, None]
+        q = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            q[integral.points.cells] = integral.pressure(u)
+        return q
+
+    def pressure_change(self, u: Floats, du: Floats) -> Floats:
+        """Derivative (E, Q) of `pressure` at u along du (N, 2)."""
+        if self.loops is not None:
+            return self.lmbda[:, None] * self._theta(self.loops, u, np.ascontiguousarray(du))
+        change = np.empty(self.space.weight.shape)
+        for _, integral in self.regions:
+            change[integral.points.cells] = integral.pressure_change(u, du)
+        return change
+
+    def pressure_forces(self, u: Floats, q: Floats) -> Floats:
+        """Nodal forces (N, 2) of q (E, Q) alone: the integral of q dtheta(v) at u."""
+        if self.loops is not None:
+            out = np.zeros_like(u)
+            self.loops.volume_forces(self.space.cells, np.ascontiguousarray(u), self._pull(q), out)
+            return out
+        fe = np.empty((*self.space.nodes.shape, self.space.dim))
+        for _, integral in self.regions:
+            cells = integral.points.cells
+            fe[cells] = integral.cell_pressure_forces(u, q[cells])
+        return scatter(self.space.nodes, fe, self.space.size)
 
     def energy(self, u: Floats) -> float:
         """Stored energy in N mm per mm of depth."""
-        if self.kernels is not None:
-            return self.kernels.energy(u, *self._blocks)
+        if self.loops is not None:
+            return self._looped(self.loops, u)[1]
         total = 0.0
         for law, integral in self.regions:
             field = integral.field(u)
@@ -105,12 +148,39 @@ class Tissue:
             J[cells] = np.einsum("dq,dq->d", det(deformation_gradient(field)), mean)
         return sigma, J
 
-    @cached_property
-    def _blocks(self) -> tuple[Any, ...]:
-        """What the compiled loops read: Lame moduli (B, L) and the space's cells."""
-        from evfem.tissue.kernels.lanes import blocked
+    def _request(self, u: Floats) -> tuple[Any, ...]:
+        """What the compiled loops read: the cells, u and the Lame moduli (B, L)."""
+        return self.space.cells, np.ascontiguousarray(u), *self._moduli
 
-        return blocked(self.mu), blocked(self.lmbda), self.space.cells
+    @cached_property
+    def _moduli(self) -> tuple[Floats, Floats]:
+        return padded(self.mu), padded(self.lmbda)
+
+    def _looped(self, loops: Any, u: Floats) -> tuple[Floats, float]:
+        """Nodal forces (N, 2) and stored energy by the compiled loops."""
+        out = np.zeros_like(u)
+        energy, _ = loops.forces(*self._request(u), out)
+        return out, energy
+
+    def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
+        """theta (E, Q) at u by the compiled loops, or its change along du (N, 2)."""
+        cells, projection = self.space.cells, self.space.projection
+        sampled = np.empty((len(cells.nodes), self.space.samples, LANES))
+        loops.log_volumes(cells, np.ascontiguousarray(u), du, sampled)
+        values = unblocked(sampled, len(self.space.nodes))
+        return values if projection is None else (projection @ values[..., None])[..., 0]
+
+    def _pull(self, q: Floats) -> Floats:
+        """What a pressure q (E, Q) is at the samples of ln J, in blocks (B, S, L)."""
+        weighted, projection = q * self.space.weight, self.space.projection
+        return padded(weighted if projection is None else (weighted[:, None] @ projection)[:, 0])
+
+    @cached_property
+    def _shear(self) -> Componentwise:
+        """mu grad v : grad w, the share of the neo-Hookean tangent that does not change."""
+        weighted = (self.space.weight * self.mu[:, None])[..., None, None] * self.space.gradient
+        rows = np.swapaxes(self.space.gradient, 2, 3).reshape(len(weighted), -1, weighted.shape[2])
+        return Componentwise(np.matmul(np.swapaxes(weighted, 2, 3).reshape(rows.shape).swapaxes(1, 2), rows))
 
 
 def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
@@ -127,6 +197,16 @@ def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
         return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
     w = SimpleNamespace(law=law)
     return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
+
+
+def volume_stiffness(law: Any) -> float:
+    """How much stiffer a law is at rest against theta than in shear, d2W/dtheta2 / mu: 2 nu / (1 -
+    2 nu) for a neo-Hookean law. Zero for laws of small strain, whose theta is linear in u.
+    """
+    if law.volume_measure == "trace":
+        return 0.0
+    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
+    return float(np.mean(k)) / law.shear_modulus
 
 
 def law_moduli(u: Field, w: Any) -> Floats:
@@ -166,14 +246,6 @@ def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any
     return mu, lmbda
 
 
-def compiled_kernels(name: str) -> Any:
-    """A module of compiled loops of evfem[fast], or None where numba is not installed."""
-    try:
-        return import_module(f"evfem.tissue.kernels.{name}")
-    except ImportError:
-        return None
-
-
 def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
     """Every region needs a law and every law a region, or an `InputError` names the missing one."""
     names: Sequence[str] = sorted(mesh.region_names)
@@ -185,5 +257,5 @@ def check_laws(mesh: Mesh, laws: Mapping[str, Any]) -> None:
     for name in laws:
         if name not in mesh.region_names:
             raise InputError(
-                f"finger.materials.{name}", name, f"one of the mesh's regions: {', '.join(names)}"
+                f"finger.materials.{name}", quoted(name), f"one of the mesh's regions: {', '.join(names)}"
             )

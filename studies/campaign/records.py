@@ -22,7 +22,7 @@ from evfem.common.tables import csv_text
 
 from ..common import make_folder
 from .ending import Ending
-from .tables import Tables, text_of
+from .tables import Tables, put_mesh, text_of
 
 TABLE, FAILURES, MINIMAL = "ends.csv", "failures", "minimal"
 COLUMNS = ("seed", "scene", *(spec.name for spec in fields(Ending)), "digest")
@@ -76,12 +76,14 @@ class Records:
             for name in (FAILURES, MINIMAL):
                 self._file(name, key).unlink(missing_ok=True)
             if not ending.good:
+                put_mesh(tables, self.folder / FAILURES)
                 write_text(self._file(FAILURES, key), _told(key, ending, tables))
             write_text(self.folder / TABLE, self._text())
 
     def add_minimal(self, key: Key, tables: Tables, ending: Ending) -> None:
         """Keep what is left of a failed scene, with its own end."""
         if self.folder is not None:
+            put_mesh(tables, self.folder / MINIMAL)
             write_text(self._file(MINIMAL, key), _told(key, ending, tables))
 
     def shrinks(self, key: Key) -> bool:

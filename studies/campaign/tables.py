@@ -4,21 +4,26 @@ image.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
 import tomli_w
+from evfem.meshes import FOLDER
 
-from evfem.common.storage import write_text
+from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_text
+from evfem.contact.textures import SelfAffine
 from evfem.scene.file import loads
 from evfem.scene.scene import Scene
 
 Tables = dict[str, Any]
+#: keys of a surface of the kind self_affine alone
+ROUGH = ("hurst", "rms", "period", "shortest", "longest", "seed")
 #: steps of a motion that does not say how many
-USUAL_STEPS = {"press": 10, "slide": 100, "hover": 1, "voltage": 10}
+USUAL_STEPS = {"press": 10, "slide": 100, "hover": 1, "voltage": 10, "wait": 100}
 
 
 def copied(tables: Tables) -> Tables:
@@ -33,14 +38,15 @@ def text_of(tables: Tables) -> str:
 
 def scene_of(tables: Tables, name: str = "scene") -> Scene:
     """The scene; raises InputError if it is none."""
-    return loads(text_of(tables), name=name)
+    return loads(text_of(tables), FOLDER, name=name)
 
 
 def with_files(tables: Tables, folder: Path) -> Tables:
-    """The same scene with its profile and its voltage in csv files in `folder`, as users have
-    them.
+    """The same scene with its profile and its voltage in csv files and its mesh in `folder`, as
+    users have them.
     """
     tables = copied(tables)
+    put_mesh(tables, folder)
     surface, electrostatics = tables["surface"], tables.get("electrostatics", {})
     if "points" in surface:
         write_text(folder / "profile.csv", csv_text([["x", "height"], *surface.pop("points")]))
@@ -52,6 +58,13 @@ def with_files(tables: Tables, folder: Path) -> Tables:
     return tables
 
 
+def put_mesh(tables: Tables, folder: Path) -> None:
+    """Put the ready-made mesh of a scene, if it has one, into the folder of its file."""
+    if "mesh" in tables["finger"]:
+        with disk(f"write {folder}"):
+            shutil.copy(FOLDER / tables["finger"]["mesh"], folder)
+
+
 def mirrored(tables: Tables) -> Tables:
     """The scene seen in a mirror: x becomes -x in finger, surface, friction, voltage and motion."""
     tables = copied(tables)
@@ -60,6 +73,10 @@ def mirrored(tables: Tables) -> Tables:
         finger["ridge_phase"] = -finger["ridge_phase"]
     for rows in _along(tables):
         rows[:] = [[-x, value] for x, value in reversed(rows)]
+    if surface["kind"] == "self_affine":
+        _as_waves(surface)
+    if "phase" in surface:
+        surface["phase"] = -surface["phase"]
     if surface["kind"] == "sinusoid" and "terms" in surface:
         surface["terms"] = [[a, -k, phase] for a, k, phase in surface["terms"]]
     elif surface["kind"] == "sinusoid":
@@ -69,6 +86,12 @@ def mirrored(tables: Tables) -> Tables:
         if motion["kind"] == "slide":
             motion["distance"] = -motion["distance"]
     return tables
+
+
+def _as_waves(surface: Tables) -> None:
+    """Roughness as the waves that it is made of: no seed gives its mirror image."""
+    own = {name: surface.pop(name) for name in ROUGH if name in surface}
+    surface |= {"kind": "sinusoid", "terms": [list(row) for row in SelfAffine(**own).terms]}
 
 
 def _along(tables: Tables) -> Iterator[list[list[float]]]:

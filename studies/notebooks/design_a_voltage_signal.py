@@ -35,7 +35,7 @@ from evfem.simulation.rendering import apparent_friction, compare, exact, record
 # %%
 finger = ev.FingerPad(resolution="coarse", ridges=False)
 real_surface = ev.Flat(friction=[[0.0, 0.5], [1.0, 0.5], [1.0, 0.6]])
-motion = [ev.Press(force=0.05, steps=2), ev.Slide(distance=4.0, steps=16)]
+motion = [ev.Press(force=0.05, steps=2), ev.Slide(distance=4.0, steps=16, hold="force")]
 real = record(ev.Scene(finger, real_surface, motion=motion))
 real.result
 

@@ -41,7 +41,7 @@ def slide(load=0.05, voltage=1000.0, friction=0.3, distance=1.0):
         ev.Display(friction=friction),
         law=ev.Kaczmarek(),
         voltage=voltage,
-        motion=[ev.Press(force=load, steps=3), ev.Slide(distance=distance, steps=6)],
+        motion=[ev.Press(force=load, steps=3), ev.Slide(distance=distance, steps=6, hold="force")],
         output=ev.Output(every=9),  # the fields of the last step only
     )
     return ev.simulate(scene)

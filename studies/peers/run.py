@@ -32,15 +32,8 @@ from .problem import (
     scene_mesh,
 )
 
-#: what evfem would import while it runs, and what more with its extra `fast`
+#: what evfem would import while it runs
 LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "scipy.sparse.linalg")
-FAST = (
-    "evfem.tissue.kernels.elastic",
-    "numba.np.arraymath",
-    "numba.np.linalg",
-    "numba.np.npyimpl",
-    "numba.np.random.generator_methods",
-)
 
 
 def evfem_scene(scene: str, element: str, level: int) -> Scene:
@@ -59,7 +52,7 @@ def evfem_scene(scene: str, element: str, level: int) -> Scene:
 
 
 def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
-    for name in LATE + (FAST if find_spec("numba") and find_spec("pypardiso") else ()):
+    for name in LATE:
         import_module(name)
     from evfem.simulation.run import simulate
     from evfem.solver.condensation import pardiso_library

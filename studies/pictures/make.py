@@ -1,12 +1,13 @@
 """The pictures of README and pages: `python studies/pictures/make.py [PICTURE...]` draws them
 again.
 
-Those of the gallery come from their studies, `evfem study NAME --out docs/pictures`.
+Those of the studies come from `evfem study NAME --out docs/pictures`.
 """
 
 import re
 import shutil
 import sys
+from collections.abc import Iterable
 from contextlib import chdir
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,10 +21,22 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 #: "paraview.png" needs evfem[vtk]
 OF_PAGES = {
     "howto-layers.png": ("howto/finger.md", "layers.png"),
+    "howto-residuals.png": ("howto/fit.md", "residuals.png"),
     "tutorial-forces.png": ("tutorial.md", "forces.png"),
     "tutorial-deformed.png": ("tutorial.md", "deformed.png"),
     "paraview.png": ("howto/paraview.md", "pad.png"),
+    "pictures-contact.png": ("howto/pictures.md", "contact.png"),
+    "pictures-stress.png": ("howto/pictures.md", "stress.png"),
+    "pictures-beside.png": ("howto/pictures.md", "beside.png"),
+    "pictures-slide.gif": ("howto/pictures.md", "slide.gif"),
 }
+EXAMPLES = (
+    "pressure stress whole status slide stiffness area tractions energies layers electrovibration hover "
+)
+EXAMPLES += "laws spectrum history rendered texture beside sweep map samples"
+for name in EXAMPLES.split():
+    file = f"{name}.gif" if name == "slide" else f"{name}.png"
+    OF_PAGES[f"gallery-{file}"] = ("gallery.md", file)
 CODE = re.compile(r"^(<!-- not run: .+? -->\n)?```python\n(.*?)^```$", re.M | re.S)
 
 
@@ -33,7 +46,7 @@ def draw_readme(path: Path = README) -> None:
 
     finger = ev.FingerPad()
     display = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
-    motion = [ev.Press(force=0.05), ev.Slide(distance=2.0, steps=40)]
+    motion = [ev.Press(force=0.05), ev.Slide(distance=2.0, steps=40, hold="force")]
     scene = ev.Scene(
         finger, display, law=ev.Kaczmarek(), voltage=1000.0, motion=motion, output=ev.Output(every=50)
     )
@@ -46,24 +59,28 @@ def draw_readme(path: Path = README) -> None:
     figure.savefig(path, dpi=90)
 
 
-def draw_from_page(picture: str) -> None:
-    """Run the Python blocks of the page in a folder of their own and keep the picture that they
+def draw_from_page(page: str, pictures: Iterable[str]) -> None:
+    """Run the Python blocks of the page in a folder of their own and keep the pictures that they
     write.
     """
-    page, written = OF_PAGES[picture]
     code = "\n".join(block for mark, block in CODE.findall((DOCS / page).read_text("utf-8")) if not mark)
     with TemporaryDirectory() as folder, chdir(folder):
         exec(compile(code, page, "exec"), {"__name__": "page"})
-        shutil.copyfile(written, DOCS / "pictures" / picture)
+        for picture in pictures:
+            shutil.copyfile(OF_PAGES[picture][1], DOCS / "pictures" / picture)
 
 
 def main(names: list[str]) -> None:
-    """Draw the named pictures, or all of them."""
-    for name in names or [README.name, *OF_PAGES]:
-        if name == README.name:
-            draw_readme()
-        else:
-            draw_from_page(name)
+    """Draw the named pictures, or all of them; each page is run once."""
+    wanted = names or [README.name, *OF_PAGES]
+    if README.name in wanted:
+        draw_readme()
+    pages: dict[str, list[str]] = {}
+    for name in wanted:
+        if name != README.name:
+            pages.setdefault(OF_PAGES[name][0], []).append(name)
+    for page, pictures in pages.items():
+        draw_from_page(page, pictures)
 
 
 if __name__ == "__main__":

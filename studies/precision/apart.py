@@ -14,7 +14,7 @@ from typing import Any
 
 from ..peers.hosts import environment
 
-FAST = ("pypardiso", "numba")
+FAST = ("pypardiso",)
 #: task -> module and function, which takes and returns a JSON list
 TASKS = {
     "runs": ("runs", "measure_plain"),

@@ -11,6 +11,7 @@ from tools.fakes import fake_result
 
 import evfem as ev
 from evfem.scene import file as scenefile
+from evfem.simulation.rendering import ApparentFriction, Comparison
 from evfem.simulation.result import Result
 
 NAIL = ev.NeoHookean(E=20.0, nu=0.3)
@@ -93,6 +94,19 @@ def test_a_result_shows_how_far_it_came_and_its_end():
     assert [float(v) for v in box.split()] == pytest.approx([0.0, -2.0, 3.0, 2.0])
 
 
+def test_a_result_with_a_depth_shows_its_end_over_it_too():
+    result = fake_result(provenance={"scene": {"name": "fake", "total_steps": 4, "depth": 10.0}})
+    assert repr(result).splitlines()[3:] == [
+        "  electrostatic force 2.143 N/mm; contact width 2.429 mm",
+        "  over 10 mm: normal force 18.57 N; tangential force 20 N",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
+    ]
+    assert repr(result.total).splitlines()[2:] == [
+        "  normal force 18.57 N; tangential force 20 N",
+        "  electrostatic force 21.43 N; contact area 24.29 mm2",
+    ]
+
+
 def test_results_without_or_with_odd_steps():
     empty = Result.from_rows([], [], fake_result().mesh, {})
     assert repr(empty) == "Result of 'scene': 0 of 0 steps, 0 with fields, 9 nodes"
@@ -138,3 +152,22 @@ def test_showing_a_scene_loads_nothing_heavy():
     words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
     done = subprocess.run(words, capture_output=True, text=True)
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
+
+
+def test_meshes_frames_and_forces_show_their_size_not_their_numbers():
+    result = fake_result("quad9")
+    assert repr(result.mesh) == "Mesh of 25 nodes, 4 cells (quad9); regions soft, hard; sets pad, bone"
+    assert repr(result.frames[1]) == "Frame of step 4 at 0.2 mm, 0 s: 25 nodes, 4 cells"
+    felt = ApparentFriction(np.linspace(-0.0, 5.0, 1000), np.full(1000, 0.05), np.linspace(0.0, 0.02, 1000))
+    assert repr(felt) == "ApparentFriction(1000 positions, 0 to 5 mm, friction 0 to 0.4)"
+    found = Comparison(np.arange(3.0), np.array([1e-3, 0.0, 1e-9]), 0.99, 0.01, 0.0)
+    assert repr(found) == (
+        "Comparison(3 positions: pearson 0.99, relative L2 error 0.01, at most 0.001 N/mm and 0 V apart)"
+    )
+
+
+def test_no_minus_zero_is_shown():
+    row = dict(fake_result().rows[-1]) | {"tangential_force": -1e-17, "position": -0.0}
+    result = Result.from_rows([row], [], fake_result().mesh, {})
+    assert "-0 " not in repr(result)
+    assert "tangential force 0 N/mm" in repr(result)

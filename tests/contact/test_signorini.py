@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from evfem.common.constants import ACTIVE_SET_LIMIT
+from evfem.contact import signorini
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
@@ -280,6 +282,21 @@ def test_an_impossible_problem_is_refused_not_answered():
     problem = ContactProblem(np.array([-1.0, 0.0]), -np.eye(2), np.array([0.0]))
     with pytest.raises(ContactNotSolved):
         solve_contact(problem, np.array([OPEN]))
+
+
+def test_statuses_that_go_round_in_a_circle_are_not_followed_for_ever(monkeypatch):
+    asked = []
+    solve = signorini._solve_statuses
+    monkeypatch.setattr(
+        signorini, "_solve_statuses", lambda *known: asked.append(known[1].tobytes()) or solve(*known)
+    )
+    k = 200  # the impossible node among others that are held
+    compliance = np.diag(np.append(np.append(-1.0, np.ones(k - 1)), np.ones(k)))
+    problem = ContactProblem(np.append(np.full(k, -1.0), np.zeros(k)), compliance, np.zeros(k))
+    with pytest.raises(ContactNotSolved, match="1 of 200 nodes keep changing"):
+        solve_contact(problem, np.full(k, OPEN))
+    assert len(asked) < ACTIVE_SET_LIMIT
+    assert len(set(asked)) < 5
 
 
 def test_nothing_touches_nothing_pushes():

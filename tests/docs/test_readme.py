@@ -22,7 +22,7 @@ from evfem.simulation.result import load
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 FINGER = ev.FingerPad(ridges=False, resolution="coarse")
 DISPLAY = ev.Display(insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
-MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6))
+MOTION = (ev.Press(force=0.05, steps=3), ev.Slide(distance=1.2, steps=6, hold="force"))
 
 
 class RoughGap:
@@ -68,7 +68,7 @@ def example(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def scene():
-    return ev.Scene(FINGER, DISPLAY, law=ev.Kaczmarek(), voltage=1000.0, motion=MOTION, name="slide")
+    return ev.Scene(FINGER, DISPLAY, ev.Kaczmarek(), 1000.0, MOTION, name="slide", depth=10.0)
 
 
 @pytest.fixture(scope="module")
@@ -78,9 +78,11 @@ def result(example):
     return names["result"], live
 
 
-def test_the_readmes_two_scenes_and_the_built_in_one_are_the_same(example):
+def test_the_readmes_two_scenes_are_the_same_and_the_built_in_one_with_held_load_and_a_depth(example):
     names, printed, _, _ = example
-    assert names["scene"].digest() == loads(block("toml")).digest() == default_scene().digest()
+    press, slide = default_scene().motion
+    held = replace(default_scene(), motion=(press, replace(slide, hold="force")), depth=10.0)
+    assert names["scene"].digest() == loads(block("toml")).digest() == held.digest()
     assert str(ev.plan(names["scene"])) in printed
 
 
@@ -101,6 +103,7 @@ def test_the_forces_are_those_of_a_press_and_full_slip(result):
     result, _ = result
     assert result.motion == ["press"] * 3 + ["slide"] * 6
     np.testing.assert_allclose(result.applied_force[:3], [0.05 / 3, 0.1 / 3, 0.05], rtol=1e-7)
+    np.testing.assert_allclose(result.applied_force[3:], 0.05, rtol=1e-7)
     assert result.tangential_force[-1] == pytest.approx(0.3 * result.normal_force[-1], rel=1e-7)
     balance = result.applied_force - (result.normal_force - result.electrostatic_force)
     np.testing.assert_allclose(balance, 0.0, atol=1e-7 * result.normal_force.max())

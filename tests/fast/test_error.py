@@ -97,8 +97,9 @@ def test_a_path_put_right_at_every_state_is_that_of_the_full_model(fast):
     """The error of the remembered displacements is all that there is."""
     scene = paths.random_scene(3, FINGER, STEPS)
     run, full = followed(fast, scene), ev.simulate(scene)
+    held = HeldFinger(scene, run.whole)
     beside = np.array(
-        [missing(fast.memory, HeldFinger(scene, run.whole), s, scene) for s in run.states[1:]]
+        [missing(fast.memory, held, state) for state in run.states[1:]]
     )
     again = CorrectedRun(run, fast.memory.pad, beside)
     for request in again.requests():
@@ -118,7 +119,7 @@ def test_the_held_finger_under_the_forces_of_an_equilibrium_is_in_it(fast):
     state, pad = run.state, run.model.pad
     force = run.model.equilibrium.contact_forces(state) + state.attraction
     start = np.zeros_like(state.u)
-    moved = HeldFinger(scene, pad).under(force, start, 1e-10, 40)
+    moved = HeldFinger(scene, pad).under(force, start)
     np.testing.assert_allclose(moved, (state.u - state.bone)[pad.nodes], atol=1e-6)
 
 
@@ -128,7 +129,7 @@ def test_a_finger_that_finds_no_equilibrium_says_so_and_the_scene_is_run_in_full
     force = np.zeros((held.pad.nodes.size, 2))
     force[len(force) // 2, 1] = -100.0
     with pytest.raises(StepFailed):
-        held.under(force, np.zeros((held.body.space.size, 2)), 1e-8, 20)
+        held.under(force, np.zeros_like(fast.memory.whole[0]))
 
     def fails(*_):
         raise StepFailed("no", [])

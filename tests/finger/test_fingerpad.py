@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from evfem import data
-from evfem.errors import InputError
+from evfem.errors import InputError, readable
 from evfem.finger import fingerpad
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, Electrical, FingerPad, MeshedFinger
 from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
@@ -387,7 +387,7 @@ def test_a_wrong_number_gets_the_sentence_of_its_parameter(name):
     for value in ("abc", None, True, low - 0.3, high + 0.3, float("nan"), float("-inf")):
         with pytest.raises(InputError) as caught:
             FingerPad(**{name: value})
-        expected = f"finger.{name}: given {value}; allowed: {low:g} to {high:g}{unit}"
+        expected = f"finger.{name}: given {readable(value)}; allowed: {low:g} to {high:g}{unit}"
         assert str(caught.value) == expected
 
 
@@ -427,3 +427,25 @@ def test_meshed_finger_raises_its_mesh_and_wants_every_material():
         MeshedFinger(linear, {**laws, "skin": laws["nail"]})
     with pytest.raises(InputError, match=r"solver\.element"):
         MeshedFinger(FingerPad(resolution="coarse").mesh(2), laws).mesh(1)
+
+
+def test_participants_are_as_wide_and_high_as_measured_and_scaled():
+    measured, usual = data.load("table1"), FingerPad()
+    for i, name in enumerate(measured["participant"]):
+        finger = FingerPad.participant(name, "coarse")
+        points = finger.mesh(1).points
+        assert np.ptp(points[:, 0]) == pytest.approx(measured["a"][i], abs=1e-12)
+        assert np.ptp(points[:, 1]) == pytest.approx(measured["b"][i], abs=1e-12)
+        # the shares that bone and layers have of Table 2's finger
+        for key in ("bone_width", "nail_width", "dermis_thickness"):
+            share = getattr(finger, key) / finger.width
+            assert share == pytest.approx(getattr(usual, key) / usual.width, rel=1e-12)
+        assert finger.bone_height / finger.height == pytest.approx(usual.bone_height / usual.height)
+        assert (finger.ridge_height, finger.stratum_corneum_thickness) == (0.15, 0.38)
+        assert (finger.materials, finger.resolution) == (usual.materials, "coarse")
+
+
+def test_an_unknown_participant_is_refused():
+    for name in ("xii", 3):
+        with pytest.raises(InputError, match=r"finger\.participant: given .*; allowed: i \| ii \| iii"):
+            FingerPad.participant(name)

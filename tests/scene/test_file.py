@@ -1,10 +1,14 @@
 """Scene files: three examples load, what is written is read back, mistakes get one sentence."""
 
+import pickle
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.meshes import square_mesh
 
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -108,6 +112,7 @@ speed = 20.0
 hold = "indentation"
 """
 SHORT = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
+DEEP = "[finger]\ndepth = 10\n"
 
 
 @pytest.fixture
@@ -176,6 +181,21 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
     assert scene.air_layer is False
 
 
+def test_a_participant_of_table_1_may_stand_in_a_file():
+    """Other keys say what is different from it."""
+    text = SHORT + "[finger]\nparticipant = 'iii'\nresolution = 'coarse'\nbone_offset = 0.5\n"
+    assert loads(text).finger == replace(FingerPad.participant("iii", "coarse"), bone_offset=0.5)
+
+
+def test_a_material_of_table_2_may_be_changed_in_one_of_its_moduli():
+    text = SHORT + "[finger.materials]\ndermis.E = 0.06\nnail.nu = 0.2\nhypodermis.viscosity = 0.1\n"
+    laws = loads(text).finger.materials
+    assert laws["dermis"] == NeoHookean(E=0.06, nu=0.48)
+    assert laws["nail"] == NeoHookean(E=17.0, nu=0.2)
+    assert laws["hypodermis"] == NeoHookean(E=0.034, nu=0.48, viscosity=0.1)
+    assert laws["epidermis"] == FingerPad().materials["epidermis"]
+
+
 def scenes(folder):
     """Scenes that use everything a file can hold."""
     laws = {"nail": LinearElastic(E=20.0, nu=0.3), "dermis": NeoHookean(E=0.1, nu=0.4, viscosity=1e-3)}
@@ -199,14 +219,46 @@ def scenes(folder):
         solver=Solver("q1", "inertial", "penalty", 10.0, 2.0, 1e-6, 2),
         output=Output(3),
     )
+    grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
+    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press])
+    rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
+    yield Scene(FingerPad(), rough, motion=[press])
 
 
-@pytest.mark.parametrize("number", range(5))
+@pytest.mark.parametrize("number", range(7))
 def test_what_is_written_is_read_back(folder, number):
     scene = list(scenes(folder))[number]
     text = dump(scene)
     assert loads(text).digest() == scene.digest()
     assert dump(loads(text)) == text
+
+
+def test_the_depth_stands_with_the_finger(folder):
+    for text in (SHORT, OWN_MESH):
+        with_depth = text.replace("[finger]", "[finger]\ndepth = 10") if "[finger]" in text else text + DEEP
+        scene = loads(with_depth, folder)
+        assert scene.depth == 10.0
+        assert replace(scene, depth=None).digest() == loads(text, folder).digest()
+        assert loads(dump(scene)).digest() == scene.digest()
+    with pytest.raises(InputError, match=r"finger.depth: given -1; allowed: a depth in mm, larger than 0"):
+        loads(SHORT + DEEP.replace("10", "-1"))
+
+
+@pytest.mark.parametrize(("name", "layer"), [("film", (0.09, 3.35)), ("touchscreen", (0.001, 3.9))])
+def test_insulators_have_names(name, layer):
+    own = "insulator_thickness = 0.09\ninsulator_eps_r = 3.35\n"
+    assert own in DISPLAY
+    scene = loads(DISPLAY.replace(own, f'insulator = "{name}"\n'))
+    assert scene.surface.insulator == Layer(*layer)
+    assert loads(dump(scene)).digest() == scene.digest()
+    with pytest.raises(
+        InputError, match=f"electrostatics.insulator_eps_r: given 3 beside insulator = {name}"
+    ):
+        loads(DISPLAY.replace(own, f'insulator = "{name}"\ninsulator_eps_r = 3.0\n'))
+    with pytest.raises(
+        InputError, match=r'electrostatics.insulator: given "glass"; allowed: film \| touchscreen'
+    ):
+        loads(DISPLAY.replace(own, 'insulator = "glass"\n'))
 
 
 @form
@@ -247,21 +299,36 @@ def test_what_a_file_cannot_hold_is_refused(folder):
 
 #: (example, what is replaced, by what, the key in the sentence, words of the sentence)
 WRONG = [
-    (SHORT, "version = 1", "", "version", "given nothing; allowed: version = 1"),
+    (SHORT, "version = 1", "", "version", "version: missing; allowed: version = 1"),
     (SHORT, "version = 1", "version = 2", "version", "given 2"),
     (SHORT, "version = 1", "version = true", "version", "given true"),
     (SHORT, "version = 1", "version = 1\nspeed = 3", "speed", "an unknown key"),
     (SHORT, "[surface]", "[surfaces]", "surfaces", "an unknown key; allowed: surface? (version"),
-    (SHORT, "[surface]\nkind = 'flat'", "", "surface", "given nothing"),
-    (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", "given 'flat'"),
+    (SHORT, "[surface]\nkind = 'flat'", "", "surface", "missing; allowed:"),
+    (SHORT, "[surface]\nkind = 'flat'", "surface = 'flat'", "surface", 'given "flat"'),
     (SHORT, "kind = 'flat'", "", "surface.kind", "flat | sinusoid | profile"),
-    (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", "given round"),
+    (SHORT, "kind = 'flat'", "kind = 'round'", "surface.kind", 'given "round"'),
+    (SHORT, "kind = 'flat'", "kind = 'grating'", "surface.period", "missing; allowed: a length in mm"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
+        "surface.hurst",
+        "given 2.0; allowed: a Hurst exponent from 0 to 1",
+    ),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'self_affine'\nhurst = 0.5\nrms = 0.01\nseed = 0.5",
+        "surface.seed",
+        "given 0.5",
+    ),
     (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = -0.3", "surface.friction", "given -0.3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = nan", "surface.friction", "given nan"),
-    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = 'a lot'", "surface.friction", "given 'a lot'"),
+    (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = 'a lot'", "surface.friction", 'given "a lot"'),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = true", "surface.friction", "given true"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = [[0, 1, 2]]", "surface.friction", "[[x, mu], ...]"),
     (
@@ -273,19 +340,19 @@ WRONG = [
     ),
     (SHORT, "kind = 'flat'", "kind = 'flat'\ny = inf", "surface.y", "given inf"),
     (SHORT, "kind = 'flat'", "kind = 'sinusoid'\nterms = [[1, 2]]", "surface.terms", "wavenumber"),
-    (SHORT, "kind = 'flat'", "kind = 'profile'", "surface.file", "given nothing"),
+    (SHORT, "kind = 'flat'", "kind = 'profile'", "surface.file", "missing; allowed:"),
     (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'none.csv'", "surface.file", "No such file"),
     (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'voltage.csv'", "surface.file", "x,height"),
     (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = '.'", "surface.file", "no file"),
     (SHORT, "kind = 'flat'", "kind = 'profile'\nfile = 'pad.vtu'", "surface.file", "x,height"),
     (SHORT, "kind = 'flat'", "kind = 'profile'\npoints = [[1]]", "surface.points[0]", "two numbers"),
     (SHORT, "force = 0.05", "force = 0.05\n[[motion]]\nkind = 'jump'", "motion[1].kind", "press | slide"),
-    (SHORT, "[[motion]]\nkind = 'press'\nforce = 0.05", "", "motion", "given nothing"),
+    (SHORT, "[[motion]]\nkind = 'press'\nforce = 0.05", "", "motion", "missing; allowed:"),
     (SHORT, "[[motion]]\nkind = 'press'\nforce = 0.05", "[motion]\nkind = 'press'", "motion", "[[motion]]"),
     (SHORT, "version = 1\n[surface]", "version = 1\nmotion = []\n[surface]", "scene", "TOML"),
     (SHORT, "force = 0.05", "", "motion[0].force", "neither force nor indentation"),
     (SHORT, "force = 0.05", "force = 0.05\nindentation = 1", "motion[0].force", "force and indentation"),
-    (SHORT, "force = 0.05", "force = '0.05'", "motion[0].force", "given '0.05'"),
+    (SHORT, "force = 0.05", "force = '0.05'", "motion[0].force", 'given "0.05"'),
     (SHORT, "force = 0.05", "force = -1", "motion[0].force", "given -1"),
     (SHORT, "force = 0.05", "force = 1" + "0" * 400, "motion[0].force", "N/mm"),
     (SHORT, "force = 0.05", "force = 1e999", "motion[0].force", "given inf"),
@@ -296,9 +363,9 @@ WRONG = [
     (SHORT, "force = 0.05", "force = 0.05\n[output]\nevery = 0", "output.every", "given 0"),
     (SHORT, "force = 0.05", "force = 0.05\n[solver]\nelement = 'p3'", "solver.element", "q2p1"),
     (SHORT, "force = 0.05", "force = 0.05\n[solver]\ntolerance = 1", "solver.tolerance", "given 1.0"),
-    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ncontact='penalty'", "solver.penalty_normal", "nothing"),
+    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ncontact='penalty'", "solver.penalty_normal", "missing"),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = -3", "finger.width", "given -3"),
-    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = 'w'", "finger.width", "given w"),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = 'w'", "finger.width", 'given "w"'),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidht = 3", "finger.widht", "width?"),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nresolution = 'x'", "finger.resolution", "coarse"),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nridges = 1", "finger.ridges", "given 1"),
@@ -310,6 +377,7 @@ WRONG = [
         "finger.materials.dermis",
         "given 3",
     ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nparticipant = 'xx'", "finger.participant", "i | ii |"),
     (
         SHORT,
         "force = 0.05",
@@ -323,9 +391,9 @@ WRONG = [
     (SHORT, "version = 1", "version = 1\na = " + "[" * 5000, "scene", "no valid TOML"),
     (SHORT, "version = 1", "version = " + "1" * 5000, "scene", "no valid TOML"),
     (DISPLAY, 'law = "kaczmarek"', 'law = "coulomb"', "electrostatics.law", "strong_troxel | kaczmarek"),
-    (DISPLAY, 'law = "kaczmarek"', "", "electrostatics.law", "given nothing"),
-    (DISPLAY, "voltage = 1000.0", "", "electrostatics.voltage", "given nothing"),
-    (DISPLAY, "voltage = 1000.0", "voltage = '1 kV'", "electrostatics.voltage", "given '1 kV'"),
+    (DISPLAY, 'law = "kaczmarek"', "", "electrostatics.law", "missing; allowed:"),
+    (DISPLAY, "voltage = 1000.0", "", "electrostatics.voltage", "missing; allowed:"),
+    (DISPLAY, "voltage = 1000.0", "voltage = '1 kV'", "electrostatics.voltage", 'given "1 kV"'),
     (DISPLAY, "voltage = 1000.0", "voltage = 1e9", "electrostatics.voltage", "given 1000000000.0"),
     (
         DISPLAY,
@@ -349,7 +417,7 @@ WRONG = [
         "electrostatics.insulator_thickness",
         "-0.09",
     ),
-    (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "given nothing"),
+    (DISPLAY, "insulator_thickness = 0.09", "", "electrostatics.insulator_thickness", "missing; allowed:"),
     (
         DISPLAY,
         "insulator_eps_r = 3.35",
@@ -365,9 +433,9 @@ WRONG = [
     (OWN_MESH, 'mesh = "pad.vtu"', "mesh = 3", "finger.mesh", "given 3"),
     (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nwidth = 16.0', "finger.width", "no geometry keys"),
     (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nviscosity = -1.0', "finger.viscosity", "given -1.0"),
-    (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", "given 'zero'"),
+    (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", 'given "zero"'),
     (OWN_MESH, "nu = 0.48", "nu = 0.5", "finger.materials.tissue.nu", "given 0.5"),
-    (OWN_MESH, "nu = 0.48", "", "finger.materials.tissue.nu", "given nothing"),
+    (OWN_MESH, "nu = 0.48", "", "finger.materials.tissue.nu", "missing; allowed:"),
     (OWN_MESH, "nu = 0.48", "nu = 0.48\nmu = 3", "finger.materials.tissue.mu", "an unknown key"),
     (OWN_MESH, "E = 0.05", "E = -0.05", "finger.materials.tissue.E", "given -0.05"),
     (OWN_MESH, "E = 0.05", "E = 'soft'", "finger.materials.tissue.E", "soft"),
@@ -408,6 +476,38 @@ def test_each_mistake_gets_one_sentence_with_its_key(text, old, new, key, words,
     assert "\n" not in sentence
     assert len(sentence) < 600
     assert caught.value.key == key
+
+
+def test_mistakes_in_different_places_are_reported_at_once(folder):
+    text = DISPLAY.replace("friction = 0.3", "frictoin = 0.3\ny = 'high'").replace(
+        "force = 0.05", "force = -1"
+    )
+    text = text.replace('law = "kaczmarek"', "").replace(
+        "distance = 5.0\nsteps = 100", "distance = 0\nsteps = 0"
+    )
+    text = text.replace("width = 16.68", "width = 500\nwidht = 3").replace(
+        "height = 12.79", "height = '12'", 1
+    )
+    with pytest.raises(InputError) as caught:
+        loads(text, folder)
+    keys = [mistake.key for mistake in caught.value.mistakes]
+    assert keys == [
+        *("finger.widht", "finger.width", "finger.height", "electrostatics.law"),
+        *("surface.frictoin", "surface.y", "motion[0].force", "motion[1].distance", "motion[1].steps"),
+    ]
+    sentence = str(caught.value)
+    assert sentence.startswith("9 mistakes: (1) finger.widht: given an unknown key; allowed: width?")
+    assert "(4) electrostatics.law: missing; allowed: strong_troxel | kaczmarek (5) surface" in sentence
+    assert sentence.endswith(" more")
+    assert "\n" not in sentence
+    again = pickle.loads(pickle.dumps(caught.value))
+    assert (str(again), again.mistakes[3].given) == (sentence, caught.value.mistakes[3].given)
+
+
+def test_what_an_unknown_key_may_stand_for_is_not_said_to_be_missing(folder):
+    with pytest.raises(InputError) as caught:
+        loads(DISPLAY.replace("law =", "lwa ="), folder)
+    assert [mistake.key for mistake in caught.value.mistakes] == ["electrostatics.lwa"]
 
 
 def test_a_voltage_file_beside_a_ramp_is_refused(folder):

@@ -9,6 +9,7 @@ from tools.meshes import block
 
 from evfem.cli import main
 from evfem.contact.surfaces import Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan
 from evfem.scene.scene import Scene
@@ -61,6 +62,23 @@ def test_how_much_of_the_slope_is_too_fine():
     # a wave as long as the spacing has no slope from node to node; the squares of the slopes add up
     share = 3e-3 * short / np.hypot(3e-3 * short, 0.05 * long)
     assert float(re.search(r"(\d+)%", found)[1]) == pytest.approx(100.0 * share, abs=1.0)
+
+
+def test_the_shortest_waves_of_roughness_need_five_nodes_each():
+    """Nodes 1/24 mm apart: 0.2083 mm."""
+    for shortest, enough in ((0.21, True), (0.2, False)):
+        rough = SelfAffine(hurst=0.9, rms=0.01, shortest=shortest, friction=0.0)
+        found = plan(scene(rough, cells=48)).warning
+        assert (found is None) == enough
+    assert "(0.2 mm) have fewer than 5 nodes of the pad each, which are 0.042 mm apart" in found
+    assert found.endswith("a shortest wave of 0.21 mm")
+
+
+def test_walls_of_a_grating_between_two_nodes_are_warned_of():
+    steep = Grating(period=1.0, groove_depth=0.02, wall_width=0.01, friction=0.0)
+    assert "sharper than the node spacing" in plan(scene(steep, cells=48)).warning
+    gentle = Grating(period=1.0, groove_depth=0.02, wall_width=0.2, friction=0.0)
+    assert plan(scene(gentle, cells=48)).warning is None
 
 
 def test_the_command_says_it_in_one_line(tmp_path, capsys, monkeypatch):

@@ -110,6 +110,8 @@ WRONG_PARTS = [
     (lambda: Solver(tolerance=0.1), "tolerance"),
     (lambda: Solver(threads=0), "threads"),
     (lambda: Output(every=0), "every"),
+    (lambda: Output(precision="half"), "precision"),
+    (lambda: Output(compression=1), "compression"),
 ]
 
 
@@ -271,3 +273,16 @@ def test_an_object_that_contains_itself_has_a_fingerprint():
     law = Bent()
     law.me = law
     assert len(digest(law)) == 64
+
+
+@pytest.mark.parametrize("depth", [0.0, -1.0, 201.0, np.nan, "10", True])
+def test_a_depth_that_is_none_is_refused(depth):
+    with pytest.raises(InputError) as caught:
+        plain(depth=depth)
+    assert caught.value.key == "depth"
+
+
+def test_a_depth_is_part_of_a_scene():
+    assert plain(depth=10).depth == 10.0
+    assert plain().depth is None
+    assert plain(depth=10.0).digest() != plain().digest()

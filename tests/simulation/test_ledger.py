@@ -306,6 +306,30 @@ def test_widths_of_contact():
         assert found[-1] > 0.0
 
 
+def test_contact_pressures_are_nodal_forces_over_their_shares():
+    def peak(_, state):
+        left, right = shares(state)
+        return (state.contact_force[:, 0] / (right - left)).max()
+
+    def mean(_, state):
+        left, right = shares(state)
+        touching = state.status > 0
+        if not touching.any():
+            return 0.0
+        return state.contact_force[touching, 0].sum() / (right - left)[touching].sum()
+
+    for name, function in (("peak_contact_pressure", peak), ("mean_contact_pressure", mean)):
+        found, expected = column(name, function)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-14, err_msg=name)
+        assert found[0] == 0.0
+        assert found[-1] > 0.0
+    result, _, _ = run()
+    for frame in result.frames:
+        peak_now = result.peak_contact_pressure[frame.step - 1]
+        assert frame.contact_pressure.max() == pytest.approx(peak_now, rel=1e-12, abs=1e-15)
+    assert (result.mean_contact_pressure <= result.peak_contact_pressure).all()
+
+
 # -- fields ----------------------------------------------------------------------------------------------
 
 

@@ -3,7 +3,9 @@
 import csv
 import io
 import json
+import sys
 import zipfile
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,13 +13,26 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
-from evfem.simulation.result import COLUMNS, NEEDED, Checkpoint, Result, csv_header, csv_line, load, versions
+from evfem.simulation.result import (
+    COLUMNS,
+    MEANINGS,
+    NEEDED,
+    UNITS,
+    WHOLE_UNITS,
+    Checkpoint,
+    Result,
+    csv_header,
+    csv_line,
+    load,
+    versions,
+)
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (
     "step, motion_index, motion, time, position, indentation, voltage, applied_force, "
     "applied_tangential_force, normal_force, tangential_force, electrostatic_force, electrostatic_force_x, "
-    "contact_width, real_contact_width, min_gap, external_work, electrostatic_work, stored_energy, "
+    "contact_width, real_contact_width, min_gap, peak_contact_pressure, mean_contact_pressure, "
+    "external_work, electrostatic_work, stored_energy, "
     "friction_dissipation, viscous_dissipation, kinetic_energy, integrator_dissipation, snap_dissipation, "
     "substeps, newton_iterations, seconds"
 )
@@ -185,6 +200,47 @@ def test_csv_numbers_are_plain_also_from_numpy_scalars():
     assert (values["normal_force"], values["step"], values["min_gap"]) == ("0.1", "3", "nan")
 
 
+def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
+    result = fake_result()
+    for name in COLUMNS:
+        assert result[name] is getattr(result, name)
+    with pytest.raises(
+        InputError, match='column: given "normal_forse"; allowed: normal_force\\? \\(step, motion'
+    ):
+        result["normal_forse"]
+
+
+def test_a_written_history_is_that_of_a_run_folder(tmp_path):
+    result = fake_result()
+    result.to_csv(tmp_path / "mine.csv")
+    assert (tmp_path / "mine.csv").read_text() == csv_header() + "".join(map(csv_line, result.rows))
+
+
+def test_the_table_has_every_column_without_pandas_and_with_it(monkeypatch):
+    """`pandas` stands for a module with a DataFrame made of columns."""
+    result = fake_result()
+    monkeypatch.setattr("evfem.common.tables.find_spec", lambda name: None)
+    records = result.table()
+    assert records.dtype.names == COLUMNS
+    assert [tuple(row.values()) for row in result.rows] == records.tolist()
+    assert records.step.dtype.kind == "i"
+    monkeypatch.setattr("evfem.common.tables.find_spec", lambda name: name == "pandas")
+    monkeypatch.setitem(sys.modules, "pandas", SimpleNamespace(DataFrame=lambda columns: ("frame", columns)))
+    kind, columns = result.table()
+    assert kind == "frame"
+    assert tuple(columns) == COLUMNS
+    np.testing.assert_array_equal(columns["voltage"], result.voltage)
+
+
+def test_every_column_has_a_unit_and_a_meaning():
+    units = {"", "s", "mm", "V", "N/mm", "N", "MPa"}
+    assert tuple(UNITS) == tuple(MEANINGS) == COLUMNS
+    assert set(UNITS.values()) == units
+    assert all(MEANINGS.values())
+    assert {UNITS[name] for name in COLUMNS if name.endswith("_force")} == {"N/mm"}
+    assert {UNITS[name] for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))} == {"N"}
+
+
 def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
     result = fake_result()
     result.min_gap[-1] = np.inf
@@ -196,6 +252,68 @@ def test_summary_is_plain_json_with_the_last_row_and_the_peaks():
     assert result.summary()["largest"]["tangential_force"] == 7.0
     assert summary["newton_iterations"] == 12
     assert (summary["nodes"], summary["cells"], summary["kind"]) == (9, 4, "quad")
+
+
+def with_depth(depth=10.0):
+    scene = {"name": "fake", "total_steps": 4, "depth": depth}
+    return fake_result(provenance={"scene": scene})
+
+
+def test_a_total_has_the_same_names_over_the_depth(tmp_path):
+    result = with_depth(8.0)
+    total = result.total
+    per_depth = {name for name in COLUMNS if name.endswith(("_force", "_force_x", "_width"))}
+    per_depth |= {name for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))}
+    assert len(per_depth) == 16
+    for name in COLUMNS:
+        factor = 8.0 if name in per_depth else 1.0
+        assert total.rows[2][name] == (
+            factor * result.rows[2][name] if factor != 1.0 else result.rows[2][name]
+        )
+        units = {"N/mm": "N", "N": "mJ", "mm": "mm2"} if name in per_depth else {}
+        assert total.units[name] == units.get(result.units[name], result.units[name])
+    assert total.total is total
+    assert total.frames == result.frames
+    np.testing.assert_array_equal(result.contact_area, 8.0 * result.contact_width)
+    np.testing.assert_array_equal(total.real_contact_area, 8.0 * result.real_contact_width)
+    total.save(tmp_path / "total.npz")
+    back = load(tmp_path / "total.npz")
+    assert (back.rows, back.units["normal_force"]) == (total.rows, "N")
+    assert back.total is back
+
+
+def test_energies_over_the_depth_are_forces_over_it_times_ways():
+    """1 N over 1 mm is 1 mJ: work per depth in N times mm is mJ."""
+    result = with_depth()
+    work = result.applied_force[-1] * result.indentation[-1]  # N/mm times mm
+    assert result.total.applied_force[-1] * result.indentation[-1] == pytest.approx(10.0 * work)
+    assert WHOLE_UNITS["external_work"] == "mJ"
+
+
+@pytest.mark.parametrize("name", ["total", "contact_area", "real_contact_area"])
+def test_without_a_depth_there_is_no_total(name):
+    for result in (fake_result(), with_depth(None)):
+        assert result.depth is None
+        with pytest.raises(
+            InputError, match=r"depth: missing; allowed: a depth in mm, by Scene\(depth=...\)"
+        ):
+            getattr(result, name)
+        assert "total" not in result.summary()
+
+
+def test_the_summary_says_the_end_over_the_depth_too():
+    result = with_depth()
+    summary = json.loads(json.dumps(result.summary()))
+    assert summary["last"]["normal_force"] == result.normal_force[-1]
+    assert summary["units"]["force"] == "N/mm"
+    total = summary["total"]
+    assert (total["depth"], total["last"]["normal_force"]) == (10.0, 10.0 * result.normal_force[-1])
+    assert total["largest"]["contact_width"] == 10.0 * result.contact_width.max()
+    assert total["largest"]["peak_contact_pressure"] == summary["largest"]["peak_contact_pressure"]
+    assert (total["units"]["force"], total["units"]["energy"], total["units"]["stress"]) == ("N", "mJ", "MPa")
+    whole = result.total.summary()
+    assert whole["units"]["force"] == "N"
+    assert "total" not in whole
 
 
 def test_versions_name_what_computes():

@@ -187,3 +187,23 @@ def test_who_dissipates_by_friction(before, after, way, share):
         states.append(state)
     expected = share * 0.5 * 2.0 * 0.1
     assert Part(model, *states).friction() == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("thickness", [0.09, 1e-3, 2e-4])
+@pytest.mark.parametrize("way", ["down", "up"])
+def test_the_attraction_of_a_plate_that_lands_or_lifts_works_what_its_potential_says(thickness, way):
+    """Over 0.3 mm at a constant voltage; above 0.2 um of insulator the attraction falls to half within a
+    thousandth of that.
+    """
+    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
+    insulator, gap, voltage = ev.Layer(thickness, 3.35), 0.3, 140.0
+    surface = Display(insulator, friction=0.0)
+    model = make_model(scene(surface, StrongTroxel(), voltage, (Hover(gap),), column))
+    rest = model.equilibrium.rest(np.array([0.0, gap]), voltage)
+    landed = replace(rest, u=rest.u - [0.0, gap], status=np.full_like(rest.status, STICK))
+    landed = replace(landed, attraction=model.equilibrium.attraction_at(landed, landed, voltage))
+    states = (rest, landed) if way == "down" else (landed, rest)
+    layers = Layers.of(ev.Layer(0.38, 1650.0), insulator)
+    far, near = (StrongTroxel().potential(g, voltage, layers) for g in (gap, 0.0))
+    expected = 4.0 * (far - near) * (1.0 if way == "down" else -1.0)
+    assert Part(model, *states).electrostatic() == pytest.approx(expected, rel=1e-4)

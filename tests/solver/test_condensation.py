@@ -10,8 +10,9 @@ import pytest
 from tools.grids import rectangle
 
 from evfem.solver.condensation import Pardiso, Singular, SuperLU, make_condensation, mkl_library
-from evfem.tissue.body import Body, Pattern
+from evfem.tissue.body import Body
 from evfem.tissue.laws import NeoHookean
+from evfem.tissue.pattern import Pattern
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
 BACK_ENDS = [Pardiso, SuperLU] if importlib.util.find_spec("pypardiso") else [SuperLU]
@@ -84,39 +85,44 @@ def compare(factor, problem, kept, rtol):
     np.testing.assert_allclose((problem.dense @ x)[i], b[i], atol=rtol * np.abs(problem.dense).max())
 
 
+def entries(pattern, cells):
+    """Upper triangle from cell matrices."""
+    data = pattern.zeros()
+    pattern.add(cells, np.arange(len(cells)), data)
+    return pattern.finish(data)
+
+
 def test_pattern_adds_cells_up():
-    """Both triangles and an added diagonal equal the dense sum; empty rows keep a diagonal."""
+    """Both triangles equal the dense sum; empty rows keep a diagonal."""
     problem = random_problem(size=45, count=20)
-    pattern = Pattern(problem.unknowns, problem.size)
-    diagonal = np.linspace(0.0, 1.0, problem.size)
-    upper = pattern.upper(problem.cells, diagonal)
-    expected = problem.dense + np.diag(diagonal)
-    np.testing.assert_allclose(pattern.full(upper).toarray(), expected, atol=1e-13)
+    pattern = Pattern(problem.unknowns, 1)
+    found = pattern.full(entries(pattern, problem.cells)).toarray()
+    np.testing.assert_allclose(found, problem.dense, atol=1e-13)
     assert (np.diff(pattern.indptr) >= 1).all()
     row = np.repeat(np.arange(problem.size), np.diff(pattern.indptr))
     assert (pattern.indices >= row).all()
     # cells that hold an unknown twice, as those with two bone nodes do
-    twice = Pattern(np.array([[0, 1, 1]]), 2)
+    twice = Pattern(np.array([[0, 1, 1]]), 1)
     cell = np.array([[[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]]])
-    np.testing.assert_allclose(twice.full(twice.upper(cell)).toarray(), [[1.0, 5.0], [5.0, 20.0]])
+    np.testing.assert_allclose(twice.full(entries(twice, cell)).toarray(), [[1.0, 5.0], [5.0, 20.0]])
 
 
 @every_back_end
 @pytest.mark.parametrize("kept", [KEPT, np.sort(KEPT), KEPT[:1]], ids=["any order", "sorted", "one"])
 def test_condensation_equals_dense_elimination(back_end, kept):
     problem = random_problem()
-    pattern = Pattern(problem.unknowns, problem.size)
+    pattern = Pattern(problem.unknowns, 1)
     factor = back_end(pattern, kept)
-    factor.factorise(pattern.upper(problem.cells))
+    factor.factorise(entries(pattern, problem.cells))
     compare(factor, problem, kept, 1e-12)
 
 
 @every_back_end
 def test_indefinite_interior(back_end):
     problem = indefinite_problem()
-    pattern = Pattern(problem.unknowns, problem.size)
+    pattern = Pattern(problem.unknowns, 1)
     factor = back_end(pattern, KEPT)
-    factor.factorise(pattern.upper(problem.cells))
+    factor.factorise(entries(pattern, problem.cells))
     compare(factor, problem, KEPT, 1e-10)
 
 
@@ -127,9 +133,9 @@ def test_singular_condensed_matrix_is_no_obstacle(back_end):
     """
     unknowns = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
     problem = Problem(unknowns, np.tile([[1.0, -1.0], [-1.0, 1.0]], (4, 1, 1)), 5)
-    pattern, kept = Pattern(unknowns, 5), np.array([4, 0])
+    pattern, kept = Pattern(unknowns, 1), np.array([4, 0])
     factor = back_end(pattern, kept)
-    factor.factorise(pattern.upper(problem.cells))
+    factor.factorise(entries(pattern, problem.cells))
     np.testing.assert_allclose(factor.schur, 0.25 * np.array([[1.0, -1.0], [-1.0, 1.0]]), atol=1e-14)
 
 
@@ -137,11 +143,11 @@ def test_singular_condensed_matrix_is_no_obstacle(back_end):
 def test_one_analysis_many_factorisations(back_end):
     """Definite, indefinite and definite again: each answer belongs to the last matrix given."""
     definite, other = random_problem(), indefinite_problem()
-    pattern = Pattern(definite.unknowns, definite.size)
+    pattern = Pattern(definite.unknowns, 1)
     factor = back_end(pattern, KEPT)
     for scale, problem in ((1.0, definite), (1.0, other), (2.5, definite), (1e-6, other)):
         scaled = Problem(problem.unknowns, scale * problem.cells, problem.size)
-        factor.factorise(pattern.upper(scaled.cells))
+        factor.factorise(entries(pattern, scaled.cells))
         compare(factor, scaled, KEPT, 1e-10)
 
 
@@ -157,12 +163,12 @@ def test_singular_interior_is_reported_and_survived(back_end, case):
         "empty": np.zeros((3, 3)),
         "nan": np.full((3, 3), np.nan),
     }[case]
-    pattern = Pattern(unknowns, 5)
+    pattern = Pattern(unknowns, 1)
     factor = back_end(pattern, np.array([4, 3]))
     with pytest.raises(Singular):
-        factor.factorise(pattern.upper(np.array([cell, np.eye(3)])))
+        factor.factorise(entries(pattern, np.array([cell, np.eye(3)])))
     good = Problem(unknowns, np.array([np.eye(3) + 1.0, 2.0 * np.eye(3) - 0.5]), 5)
-    factor.factorise(pattern.upper(good.cells))
+    factor.factorise(entries(pattern, good.cells))
     compare(factor, good, np.array([4, 3]), 1e-12)
 
 
@@ -176,10 +182,10 @@ def test_zero_pivots_give_no_wrong_answer(back_end):
     cells[2, 0, 1] = cells[2, 1, 0] = 0.3
     cells[3, 0, 1] = cells[3, 1, 0] = 0.1
     problem, kept = Problem(unknowns, cells, 6), np.array([5, 4])
-    pattern = Pattern(unknowns, 6)
+    pattern = Pattern(unknowns, 1)
     factor = back_end(pattern, kept)
     try:
-        factor.factorise(pattern.upper(cells))
+        factor.factorise(entries(pattern, cells))
     except Singular:
         return
     compare(factor, problem, kept, 1e-10)
@@ -217,7 +223,7 @@ def test_back_ends_agree_on_tissue():
 
 def test_fastest_back_end_is_chosen():
     problem = random_problem()
-    pattern = Pattern(problem.unknowns, problem.size)
+    pattern = Pattern(problem.unknowns, 1)
     assert type(make_condensation(pattern, KEPT)) is BACK_ENDS[0]
 
 

@@ -6,17 +6,34 @@ import csv
 import importlib
 import importlib.util
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
+from evfem.electrostatics.laws import INSULATORS
 from evfem.errors import NotConverged
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.keys import (
+    MOTIONS,
+    SURFACES,
+    ElectricalTable,
+    ElectrostaticsTable,
+    MeshTable,
+    OutputTable,
+    SceneTable,
+    SolverTable,
+    StrategyTable,
+)
+from evfem.scene.sense import largest_voltage
+from evfem.scene.voltage import SIGNALS
 from evfem.simulation.run import simulate
+from evfem.tissue.elements import ELEMENTS
+from evfem.tissue.laws import LAWS
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-NAMES = "apart drawing ending invariants records run shrinking study tables twins"
-apart, drawing, ending, invariants, records, run, shrinking, study, tables, twins = (
+NAMES = "apart bodies drawing ending invariants records run shrinking study tables twins"
+apart, bodies, drawing, ending, invariants, records, run, shrinking, study, tables, twins = (
     importlib.import_module(f"{studies.__name__}.campaign.{name}") for name in NAMES.split(" ")
 )
 Ending = ending.Ending
@@ -27,7 +44,7 @@ Ending = ending.Ending
 
 @pytest.fixture(scope="module")
 def drawn():
-    return [drawing.draw(5, number) for number in range(150)]
+    return [drawing.draw(5, number) for number in range(400)]
 
 
 def test_every_drawn_scene_is_valid_and_so_is_its_mirror_image(drawn):
@@ -38,38 +55,93 @@ def test_every_drawn_scene_is_valid_and_so_is_its_mirror_image(drawn):
 
 
 def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
-    charged = [one["electrostatics"] for one in drawn if "electrostatics" in one]
-    for one in charged:
-        volts = [abs(one.get("voltage", 0.0)), *(u for _, u in one.get("voltage_profile", []))]
-        assert max(volts) <= 3000.0
-        assert max(volts) <= 60e3 * one["insulator_thickness"] * (1.0 + 1e-9)
-        assert 0.005 <= one["insulator_thickness"] <= 0.5
+    for one in drawn:
+        if "electrostatics" not in one:
+            continue
+        scene = tables.scene_of(one)
+        thickness = float(scene.ground.insulator.thickness)
+        assert largest_voltage(scene) <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
+        assert 1e-3 <= thickness <= 0.5
     for one in drawn:
         friction = np.atleast_2d(one["surface"]["friction"])[:, -1]
         assert friction.min() >= 0.0
         assert friction.max() <= 1.5
 
 
-def test_everything_that_a_scene_file_can_say_is_drawn(drawn):
+def test_every_choice_of_a_scene_file_is_drawn(drawn):
     def seen(name, key):
         return {one.get(name, {}).get(key) for one in drawn}
 
-    assert seen("surface", "kind") == {"flat", "sinusoid", "profile"}
-    assert seen("solver", "element") == {None, "q1", "q1_fbar", "q2", "q2p1"}
+    assert seen("surface", "kind") == set(SURFACES)
+    assert seen("solver", "element") == {None, *ELEMENTS}
     assert seen("solver", "dynamics") == {None, "viscous", "inertial"}
     assert seen("solver", "contact") == {None, "penalty"}
     assert {"strong_troxel", "kaczmarek"} < seen("electrostatics", "law")
     assert {"staggered", "staggered_once"} < seen("electrostatics", "coupling")
     assert {"normal"} < seen("electrostatics", "direction")
     assert {False} < seen("electrostatics", "air_layer")
-    assert seen("finger", "ridges") == {True, False}
+    assert set(INSULATORS) < seen("electrostatics", "insulator")
+    assert {True, False} <= seen("finger", "ridges")
+    assert set(bodies.MESHES) < seen("finger", "mesh")
+    assert {
+        one["electrostatics"]["signal"]["kind"] for one in drawn if "signal" in one.get("electrostatics", {})
+    } == (set(SIGNALS))
+    materials = [law for one in drawn for law in one["finger"].get("materials", {}).values()]
+    assert {law.get("law") for law in materials} == {None, *LAWS}
     motions = [motion for one in drawn for motion in one["motion"]]
-    assert {motion["kind"] for motion in motions} == {"press", "slide", "hover", "voltage"}
+    assert {motion["kind"] for motion in motions} == set(MOTIONS)
     assert {motion.get("hold") for motion in motions} == {None, "force"}
+
+
+def test_friction_is_drawn_with_jumps_and_with_ramps_within_a_node_spacing(drawn):
     rows = [one["surface"]["friction"] for one in drawn if isinstance(one["surface"]["friction"], list)]
     widths = np.concatenate([np.diff(np.array(table)[:, 0]) for table in rows])
     assert (widths == 0.0).any()  # jumps
     assert ((widths > 0.0) & (widths < 0.02)).any()  # ramps within a node spacing
+
+
+#: what a drawn scene never says, and why
+NEVER = {
+    "surface.file": "`with_files` writes it from points",
+    "electrostatics.voltage_file": "`with_files` writes it from a profile",
+    "electrostatics.signal.file": "samples stand in the table",
+    "electrostatics.signal.full_scale": "of a .wav alone",
+    "solver.strategy.relaxation": "switched off it leaves scenes without an end",
+}
+
+
+def keys_of_a_scene_file():
+    """Every key of every table, as keys.py and the classes behind it have them."""
+    yield from SceneTable.model_fields
+    tables = {
+        "electrostatics": [ElectrostaticsTable],
+        "finger": [MeshTable],
+        "finger.electrical": [ElectricalTable],
+        "surface": SURFACES.values(),
+        "electrostatics.signal": SIGNALS.values(),
+        "solver": [SolverTable],
+        "solver.strategy": [StrategyTable],
+        "output": [OutputTable],
+        "motion": [table for table, _ in MOTIONS.values()],
+    }
+    for name, several in tables.items():
+        yield from (f"{name}.{key}" for table in several for key in table.model_fields)
+    yield from (f"finger.{spec.name}" for spec in fields(FingerPad) if spec.init)
+    yield "finger.participant"
+
+
+def keys_in(table, prefix=""):
+    for key, value in table.items():
+        yield prefix + key
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, dict) and key != "materials":
+                yield from keys_in(one, f"{prefix}{key}.")
+
+
+def test_every_key_of_a_scene_file_is_drawn(drawn):
+    said = {key for one in drawn for key in keys_in(one)}
+    assert set(keys_of_a_scene_file()) - said - set(NEVER) == set()
+    assert said & set(NEVER) == set()
 
 
 def test_a_scene_depends_on_its_seed_and_number_alone():
@@ -81,11 +153,9 @@ def test_a_scene_depends_on_its_seed_and_number_alone():
 def test_a_mirror_image_of_the_mirror_image_is_the_scene(drawn):
     for one in drawn:
         again = tables.mirrored(tables.mirrored(one))
-        again["surface"].setdefault("terms", None)
-        expected = tables.copied(one)
-        if one["surface"]["kind"] != "sinusoid" or "terms" in one["surface"]:
-            expected["surface"].setdefault("terms", None)
-            assert again == expected
+        usual = one["surface"]["kind"] == "sinusoid" and "terms" not in one["surface"]
+        if not usual and one["surface"]["kind"] != "self_affine":
+            assert again == one
 
 
 def test_a_mirrored_profile_is_as_high_on_the_other_side(drawn):
@@ -369,11 +439,12 @@ def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
     drawn = [tables.scene_of(drawing.draw(0, n)).total_steps for n in range(10)]
     assert [int(row["requested"]) for row in rows] == drawn
     for folder in ("failures", "minimal"):
-        names = sorted(p.name for p in (tmp_path / "campaign" / folder).iterdir())
+        names = sorted(p.name for p in (tmp_path / "campaign" / folder).glob("*.toml"))
         assert names == ["seed0-scene0000.toml", "seed0-scene0005.toml"]
     failure = tmp_path / "campaign" / "failures" / "seed0-scene0005.toml"
     assert failure.read_text().startswith("# seed 0, scene 5: not_converged; said\n")
-    assert tables.loads(failure.read_text()).digest() == tables.scene_of(drawing.draw(0, 5)).digest()
+    again = tables.loads(failure.read_text(), failure.parent)
+    assert again.digest() == tables.scene_of(drawing.draw(0, 5)).digest()
 
 
 def test_finished_scenes_are_not_run_again_unless_the_code_is_another(fake, tmp_path, monkeypatch):
@@ -423,8 +494,10 @@ def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
 
 # -- the property
 
+#: without an equilibrium that is found: a ridged pad without friction, drawn onto a rough profile
+OPEN = (20,)
 #: the normal suite's scenes, none of which takes more than a few seconds
-FEW = (0, 1, 2, 3, 4, 5, 6, 8, 9, 10)
+FEW = (3, 4, 5, 6, 7, 10, 11, 15, 16, 17)
 
 
 def ends_well(number):
@@ -440,6 +513,6 @@ def test_a_scene_nobody_chose_ends_in_equilibria(number):
 
 @pytest.mark.slow
 @pytest.mark.solver
-@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW}))
+@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW, *OPEN}))
 def test_more_scenes_nobody_chose_end_in_equilibria(number):
     ends_well(number)

@@ -127,7 +127,7 @@ def test_only_cells_near_the_contact_count():
         frames = (Frame,)
 
     Result.mesh = mesh
-    near = fig13.Instant(Result, None).near()
+    near = fig13.Instant(Result).near()
     distance = np.hypot(*(mesh.points[mesh.cells].mean(axis=1) - mesh.points[lowest]).T)
     assert near.any()
     assert np.array_equal(near, distance <= 1.0)

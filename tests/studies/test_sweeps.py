@@ -36,7 +36,7 @@ def test_every_participant_law_and_case_is_a_scene(participants):
     assert len(points) == 2 * 3 * 11
     for point in points:
         scene = scenefile.loads(point.text)
-        row = common.participants()["participant"].index(point.labels["participant"])
+        row = common.participants()["participant"].index(point.parameters["finger.participant"])
         assert (scene.finger.width, scene.finger.height) == (
             common.participants()["a"][row], common.participants()["b"][row]
         )  # fmt: skip
@@ -52,7 +52,8 @@ def test_a_participants_force_is_that_of_a_single_run(participants):
     (point,) = [
         p
         for p in people.plan(names).points()
-        if p.labels == {"case": "HVLD", "participant": "ii"}
+        if p.labels == {"case": "HVLD"}
+        and p.parameters["finger.participant"] == "ii"
         and p.parameters["electrostatics.law"] == "kaczmarek"
     ]
     per_depth = simulate(scenefile.loads(point.text)).electrostatic_force[-1]

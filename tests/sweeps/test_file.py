@@ -144,12 +144,12 @@ def test_every_combination_gets_the_same_samples():
 SAMPLED = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\n"
 MISTAKES = [
     ("", "sweep: given nothing that varies; allowed: a grid or samples"),
-    ("[grid]\nfriction = [0.1]", "grid.friction: given 'friction'; allowed: TABLE.KEY of a scene file"),
-    ("[grid]\nsurface.friction = []", "grid.surface.friction: given nothing; allowed: a list of values"),
+    ("[grid]\nfriction = [0.1]", 'grid.friction: given "friction"; allowed: TABLE.KEY of a scene file'),
+    ("[grid]\nsurface.friction = []", "grid.surface.friction: given no values; allowed: a list of values"),
     ("[grid]\nsurface.friction = 0.3", "grid.surface.friction: given 0.3; allowed: a list of values"),
     ("[grid]\nsurface.friction = [1979-05-27]", "allowed: numbers, text, true or false, and lists of them"),
     ("[grid]\nhand = { a = 1 }", "grid.hand.a: given 1; allowed: a table {key = value, ...}"),
-    ("[grid]\nhand = { a = { x = 1 } }", "grid.hand.a: given 'x'; allowed: TABLE.KEY"),
+    ("[grid]\nhand = { a = { x = 1 } }", 'grid.hand.a: given "x"; allowed: TABLE.KEY'),
     (
         "[grid.hand]\na = { surface.y = 1.0 }\nb = { surface.friction = 1.0 }",
         "grid.hand.b: given surface.friction; allowed: the keys of the first row: surface.y",
@@ -162,13 +162,13 @@ MISTAKES = [
     ("outputs = ['force.last']\n[grid]\nsurface.y = [0.1]", "outputs: force.last: given an unknown key"),
     (
         "outputs = ['voltage']\n[grid]\nsurface.y = [0.1]",
-        "outputs: given 'voltage'; allowed: COLUMN.STATISTIC",
+        'outputs: given "voltage"; allowed: COLUMN.STATISTIC',
     ),
     (
         "outputs = ['voltage.max.2']\n[grid]\nsurface.y = [0.1]",
-        "given voltage.max.2; allowed: motions from 0 to 1",
+        'given "voltage.max.2"; allowed: motions from 0 to 1',
     ),
-    (SAMPLED, "samples.parameters: given nothing; allowed: at least one parameter"),
+    (SAMPLED, "samples.parameters: missing; allowed: at least one parameter"),
     (f"{SAMPLED}surface.y = 1.0", "samples.parameters.surface.y: given 1.0; allowed: { uniform"),
     (
         f"{SAMPLED}surface.y = {{ uniform = [2.0, 1.0] }}",
@@ -182,7 +182,7 @@ MISTAKES = [
     ),
     (
         SAMPLED.replace("seed = 1\n", "") + "surface.y = { normal = [0.0, 1.0] }",
-        "samples.seed: given nothing",
+        "samples.seed: missing",
     ),
     (
         SAMPLED.replace("seed = 1", "seed = -1") + "surface.y = { normal = [0.0, 1.0] }",

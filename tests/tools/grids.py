@@ -11,6 +11,7 @@ from skfem.io.meshio import from_meshio
 
 from evfem.mesh.mesh import Mesh, raised
 from evfem.tissue.elements import ELEMENTS
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import make_space
 from tools.meshes import between
 
@@ -67,12 +68,24 @@ def quarter_ring(inner, outer):
     return warp
 
 
-def assembled(space, cells):
-    """Cell matrices as one sparse matrix, unknowns (node, component)."""
-    unknown = (2 * space.nodes[:, :, None] + [0, 1]).reshape(len(space.nodes), -1)
+def assembled(space, cells, numbers=None):
+    """Cell matrices, of all cells or those with these `numbers`, as one sparse matrix, unknowns
+    (node, component).
+    """
+    nodes = space.nodes if numbers is None else space.nodes[numbers]
+    unknown = (2 * nodes[:, :, None] + [0, 1]).reshape(len(nodes), -1)
     rows = np.broadcast_to(unknown[:, :, None], cells.shape)
     columns = np.broadcast_to(unknown[:, None, :], cells.shape)
     return sparse.csr_matrix((cells.ravel(), (rows.ravel(), columns.ravel())), shape=(2 * space.size,) * 2)
+
+
+def tangent_of(space, u, *terms):
+    """Tangent of the terms as one sparse matrix, unknowns (node, component)."""
+    pattern = Pattern(space.nodes, 2)
+    data = pattern.zeros()
+    for term in terms:
+        term.add_tangent(u, pattern, data)
+    return pattern.full(pattern.finish(data))
 
 
 def solve(tissue, u, free, load=0.0, iterations=14):
@@ -81,7 +94,7 @@ def solve(tissue, u, free, load=0.0, iterations=14):
     """
     u, free = u.copy(), free.ravel()
     for _ in range(iterations):
-        K = assembled(tissue.space, tissue.tangent(u))[free][:, free]
+        K = tangent_of(tissue.space, u, *getattr(tissue, "terms", [tissue]))[free][:, free]
         step = np.zeros(u.size)
         step[free] = spsolve(K.tocsc(), (load - tissue.forces(u)).ravel()[free])
         length = 1.0

@@ -40,7 +40,7 @@ SHARE, FLOOR = 1e-3, 1e-9
 def versions() -> dict[str, str]:
     """What computes, as far as it is installed."""
     found = {}
-    for package in ("numpy", "scipy", "scikit-fem", "numba", "pypardiso", "mkl"):
+    for package in ("numpy", "scipy", "scikit-fem", "pypardiso", "mkl"):
         with suppress(metadata.PackageNotFoundError):
             found[package] = metadata.version(package)
     return found

@@ -4,6 +4,7 @@ import os
 import time
 from pathlib import Path
 
+from evfem.calibration import runs
 from evfem.sweeps.folder import Answer
 
 
@@ -19,3 +20,15 @@ def work_or_die(job):
         time.sleep(0.02)
     time.sleep(0.3)
     return Answer("done", 0.0, "", {"length": float(len(word))})
+
+
+def die_once(job):
+    """The process of the first job ends without a word; every other one does the work of a fit.
+
+    Whether one has died is a file whose path is in the environment.
+    """
+    file = Path(os.environ["DIE_ONCE"])
+    if not file.exists():
+        file.touch()
+        os._exit(9)
+    return runs.work(job)

@@ -1,0 +1,84 @@
+"""Writes what stands in the documentation about keys and columns from the package itself:
+`python docs/tables.py` after a change of either. A test compares.
+"""
+
+import re
+import textwrap
+from pathlib import Path
+
+from evfem.scene import schema as scenes
+from evfem.scene.schema import Key, Section
+from evfem.simulation.result import COLUMNS, MEANINGS, UNITS
+from evfem.sweeps import schema as sweeps
+
+DOCS = Path(__file__).parent
+WIDTH = 99
+HEAD = """\
+# Keys of scenes and sweeps
+
+<!-- written by docs/tables.py -->
+
+Each key with type, unit, default and what is allowed, as the reader of the files has them.
+`evfem schema` prints the same as a JSON schema, with which an editor completes and checks keys
+([how](../commandline.md#keys-in-an-editor)); `evfem init` writes a scene to begin with.
+"""
+TABLE = re.compile(r"(?<=^## Columns of the history\n\n)(.*?\n\n)\|.*?\n\n", re.M | re.S)
+
+
+def page() -> str:
+    """The page of keys."""
+    parts = [HEAD]
+    for title, found in (("Scene", scenes.sections()), ("Sweep", sweeps.sections())):
+        parts.append(f"## {title}\n")
+        seen: set[tuple[str, str]] = set()
+        for section in found:
+            parts.append(f"### {heading(title, section)}\n")
+            new = [key for key in section.keys if (section.name, entry(key)) not in seen]
+            seen |= {(section.name, entry(key)) for key in section.keys}
+            parts.append("\n".join(map(entry, new)) + "\n")
+            if again := [f"`{key.name}`" for key in section.keys if key not in new]:
+                parts.append(filled(f"And as above: {', '.join(again)}.", "") + "\n")
+    return "\n".join(parts)
+
+
+def heading(title: str, section: Section) -> str:
+    """What a table is called."""
+    if not section.name:
+        return f"The {title.lower()} file"
+    table = "[[motion]]" if section.name == "motion" else f"[{section.name}]"
+    return f"`{table}`: {section.kind}" if section.kind else f"`{table}`"
+
+
+def entry(key: Key) -> str:
+    """An item of a list about a key, each sentence on a line."""
+    if "const" in key.schema:
+        return f'- `{key.name} = "{key.schema["const"]}"`'
+    unit = f" in {key.unit}" if key.unit else ""
+    default = "needed" if key.required else f"default `{key.default}`" if key.default else "optional"
+    rule = filled(f"- `{key.name}`: {key.type}{unit}; {default}; {key.allowed}.")
+    return f"{rule}\n{filled(f'  {key.meaning[0].upper()}{key.meaning[1:]}.')}"
+
+
+def filled(text: str, indent: str = "  ") -> str:
+    """The text in lines that fit."""
+    return textwrap.fill(
+        text, WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
+
+
+def columns(text: str) -> str:
+    """The page on notation with the table of the history's columns."""
+    lines = ["| name | unit | meaning |", "|---|---|---|"]
+    lines += [f"| `{name}` | {UNITS[name]} | {MEANINGS[name]} |".replace("|  |", "| |") for name in COLUMNS]
+    return TABLE.sub(lambda found: found[1] + "\n".join(lines) + "\n\n", text)
+
+
+def main() -> None:
+    """Write both pages."""
+    (DOCS / "reference" / "keys.md").write_text(page(), encoding="utf-8")
+    notation = DOCS / "notation.md"
+    notation.write_text(columns(notation.read_text(encoding="utf-8")), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,182 @@
+"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one
+sentence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import re
+import sys
+from difflib import get_close_matches
+from pathlib import Path
+from types import ModuleType
+from typing import NoReturn
+
+import evfem
+from evfem.common import notices
+from evfem.errors import InputError
+from evfem.templates import TEMPLATES
+
+BAD_INPUT = 2
+STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
+#: what a shell completes an argument with, as shtab wants it: `shtab --shell bash evfem.cli.parser`
+FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
+FOLDERS = {"bash": "_shtab_compgen_dirs", "zsh": "_files -/", "tcsh": "d"}
+
+
+class _Parser(argparse.ArgumentParser):
+    """A parser that reports a mistake in one sentence."""
+
+    def error(self, message: str) -> NoReturn:
+        text = f"{self.prog}: {message}{_meant(message)} (see {self.prog} --help)"
+        self.exit(BAD_INPUT, notices.wrapped(text, sys.stderr) + "\n")
+
+
+def _meant(message: str) -> str:
+    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run',
+    ...)".
+    """
+    found = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
+    close = get_close_matches(found[1], re.findall(r"\w+", found[2]), 1) if found else []
+    return f"; did you mean {close[0]}?" if close else ""
+
+
+def _complete(argument: argparse.Action, how: dict[str, str]) -> None:
+    argument.complete = how  # type: ignore[attr-defined]
+
+
+def parser() -> argparse.ArgumentParser:
+    """All commands and options."""
+    top = _Parser(
+        prog="evfem",
+        description="A finger pad on an electrovibration display, by finite elements.",
+        epilog=f"`evfem run` alone computes a built-in scene; `evfem COMMAND --help` says more. {STATUS}",
+    )
+    top.add_argument("--version", action="version", version=f"evfem {evfem.__version__}")
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", parser_class=_Parser)
+    for name, does, options in (
+        ("run", "run a scene and write history, fields, summary and picture", _run_options),
+        ("init", "write a commented scene to begin with", _init_options),
+        ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
+        ("study", "run studies and write their numbers, series and pictures", _study_options),
+        ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
+        ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
+        ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options),
+        ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
+    ):
+        options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
+    return top
+
+
+def _scene_argument(command: argparse.ArgumentParser) -> None:
+    file = command.add_argument(
+        "scene", nargs="?", type=Path, metavar="SCENE.toml", help="default: the built-in scene"
+    )
+    _complete(file, FILES)
+
+
+def _run_options(run: argparse.ArgumentParser) -> None:
+    _scene_argument(run)
+    _results(run)
+    _again(run, "go on with the interrupted run in the folder", "replace what an earlier run left there")
+    run.add_argument("--no-fields", action="store_true", help="do not write fields.pvd and its .vtu files")
+    run.add_argument("--no-plots", action="store_true", help="do not draw forces.png")
+
+
+def _study_options(study: argparse.ArgumentParser) -> None:
+    study.add_argument("names", nargs="+", metavar="NAME", help=_study_names())
+    out = study.add_argument("--out", type=Path, default=Path(), metavar="DIR", help="folder; default: here")
+    _complete(out, FOLDERS)
+    study.add_argument("--quick", action="store_true", help="coarser and shorter")
+    drawn = study.add_argument_group("campaign alone", "scenes drawn at random")
+    drawn.add_argument("--scenes", type=int, metavar="N", help="how many; default: 300, 6 with --quick")
+    drawn.add_argument("--seed", type=int, metavar="S", help="which ones; default: 0")
+    drawn.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+
+
+def _mesh_options(mesh: argparse.ArgumentParser) -> None:
+    _scene_argument(mesh)
+    target = mesh.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="file to write, .vtu or .msh"
+    )
+    _complete(target, FILES)
+
+
+def _results(command: argparse.ArgumentParser) -> None:
+    out = command.add_argument(
+        "--out", type=Path, metavar="DIR", help="folder for the results; default: ./NAME-out"
+    )
+    _complete(out, FOLDERS)
+
+
+def _again(command: argparse.ArgumentParser, resume: str, overwrite: str) -> None:
+    """What to do with what an earlier run left in the folder: at most one of the two."""
+    either = command.add_mutually_exclusive_group()
+    either.add_argument("--resume", action="store_true", help=resume)
+    either.add_argument("--overwrite", action="store_true", help=overwrite)
+
+
+def _study_names() -> str:
+    """Help on the names of studies; a checkout that is not installed has none."""
+    try:
+        return f"{', '.join(studies().NAMES)}, or all (all but {' and '.join(studies().APART)})"
+    except InputError:
+        return "name of a study, or all"
+
+
+def _sweep_options(sweep: argparse.ArgumentParser) -> None:
+    file = sweep.add_argument(
+        "sweep", type=Path, metavar="SWEEP.toml", help="what is varied, and in which scene"
+    )
+    _complete(file, FILES)
+    _results(sweep)
+    _again(sweep, "keep the points of another sweep in the folder", "remove all points that are there")
+    sweep.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
+    )
+
+
+def _signal_options(voltage: argparse.ArgumentParser) -> None:
+    file = voltage.add_argument("file", type=Path, metavar="VOLTAGE", help="signal to read, .csv or .wav")
+    out = voltage.add_argument(
+        "--out", type=Path, required=True, metavar="FILE", help="file to write; its ending says as what"
+    )
+    for path in (file, out):
+        _complete(path, FILES)
+    voltage.add_argument("--full-scale", type=float, metavar="V", help="largest voltage the file can hold")
+    voltage.add_argument("--speed", type=float, metavar="MM/S", help="sliding speed, for .wav and .hjif")
+    voltage.add_argument(
+        "--friction",
+        type=float,
+        nargs=2,
+        metavar=("MU0", "MU1"),
+        help="coefficients at 0 V and at full scale, for .hjif",
+    )
+    voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help="of the .wav; default: 48000")
+    voltage.add_argument("--carrier", type=float, metavar="HZ", help="sine that the .wav modulates")
+    voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help="of the .png; default: 0.1")
+
+
+def _init_options(init: argparse.ArgumentParser) -> None:
+    told = f"{' | '.join(TEMPLATES)}; default: display"
+    init.add_argument("--template", metavar="NAME", choices=TEMPLATES, default="display", help=told)
+    file = init.add_argument("file", nargs="?", type=Path, metavar="FILE", help="default: NAME.toml")
+    _complete(file, FILES)
+
+
+def _schema_options(schema: argparse.ArgumentParser) -> None:
+    schema.add_argument("of", nargs="?", choices=("scene", "sweep"), default="scene", help="default: scene")
+    out = schema.add_argument("--out", type=Path, metavar="FILE", help="file to write instead of printing")
+    _complete(out, FILES)
+
+
+def studies() -> ModuleType:
+    """The studies, which an installed evfem has."""
+    try:
+        return importlib.import_module("evfem.studies")
+    except ModuleNotFoundError as error:
+        if error.name != "evfem.studies":
+            raise
+        raise InputError("study", "a checkout", "an installed evfem: pip install .") from error

@@ -1,0 +1,1 @@
+"""Parameters of a scene from measurements: what was measured, what is free, and the fit."""

@@ -1,0 +1,103 @@
+r"""How well a least-squares fit knows its unknowns, from the Jacobian of the residuals.
+
+With N residuals r, P unknowns z and J = dr/dz at the solution, the residuals' variance is
+s^2 = r.r / (N - P), the covariance of the unknowns s^2 (J^T J)^-1, and the interval of confidence
+c of an unknown is z -+ t se, se the root of its variance and t the quantile (1 + c) / 2 of
+Student's distribution with N - P degrees of freedom (Seber and Wild, Nonlinear Regression, 1989,
+doi:10.1002/0471725315, section 5.1).
+
+This assumes that the model is right, that measured values err independently of each other, by the
+normal distribution and as much as their standard deviations say relative to each other, and that
+the residuals are linear in the unknowns as far as the interval reaches.
+
+The singular values of J with columns of length 1 say whether the data determine the unknowns one
+by one: a small one belongs to a combination of them along which nothing measured changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+
+#: singular value over the largest below which a combination is not determined; part of an unknown in it
+#: that is worth naming; correlation worth a warning; length of a column of J over the longest one below
+#: which its unknown changes nothing
+UNDETERMINED, NAMED, CORRELATED, NOTHING = 1e-3, 0.1, 0.95, 1e-6
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """What the Jacobian (N, P) and the residuals (N,) say about P unknowns."""
+
+    errors: Floats
+    correlation: Floats
+    singular_values: Floats
+    warnings: tuple[str, ...]
+
+
+def confidence(jacobian: Floats, residuals: Floats, names: Sequence[str]) -> Confidence:
+    """Standard errors (P,), correlation (P, P), singular values (P,) of the scaled Jacobian, and a
+    sentence for each unknown or combination that the data do not determine.
+
+    An unknown that is not determined has an infinite standard error.
+
+    >>> J = np.array([[1.0, 2.0], [2.0, 4.0], [0.5, 1.0]])
+    >>> confidence(J, np.ones(3), ["a", "b"]).warnings
+    ('the data do not tell a and b apart: only a combination of them is determined',)
+    """
+    count, unknowns = jacobian.shape
+    length = np.linalg.norm(jacobian, axis=0)
+    seen = length > NOTHING * max(length.max(), 1e-300)
+    scale = np.where(seen, length, 1.0)
+    _, singular, right = np.linalg.svd(jacobian[:, seen] / scale[seen], full_matrices=False)
+    known = singular > UNDETERMINED * singular[0]
+    inverse = (right[known].T / singular[known] ** 2) @ right[known]
+    covariance = np.full((unknowns, unknowns), np.nan)
+    covariance[np.ix_(seen, seen)] = inverse / np.outer(scale[seen], scale[seen])
+    lost = np.zeros(unknowns)
+    lost[seen] = np.abs(right[~known]).max(axis=0, initial=0.0)
+    variance = residuals @ residuals / (count - unknowns)
+    errors = np.sqrt(variance * np.diag(covariance))
+    errors[~seen | (lost > NAMED)] = np.inf
+    spread = np.sqrt(np.diag(covariance))
+    correlation = np.clip(covariance / np.outer(spread, spread), -1.0, 1.0)
+    told = [*_unseen(names, seen), *_confounded(names, seen, right[~known])]
+    told += _correlated(names, correlation, np.isfinite(errors))
+    return Confidence(errors, correlation, _padded(singular, unknowns), tuple(told))
+
+
+def _padded(values: Floats, count: int) -> Floats:
+    return np.concatenate([values, np.zeros(count - len(values))])
+
+
+def _unseen(names: Sequence[str], seen: Floats) -> list[str]:
+    return [f"{name} changes nothing that was measured" for name, s in zip(names, seen, strict=True) if not s]
+
+
+def _confounded(names: Sequence[str], seen: Floats, directions: Floats) -> list[str]:
+    """A sentence for each combination of unknowns, a row of `directions`, that is not determined."""
+    told = []
+    inside = [name for name, one in zip(names, seen, strict=True) if one]
+    for row in directions:
+        parts = [name for name, part in zip(inside, row, strict=True) if abs(part) > NAMED]
+        told.append(
+            f"the data do not tell {', '.join(parts[:-1])} and {parts[-1]} apart: "
+            "only a combination of them is determined"
+        )
+    return told
+
+
+def _correlated(names: Sequence[str], correlation: Floats, determined: Floats) -> list[str]:
+    told = []
+    for i, j in combinations(np.flatnonzero(determined).tolist(), 2):
+        if abs(correlation[i, j]) > CORRELATED:
+            told.append(
+                f"{names[i]} and {names[j]} are correlated by {correlation[i, j]:.3f}: "
+                "the data determine a combination of them much better than each"
+            )
+    return told

@@ -1,0 +1,294 @@
+"""Fit parameters of a scene to measurements by least squares.
+
+Minimised is the sum of squares of (run - measured) / sd over all measured numbers, by the trust
+region reflective method (Branch, Coleman and Li 1999, doi:10.1137/S1064827595289108; scipy's
+`least_squares` with bounds). Where a measurement has no sd, the root mean square of its values
+takes its place: all its numbers weigh the same, and measurements of other units weigh alike.
+
+The Jacobian is of one-sided differences in the unknowns (`evfem.calibration.parameters`), one step
+of `STEP` for each, computed side by side. A scene that the solver does not solve makes a trial step
+shorter; one beside an accepted point is tried on the other side.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from evfem.calibration.confidence import confidence
+from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question
+from evfem.calibration.parameters import Given, Parameters
+from evfem.calibration.result import FitResult
+from evfem.calibration.runs import OpenPool, Runs, grouped
+from evfem.common import notices
+from evfem.common.arrays import Floats
+from evfem.common.digest import digest
+from evfem.common.storage import alone_in
+from evfem.errors import InputError
+from evfem.scene.file import VERSION, loads, read_text, tables_of
+from evfem.scene.scene import Scene
+from evfem.simulation.result import origin
+from evfem.sweeps.file import scene_tables
+from evfem.sweeps.folder import SweepFolder
+from evfem.sweeps.pools import open_pool
+
+#: step of a difference, in unknowns; relative changes of an unknown, and of the sum of squares, that end
+#: the fit; most steps of it
+STEP, UNKNOWNS, SQUARES, MOST_STEPS = 1e-3, 1e-5, 1e-6, 60
+#: share of the distance between the bounds from which a parameter counts as at one
+AT_BOUND = 1e-3
+
+
+def fit(
+    scene: Scene | str | Path,
+    data: Measured | Sequence[Measured],
+    parameters: Mapping[str, Given],
+    *,
+    out: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool = False,
+) -> FitResult:
+    """Choose parameters of a scene so that its runs agree best with what was measured.
+
+    `scene` is a `Scene` that a file can hold, or the path of a scene file; `data` a `MeasuredCurve`,
+    `MeasuredValues`, or several of them; `parameters` {dotted key of a scene file: (low, high)}, or
+    `Parameter(low, high, start, apply)` in place of the pair.
+
+    `workers` processes (None: one for each core; 1: none but this one) run the scenes. The folder
+    `out` keeps every run: the same fit, called again, goes on where it was interrupted. `progress`
+    prints a line for each step of the fit. Raises InputError for what cannot be used, before
+    anything is computed as far as it can be known, and for a start at which the scene is not solved.
+
+    >>> from evfem.contact.surfaces import Display
+    >>> from evfem.electrostatics.laws import Kaczmarek
+    >>> from evfem.finger.fingerpad import FingerPad
+    >>> from evfem.scene.motion import Hover
+    >>> pad = FingerPad(ridges=False, resolution="coarse")
+    >>> scene = Scene(pad, Display(), Kaczmarek(), 2000.0, Hover(gap=0.3))
+    >>> gaps = {"motion.0.gap": [0.25, 0.3, 0.5]}
+    >>> forces = MeasuredValues("electrostatic_force.last", [4.0e-4, 3.4e-4, 2.0e-4], gaps)
+    >>> fit(scene, forces, {"electrostatics.insulator_thickness": (0.01, 0.2)}, workers=1)
+    FitResult of 1 parameter to 3 values, rms residual 0.958 %
+      electrostatics.insulator_thickness = 0.09818 (0.0833 to 0.116 with 95 % confidence)
+    """
+    problem = _Problem(scene, data, parameters)
+    pool = open_pool(workers, None)
+    with ExitStack() as stack:
+        folder = None
+        if out is not None:
+            folder = SweepFolder(Path(out))
+            stack.enter_context(alone_in(folder.path))
+            folder.open((), problem.digest)
+            folder.write_provenance({"digest": problem.digest, **problem.provenance})
+        runs = Runs(OpenPool(pool, stack), problem.paths, folder)
+        result = _solve(problem, runs, progress)
+    if folder is not None:
+        result.save(folder.path / "fit.json")
+    return result
+
+
+class _Problem:
+    """A fit before anything is run: its scene as tables, its data, its unknowns."""
+
+    def __init__(self, scene: Scene | str | Path, data: Any, parameters: Any) -> None:
+        if isinstance(scene, Scene):
+            self.tables, self.paths, self.name = scene_tables(scene), Path(), scene.name
+        else:
+            path = Path(scene)
+            self.tables, self.paths = tables_of("scene", read_text("scene", path)), path.parent.resolve()
+            self.name = path.stem
+        # fields are not needed, and no run ends between two of them
+        self.tables = {"version": VERSION, **self.tables, "output": {"every": 10**6}}
+        self.data: list[Measured] = [data] if isinstance(data, Measured) else list(data)
+        self.parameters = Parameters.of(parameters)
+        for one in self.data:
+            if not isinstance(one, (MeasuredCurve, MeasuredValues)):
+                raise InputError("data", one, "MeasuredCurve, MeasuredValues, or a list of them")
+            one.check(len(self.tables.get("motion", ())))
+        self.questions = [(run.keys, run.question) for one in self.data for run in one.runs()]
+        self.runs = grouped(self.questions)
+        self.measured = np.concatenate([[], *(np.asarray(one.values) for one in self.data)])
+        self.scale = np.concatenate([[], *(_scale(one) for one in self.data)])
+        if len(self.measured) <= len(self.parameters.free):
+            given = f"{len(self.measured)} for {len(self.parameters.free)} parameters"
+            raise InputError("data", given, "more measured values than parameters")
+        self._check_scenes()
+
+    def _check_scenes(self) -> None:
+        """Whether the scene can be read with every parameter at its start and at its bounds."""
+        start = {key: float(one.value(0.0)) for key, one in self.parameters.free.items()}
+        for keys, _ in self.runs:
+            loads(self.text(keys, start), self.paths)
+        for key, one in self.parameters.free.items():
+            for end in (one.low, one.high):
+                try:
+                    loads(self.text(self.runs[0][0], {**start, key: end}), self.paths)
+                except InputError as error:
+                    raise InputError(
+                        f"parameters.{key}", f"the bound {end:g}: {error}", "other bounds"
+                    ) from error
+
+    def text(self, keys: Mapping[str, Any], values: Mapping[str, float]) -> str:
+        """The scene of one run as a text."""
+        return tomli_w.dumps(self.parameters.applied(self.tables, keys, values))
+
+    @property
+    def digest(self) -> str:
+        """Fingerprint of everything that the fit's steps follow from."""
+        return digest((self.tables, self.parameters, self.questions, self.measured, self.scale))
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Where the fit came from, in plain values ready for JSON."""
+        return {
+            "fit": self.name,
+            **origin(),
+            "sd": all(one.sd is not None for one in self.data),
+            "scene": self.tables,
+            "parameters": {key: vars(one) for key, one in self.parameters.free.items()},
+        }
+
+
+def _scale(one: Measured) -> Floats:
+    """What the residuals of a measurement are divided by."""
+    if one.sd is not None:
+        return np.asarray(one.sd)
+    size = float(np.sqrt(np.mean(np.square(one.values))))
+    return np.full(len(one.values), size or 1.0)
+
+
+class _Residuals:
+    """The residuals and their Jacobian as functions of the unknowns."""
+
+    def __init__(self, problem: _Problem, runs: Runs, progress: bool) -> None:
+        self.problem, self.runs, self.progress = problem, runs, progress
+        self.failed = ""
+
+    def predicted(self, points: Sequence[Floats]) -> list[Floats]:
+        """What the runs say in place of each measured value, at each of the points; NaN where a
+        scene is not solved.
+        """
+        problem = self.problem
+        values = [problem.parameters.values(z) for z in points]
+        texts = [[problem.text(keys, one) for keys, _ in problem.runs] for one in values]
+        wanted = [
+            (text, questions) for row in texts for text, (_, questions) in zip(row, problem.runs, strict=True)
+        ]
+        answers = iter(self.runs.ask(wanted))
+        return [self._gathered([next(answers) for _ in row]) for row in texts]
+
+    def _gathered(self, answers: list[Any]) -> Floats:
+        """The answers of one point's runs, in the order of the measured values."""
+        found: list[float | None] = []
+        numbers: dict[tuple[str, Question], dict[str, float | None]] = {}
+        for (keys, questions), answer in zip(self.problem.runs, answers, strict=True):
+            if answer.status != "done":
+                self.failed = answer.message
+            numbers |= {(digest(dict(keys)), q): answer.outputs for q in questions}
+        for keys, question in self.problem.questions:
+            outputs = numbers[digest(dict(keys)), question]
+            found += [outputs.get(name) for name in question.names]
+        return np.array([math.nan if value is None else value for value in found])
+
+    def __call__(self, z: Floats) -> Floats:
+        """(run - measured) / scale, (N,)."""
+        (predicted,) = self.predicted([z])
+        residuals = (predicted - self.problem.measured) / self.problem.scale
+        if self.progress:
+            told = ", ".join(f"{k} {v:.5g}" for k, v in self.problem.parameters.values(z).items())
+            size = math.sqrt(float(np.mean(residuals**2)))
+            notices.tell(f"fit: {told}: rms residual {size:.4g}, {self.runs.computed} runs so far")
+        return residuals
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Derivatives of the residuals by the unknowns, (N, P)."""
+        _, high = self.problem.parameters.bounds
+        steps = np.where(z + STEP <= high, STEP, -STEP)
+        here, *there = self.predicted(
+            [z, *(z + h * unit for h, unit in zip(steps, np.eye(len(z)), strict=True))]
+        )
+        columns = []
+        for i, (step, beside) in enumerate(zip(steps, there, strict=True)):
+            if not np.isfinite(beside).all():
+                step, (beside,) = -step, self.predicted([z - step * np.eye(len(z))[i]])
+            if not np.isfinite(beside).all():
+                key = self.problem.parameters.names[i]
+                raise InputError(
+                    f"parameters.{key}", f"a scene that is not solved: {self.failed}", "other bounds"
+                )
+            columns.append((beside - here) / step / self.problem.scale)
+        return np.column_stack(columns)
+
+
+def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
+    from scipy.optimize import least_squares
+
+    residuals, parameters = _Residuals(problem, runs, progress), problem.parameters
+    start, bounds = np.zeros(len(parameters.free)), parameters.bounds
+    if not np.isfinite(residuals(start)).all():
+        raise InputError(
+            "scene", f"one that cannot be run at the start: {residuals.failed}", "one that can be"
+        )
+    found = least_squares(
+        residuals,
+        start,
+        residuals.jacobian,
+        bounds,
+        xtol=UNKNOWNS,
+        ftol=SQUARES,
+        gtol=1e-12,
+        max_nfev=MOST_STEPS,
+    )
+    known = confidence(found.jac, found.fun, parameters.names)
+    warnings = [*([] if found.success else [f"not finished after {MOST_STEPS} steps"]), *known.warnings]
+    return FitResult(
+        parameters=dict(parameters.free),
+        values=parameters.values(found.x),
+        unknowns=found.x,
+        errors=known.errors,
+        correlation=known.correlation,
+        singular_values=known.singular_values,
+        names=[name for one in problem.data for name in one.names],
+        measured=problem.measured,
+        predicted=problem.measured + found.fun * problem.scale,
+        scale=problem.scale,
+        warnings=(*warnings, *_at_bounds(parameters, found.x), *_misfit(problem, found.fun)),
+        tables=_final_tables(problem, found.x),
+        paths=problem.paths,
+        provenance={**problem.provenance, "runs": runs.computed, "finished": bool(found.success)},
+    )
+
+
+def _final_tables(problem: _Problem, z: Floats) -> dict[str, Any]:
+    return problem.parameters.applied(problem.tables, {}, problem.parameters.values(z))
+
+
+def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
+    told = []
+    for (key, one), u, low, high in zip(parameters.free.items(), z, *parameters.bounds, strict=True):
+        near = AT_BOUND * (high - low)
+        if min(u - low, high - u) < near:
+            bound = one.low if u - low < near else one.high
+            told.append(f"{key} is at its bound {bound:g}: its interval says nothing beyond it")
+    return told
+
+
+def _misfit(problem: _Problem, residuals: Floats) -> list[str]:
+    """A sentence where residuals are larger than the given standard deviations allow (chi-square
+    test at 1 %).
+    """
+    from scipy.stats import chi2
+
+    if not problem.provenance["sd"]:
+        return []
+    freedom = len(residuals) - len(problem.parameters.free)
+    ratio = float(residuals @ residuals) / freedom
+    if ratio * freedom <= chi2.ppf(0.99, freedom):
+        return []
+    return [f"residuals are {math.sqrt(ratio):.2g} times the given sd: the scene does not explain the data"]

@@ -1,0 +1,260 @@
+"""What was measured, and what a run says at the same places.
+
+A `MeasuredCurve` belongs to one run: a column of its history over another one, as force over
+indentation or friction over position. `MeasuredValues` belong to a run each: one output of it, and
+the keys of the scene that differ from run to run, as hovering forces at some voltages and gaps.
+
+Between the steps of a run a curve is interpolated by monotone cubics (Fritsch and Carlson 1980,
+doi:10.1137/0717021), from the state before the motion on: best are steps at the measured places.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import set_frozen
+from evfem.common.tables import numbers, read_table
+from evfem.errors import InputError, unknown
+from evfem.scene.keys import shown
+from evfem.simulation.result import COLUMNS, Result
+from evfem.sweeps.file import check_key, check_output, plain_value
+from evfem.sweeps.run import output
+
+NUMBERS = tuple(name for name in COLUMNS if name != "motion")
+#: most measured numbers of one kind
+MOST = 100_000
+
+
+@dataclass(frozen=True)
+class Along:
+    """What is asked of a run: values of `column` where the column `over` is `at`, in motion
+    `motion` or in all.
+    """
+
+    column: str
+    over: str
+    at: tuple[float, ...]
+    motion: int | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each value."""
+        where = "" if self.motion is None else f" in motion {self.motion}"
+        return tuple(f"{self.column} at {self.over} {x!r}{where}" for x in self.at)
+
+    def answers(self, result: Result) -> dict[str, float | None]:
+        """The values by name."""
+        values = along(result, self.column, self.over, np.array(self.at), self.motion)
+        return dict(zip(self.names, values.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Single:
+    """What is asked of a run: COLUMN.STATISTIC, as the outputs of a sweep."""
+
+    output: str
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The name of the value."""
+        return (self.output,)
+
+    def answers(self, result: Result) -> dict[str, float | None]:
+        """The value by name."""
+        return {self.output: output(result, self.output)}
+
+
+Question = Along | Single
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run that a measurement needs: keys of the scene that it sets, and what is asked of it."""
+
+    keys: Mapping[str, Any]
+    question: Question
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredCurve:
+    """A column of the history measured along another one in one run.
+
+    `values` (N,) of `column` where `over` is `at` (N,); `motion` is the number of the motion (None:
+    the whole run, in which `over` must grow or fall throughout). `where`: keys of the scene that
+    this measurement sets, `sd` the standard deviation of a value, one for all or (N,).
+
+    >>> force = MeasuredCurve("normal_force", over="indentation", at=[0.2, 0.4], values=[0.01, 0.03])
+    >>> force.names
+    ('normal_force at indentation 0.2', 'normal_force at indentation 0.4')
+    """
+
+    column: str
+    over: str
+    at: Floats | Sequence[float]
+    values: Floats | Sequence[float]
+    motion: int | None = None
+    sd: float | Floats | Sequence[float] | None = None
+    where: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("column", "over"):
+            if getattr(self, name) not in NUMBERS:
+                raise unknown(f"data.{name}", str(getattr(self, name)), list(NUMBERS))
+        set_frozen(self, at=numbers("data.at", self.at, f"a list of places, of {self.over}"))
+        set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
+        if len(np.unique(self.at)) < len(self.at):
+            raise InputError("data.at", "the same place twice", "each place once; the mean of its values")
+        if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
+            raise InputError("data.motion", self.motion, "the number of a motion, from 0, or None")
+        set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
+
+    @classmethod
+    def from_csv(
+        cls,
+        path: str | Path,
+        motion: int | None = None,
+        sd: float | None = None,
+        where: Mapping[str, Any] | None = None,
+    ) -> MeasuredCurve:
+        """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of
+        the history: `indentation,normal_force`.
+        """
+        table = read_table(Path(path), "data")
+        spread = sd if "sd" not in table else table.pop("sd")
+        if len(table) != 2:
+            given = f"{path} with the header {','.join(table)}"
+            raise InputError("data", given, "two columns of the history, as indentation,normal_force; and sd")
+        (over, at), (column, values) = table.items()
+        return cls(column, over, at, values, motion, spread, where or {})
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each value."""
+        return self.runs()[0].question.names
+
+    def runs(self) -> list[Run]:
+        """The one run."""
+        at = tuple(np.asarray(self.at).tolist())
+        return [Run(self.where, Along(self.column, self.over, at, self.motion))]
+
+    def check(self, motions: int) -> None:
+        """InputError for a motion that a scene with so many does not have."""
+        if self.motion is not None and self.motion >= motions:
+            raise InputError("data.motion", self.motion, f"motions from 0 to {motions - 1}")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredValues:
+    """One output of each of N runs, which differ in some keys of the scene.
+
+    `output` is COLUMN.STATISTIC as in a sweep, `values` (N,) its measured values, `where` the keys
+    that differ, with N values each; `sd` the standard deviation, one for all or (N,).
+
+    >>> gaps = {"motion.0.gap": [0.25, 0.5]}
+    >>> MeasuredValues("electrostatic_force.last", values=[4.1e-4, 2.0e-4], where=gaps).names
+    ('electrostatic_force.last, motion.0.gap 0.25', 'electrostatic_force.last, motion.0.gap 0.5')
+    """
+
+    output: str
+    values: Floats | Sequence[float]
+    where: Mapping[str, Sequence[Any]]
+    sd: float | Floats | Sequence[float] | None = None
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.where, Mapping) or not self.where:
+            raise InputError("data.where", shown(self.where), "{key: list of its values} for one key or more")
+        where = {key: _setting(key, value) for key, value in self.where.items()}
+        count = len(np.atleast_1d(np.asarray(self.values, dtype=object)))
+        for key, settings in where.items():
+            if not isinstance(settings, list) or len(settings) != count:
+                raise InputError(f"data.where.{key}", shown(settings), f"{count} values, one for each run")
+        set_frozen(self, where=where, **_measured(self.values, self.sd, count, "a list of numbers"))
+
+    @classmethod
+    def from_csv(cls, path: str | Path, sd: float | None = None) -> MeasuredValues:
+        """The values in a file with the header `KEY,...,OUTPUT` or `KEY,...,OUTPUT,sd`:
+        `electrostatics.voltage,motion.0.gap,electrostatic_force.last`.
+        """
+        table = read_table(Path(path), "data")
+        spread = sd if "sd" not in table else table.pop("sd")
+        *keys, last = table
+        return cls(last, table[last], {key: table[key] for key in keys}, spread)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each value."""
+        rows = zip(*self.where.values(), strict=True)
+        told = (
+            ", ".join(f"{key} {shown(v)}" for key, v in zip(self.where, row, strict=True)) for row in rows
+        )
+        return tuple(f"{self.output}, {row}" for row in told)
+
+    def runs(self) -> list[Run]:
+        """A run for each value."""
+        rows = zip(*self.where.values(), strict=True)
+        return [Run(dict(zip(self.where, row, strict=True)), Single(self.output)) for row in rows]
+
+    def check(self, motions: int) -> None:
+        """InputError for an output that a scene with so many motions does not have."""
+        check_output(self.output, motions)
+
+
+Measured = MeasuredCurve | MeasuredValues
+
+
+def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
+    """Values of a column of the history where the column `over` is `at` (N,), in a motion or in
+    all.
+
+    The state before the motion is the last one of the motion before; before the first motion, if
+    that is a press without voltage, it is zero. Raises InputError where `over` turns round, and
+    for places beyond it.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    rows = np.arange(len(result.step)) if motion is None else np.flatnonzero(result.motion_index == motion)
+    first = int(rows[0])
+    if first > 0:
+        rows = np.concatenate([[first - 1], rows])
+    x, y = (np.asarray(getattr(result, name), dtype=float)[rows] for name in (over, column))
+    if first == 0 and result.motion[0] == "press" and not result.voltage.any():
+        x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
+    if len(x) > 1 and x[-1] < x[0]:
+        x, y = x[::-1], y[::-1]
+    if len(x) < 2 or not (np.diff(x) > 0.0).all():
+        which = "the run" if motion is None else f"motion {motion}"
+        raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
+    if at.min() < x[0] or at.max() > x[-1]:
+        given = f"{over} from {at.min():g} to {at.max():g}"
+        raise InputError("data.at", given, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
+    return PchipInterpolator(x, y)(at)
+
+
+def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Floats | None]:
+    """Values and their standard deviations, checked."""
+    found = numbers("data.values", values, allowed)
+    if len(found) != count or not 0 < count <= MOST:
+        raise InputError("data.values", f"{len(found)} values", f"{allowed}, from 1 to {MOST}")
+    if sd is None:
+        return {"values": found, "sd": None}
+    rule = "a standard deviation larger than 0, one for all or one for each value"
+    spread = numbers("data.sd", np.atleast_1d(sd), rule)
+    if len(spread) not in (1, count) or not (spread > 0.0).all():
+        raise InputError("data.sd", shown(sd), rule)
+    return {"values": found, "sd": np.broadcast_to(spread, count).copy()}
+
+
+def _setting(key: Any, value: Any) -> Any:
+    check_key("data.where", str(key))
+    found = plain_value(f"data.where.{key}", value)
+    each = found if isinstance(found, list) else [found]
+    if any(isinstance(one, float) and not math.isfinite(one) for one in each):
+        raise InputError(f"data.where.{key}", value, "finite numbers")
+    return found

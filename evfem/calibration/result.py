@@ -1,0 +1,170 @@
+"""What a fit found: values with their intervals, what they explain and what they do not."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomli_w
+
+from evfem.calibration.parameters import Parameter
+from evfem.common.arrays import Floats
+from evfem.common.checks import real
+from evfem.common.storage import write_text
+from evfem.common.tables import frame
+from evfem.common.views import table
+from evfem.errors import InputError
+from evfem.scene.file import loads
+from evfem.scene.scene import Scene
+
+FORMAT = "evfem-fit-1"
+ARRAYS = ("unknowns", "errors", "correlation", "singular_values", "measured", "predicted", "scale")
+PLAIN = ("values", "names", "warnings", "tables", "provenance")
+
+
+@dataclass(frozen=True, eq=False)
+class FitResult:
+    """P parameters fitted to N measured numbers.
+
+    `values` by key; `errors` (P,) standard errors of the `unknowns` (P,) as
+    `evfem.calibration.parameters` has them, `correlation` (P, P), `singular_values` (P,) of the
+    Jacobian with columns of length 1. `names`, `measured`, `predicted` and `scale` (N,): what was
+    measured, what the fitted scene says there, and the sd or size that residuals are divided by.
+    `warnings` has a sentence for whatever the data do not determine.
+    """
+
+    parameters: dict[str, Parameter]
+    values: dict[str, float]
+    unknowns: Floats
+    errors: Floats
+    correlation: Floats
+    singular_values: Floats
+    names: list[str]
+    measured: Floats
+    predicted: Floats
+    scale: Floats
+    warnings: tuple[str, ...]
+    tables: dict[str, Any]
+    paths: Path
+    provenance: dict[str, Any]
+
+    def __getitem__(self, key: str) -> float:
+        """The value of a parameter."""
+        if key not in self.values:
+            raise InputError("parameter", key, ", ".join(self.values))
+        return self.values[key]
+
+    @property
+    def residuals(self) -> Floats:
+        """(predicted - measured) / scale, (N,)."""
+        return (self.predicted - self.measured) / self.scale
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residuals: in sd where there is one, else as a share of the
+        measured values' root mean square.
+        """
+        return math.sqrt(float(np.mean(self.residuals**2)))
+
+    @property
+    def scene(self) -> Scene:
+        """The scene with the fitted parameters."""
+        return loads(tomli_w.dumps(self.tables), self.paths, str(self.provenance.get("fit", "fit")))
+
+    def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Lowest and highest value of each parameter with that confidence (0 to 1), by Student's
+        distribution.
+
+        What they assume stands in `evfem.calibration.confidence`.
+        """
+        from scipy.stats import t
+
+        confidence = real("confidence", confidence, "a number between 0 and 1", lambda c: 0.0 < c < 1.0)
+        reach = t.ppf(0.5 * (1.0 + confidence), len(self.measured) - len(self.values)) * self.errors
+        ends = zip(self.parameters.items(), self.unknowns - reach, self.unknowns + reach, strict=True)
+        return {key: (float(one.value(low)), float(one.value(high))) for (key, one), low, high in ends}
+
+    def table(self) -> Any:
+        """A row for each parameter, with its value, the ends of its 95 % interval, its bounds and
+        what it does to its key: a `pandas.DataFrame`, or a numpy record array.
+        """
+        ends, free = list(self.intervals().values()), self.parameters.values()
+        return frame(
+            {
+                "parameter": list(self.parameters),
+                "value": list(self.values.values()),
+                "lowest": [low for low, _ in ends],
+                "highest": [high for _, high in ends],
+                "low": [one.low for one in free],
+                "high": [one.high for one in free],
+                "apply": [one.apply for one in free],
+            }
+        )
+
+    def __repr__(self) -> str:
+        """Values with intervals, how well they explain the data, and what is doubtful."""
+        lines = [f"FitResult of {self._title}"]
+        lines += [f"  {key} = {text}" for key, text in self._rows]
+        return "\n".join([*lines, *(f"  Warning: {warning}" for warning in self.warnings)])
+
+    def _repr_html_(self) -> str:
+        """For notebooks: the same as a small table."""
+        warnings = [("warning", warning) for warning in self.warnings]
+        return table(f"Fit of {self._title}", [*self._rows, *warnings])
+
+    @property
+    def _title(self) -> str:
+        count, values = len(self.values), len(self.measured)
+        size = f"{self.rms:.3g} sd" if self.provenance.get("sd") else f"{100.0 * self.rms:.3g} %"
+        return f"{count} parameter{'s' * (count > 1)} to {values} values, rms residual {size}"
+
+    @property
+    def _rows(self) -> list[tuple[str, str]]:
+        rows = []
+        for (key, one), (low, high) in zip(self.parameters.items(), self.intervals().values(), strict=True):
+            kind = "" if one.apply == "value" else f" as {one.apply}"
+            known = (
+                f"{low:.3g} to {high:.3g} with 95 % confidence" if math.isfinite(high) else "not determined"
+            )
+            rows.append((key, f"{self.values[key]:.4g}{kind} ({known})"))
+        return rows
+
+    def save(self, path: str | Path) -> None:
+        """Write everything to one JSON file, in one step. Raises StorageError when the disk
+        refuses.
+        """
+        content: dict[str, Any] = {"format": FORMAT}
+        content |= {name: getattr(self, name) for name in PLAIN}
+        content |= {name: _listed(getattr(self, name)) for name in ARRAYS}
+        content["parameters"] = {key: vars(one) for key, one in self.parameters.items()}
+        content["paths"] = str(self.paths)
+        write_text(path, json.dumps(content, indent=1, allow_nan=False) + "\n")
+
+
+def load(path: str | Path) -> FitResult:
+    """Read what `FitResult.save` wrote. Raises InputError for any other or damaged file."""
+    allowed = "a file written by FitResult.save"
+    try:
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        if content.pop("format") != FORMAT:
+            raise ValueError("another format")
+        arrays: dict[str, Any] = {name: np.array(content.pop(name), dtype=float) for name in ARRAYS}
+        arrays["errors"][np.isnan(arrays["errors"])] = np.inf
+        parameters = {key: Parameter(**one) for key, one in content.pop("parameters").items()}
+        warnings, paths = tuple(content.pop("warnings")), Path(content.pop("paths"))
+        return FitResult(parameters=parameters, warnings=warnings, paths=paths, **arrays, **content)
+    except OSError as error:
+        raise InputError("fit", f"{path} ({error.strerror})", allowed) from error
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
+        raise InputError("fit", f"{path}, damaged or of another kind: {error}", allowed) from error
+
+
+def _listed(values: Floats) -> Any:
+    """Numbers as lists, None where they are not finite."""
+    if np.ndim(values):
+        return [_listed(value) for value in values]
+    return float(values) if math.isfinite(values) else None

@@ -1,0 +1,116 @@
+"""The runs of a fit: many scenes at once, none of them twice, in a folder that remembers them.
+
+A run is known by the fingerprint of its scene, of what is asked of it and of the version. Those of
+a folder are read instead of computed, so that a fit that was interrupted is there again in no time:
+its steps follow from the numbers alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import BrokenExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import evfem
+from evfem.calibration.measured import Question
+from evfem.common.digest import digest
+from evfem.errors import InputError
+from evfem.scene.file import loads
+from evfem.sweeps.folder import Answer, SweepFolder
+from evfem.sweeps.pools import Open, Pool
+from evfem.sweeps.run import answered, compute
+
+Job = tuple[str, str, tuple[Question, ...]]  # scene as text, folder of its paths, what is asked
+
+
+def work(job: Job) -> Answer:
+    """Run one scene and ask it all questions; whatever happens to it is in the answer."""
+    text, folder, questions = job
+    return answered(
+        text, folder, lambda result: {k: v for q in questions for k, v in q.answers(result).items()}
+    )
+
+
+class OpenPool:
+    """A pool that stays open from one batch of runs to the next; where it broke, a new one."""
+
+    def __init__(self, opener: Open, stack: ExitStack) -> None:
+        self.opener, self.stack = opener, stack
+        self.pool: Pool | None = None
+
+    @contextmanager
+    def __call__(self) -> Iterator[Pool]:
+        """The pool, opened if need be."""
+        if self.pool is not None:
+            try:
+                self.pool.executor.submit(bool, None).result()
+            except BrokenExecutor:
+                self.pool = None
+        if self.pool is None:
+            self.pool = self.stack.enter_context(self.opener())
+        yield self.pool
+
+
+@dataclass
+class Runs:
+    """Answers to questions about scenes, computed by a pool, and kept in `folder` if there is one.
+
+    `paths`: where relative paths in the scenes start.
+    """
+
+    pool: Open
+    paths: Path
+    folder: SweepFolder | None
+    answers: dict[str, Answer] = field(default_factory=dict)
+    computed: int = 0
+
+    def ask(self, wanted: Sequence[tuple[str, tuple[Question, ...]]]) -> list[Answer]:
+        """The answers to each pair of a scene's text and the questions about it."""
+        jobs: dict[str, Job] = {}
+        keys = []
+        for text, questions in wanted:
+            key = self._key(text, questions)
+            keys.append(key)
+            if key not in self.answers:
+                jobs[key] = (text, str(self.paths), questions)
+        compute(work, jobs, self.pool, self._keep)
+        return [self.answers[key] for key in keys]
+
+    def _key(self, text: str, questions: tuple[Question, ...]) -> str:
+        try:
+            scene = loads(text, self.paths).digest()
+        except InputError as error:
+            key = digest((text, "refused"))
+            self.answers[key] = Answer("refused", 0.0, str(error), {})
+            return key
+        key = digest((scene, questions, evfem.__version__))
+        if key not in self.answers and self.folder is not None:
+            kept = self.folder.read(key)
+            if kept is not None:
+                self.answers[key] = kept
+        return key
+
+    def _keep(self, key: str, answer: Answer) -> None:
+        self.computed += 1
+        if self.folder is not None:
+            self.folder.write(key, answer)
+        self.answers[key] = answer
+
+
+def grouped(
+    wanted: Sequence[tuple[Mapping[str, Any], Question]],
+) -> list[tuple[Mapping[str, Any], tuple[Question, ...]]]:
+    """Questions about the same run, put together.
+
+    >>> from evfem.calibration.measured import Single
+    >>> a, b = Single("normal_force.last"), Single("contact_width.last")
+    >>> [len(questions) for _, questions in grouped([({}, a), ({"surface.y": 0.0}, a), ({}, b)])]
+    [2, 1]
+    """
+    found: dict[str, tuple[Mapping[str, Any], list[Question]]] = {}
+    for keys, question in wanted:
+        found.setdefault(digest(dict(keys)), (keys, []))[1].append(question)
+    return [(keys, tuple(questions)) for keys, questions in found.values()]

@@ -1,0 +1,236 @@
+r"""Voltage as a function of time: a sine, a carrier with an envelope, samples at a rate.
+
+The force laws take the voltage of the moment, squared, so that the attraction has other frequencies
+than the voltage. With w = 2 pi f, on a gap that does not change::
+
+    Sine      U = B + A sin w t             U^2 = B^2 + A^2/2 + 2 A B sin w t - (A^2/2) cos 2 w t
+    Carrier   U = E(t) sin w t              U^2 = (E^2/2) (1 - cos 2 w t)
+
+A sine without bias attracts at twice its frequency; with the bias B the part at w is 4 B/A times
+that at 2 w. A carrier whose cycles are much shorter than the steps acts by its mean, E^2/2; with
+the envelope E = E_0 (1 + m sin W t), which is amplitude modulation, that is
+
+    E^2/2 = (E_0^2/2) (1 + m^2/2 + 2 m sin W t - (m^2/2) cos 2 W t)
+
+Units: V, s, Hz; phases in rad. Time is that of the run: 0 at its start, and standing still in
+motions that take none. Any object with the methods of `evfem.protocols.TimeSignal` is a signal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import Values, Within, above, check_fields, number, plain, real, set_frozen
+from evfem.common.storage import write_text
+from evfem.common.tables import MOST_ROWS, numbers, read_columns
+from evfem.electrostatics import wav
+from evfem.errors import ABSENT, InputError, quoted
+from evfem.protocols import TimeSignal
+
+HEADER = ["time", "voltage"]
+#: largest voltage (V), and frequency and rate (Hz)
+LARGEST, FASTEST = 1e6, 1e9
+#: share of the fluctuation's power that lies below the highest frequency of samples
+POWER = 0.95
+#: largest difference of two spacings of evenly spaced times, as a share of the spacing
+EVEN = 1e-3
+
+_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
+_AMPLITUDE = number(f"a voltage in V from 0 to {LARGEST:g}", Within(0.0, LARGEST))
+_BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-LARGEST, LARGEST))
+_PHASE = number("a phase in rad", Within())
+_RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
+_START = number("a time in s", Within())
+_ENVELOPE = "a voltage in V, or a signal in time that is called with times"
+
+
+@dataclass(frozen=True)
+class Sine:
+    """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`) in V; frequency in Hz, phase in rad.
+
+    >>> Sine(frequency=50.0, amplitude=100.0, bias=20.0)(0.005)
+    120.0
+    """
+
+    frequency: float = field(metadata=_FREQUENCY)
+    amplitude: float = field(metadata=_AMPLITUDE)
+    bias: float = field(default=0.0, metadata=_BIAS)
+    phase: float = field(default=0.0, metadata=_PHASE)
+    kind = "sine"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude (V)."""
+        return abs(self.bias) + self.amplitude
+
+    @property
+    def highest_frequency(self) -> float:
+        """Its frequency (Hz)."""
+        return self.frequency
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) at `time` (s, any shape)."""
+        turns = 2.0 * np.pi * self.frequency * np.asarray(time) + self.phase
+        return plain(self.bias + self.amplitude * np.sin(turns))
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """`envelope` times sin(2 pi `frequency` t), in V: a carrier, modulated where the envelope is a
+    signal.
+
+    With `resolved` False it is the root mean square over the carrier's cycles instead, envelope /
+    sqrt(2): the steps need only resolve the envelope, and a law proportional to the squared
+    voltage gives the mean attraction exactly.
+
+    >>> hum = Carrier(10_000.0, envelope=Sine(75.0, amplitude=50.0, bias=100.0))
+    >>> hum.largest, hum.highest_frequency
+    (150.0, 10075.0)
+    >>> mean = Carrier(10_000.0, envelope=Sine(75.0, amplitude=50.0, bias=100.0), resolved=False)
+    >>> round(mean(0.0), 3), mean.highest_frequency
+    (70.711, 75.0)
+    """
+
+    frequency: float = field(metadata=_FREQUENCY)
+    envelope: Any = field(metadata={"allowed": _ENVELOPE})
+    resolved: bool = True
+    kind = "carrier"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not isinstance(self.envelope, TimeSignal):
+            envelope = real("envelope", self.envelope, _ENVELOPE, Within(0.0, LARGEST))
+            set_frozen(self, envelope=envelope)
+        if not isinstance(self.resolved, bool):
+            raise InputError("resolved", quoted(self.resolved), "true or false")
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude (V)."""
+        height = float(self.envelope.largest if isinstance(self.envelope, TimeSignal) else self.envelope)
+        return height if self.resolved else height / np.sqrt(2.0)
+
+    @property
+    def highest_frequency(self) -> float:
+        """That of the envelope, plus the carrier's where it is resolved (Hz)."""
+        slow = self.envelope.highest_frequency if isinstance(self.envelope, TimeSignal) else 0.0
+        return float(slow + self.frequency * self.resolved)
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) at `time` (s, any shape)."""
+        time = np.asarray(time)
+        height = self.envelope(time) if isinstance(self.envelope, TimeSignal) else self.envelope
+        swing = np.sin(2.0 * np.pi * self.frequency * time) if self.resolved else np.sqrt(0.5)
+        return plain(np.asarray(height * swing) + np.zeros_like(time, dtype=float))
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """Samples `voltage` (V, one axis) at `rate` (Hz), the first one at the time `start` (s): linear
+    between them.
+
+    Before the first and after the last sample it is constant; with `repeat` it starts again one
+    period after the last sample, as long as it lasts.
+
+    >>> steps = Sampled([0.0, 100.0, 0.0], rate=1000.0)
+    >>> steps(0.0005), steps(0.5)
+    (50.0, 0.0)
+    >>> Sampled([0.0, 100.0], rate=4.0, repeat=True)(100.125)
+    50.0
+    """
+
+    voltage: Any
+    rate: float = field(metadata=_RATE)
+    start: float = field(default=0.0, metadata=_START)
+    repeat: bool = False
+    kind = "sampled"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        voltage = numbers("voltage", self.voltage, "samples in V")
+        if not 0 < voltage.size <= MOST_ROWS:
+            raise InputError("voltage", f"{voltage.size} samples", f"1 to {MOST_ROWS} samples")
+        if np.abs(voltage).max() > LARGEST:
+            raise InputError("voltage", f"{voltage[np.argmax(np.abs(voltage))]:g}", _BIAS["allowed"])
+        if not isinstance(self.repeat, bool):
+            raise InputError("repeat", quoted(self.repeat), "true or false")
+        set_frozen(self, voltage=voltage)
+
+    def __repr__(self) -> str:
+        low, high = self.voltage.min(), self.voltage.max()
+        text = f"{self.voltage.size} samples at {self.rate:g} Hz, {low:.4g} to {high:.4g} V"
+        return f"Sampled({text}{', repeated' if self.repeat else ''})"
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude (V)."""
+        return float(np.abs(self.voltage).max())
+
+    @property
+    def highest_frequency(self) -> float:
+        """Frequency (Hz) below which 95 % of the power of the fluctuation lies; 0 for a constant."""
+        fluctuation = self.voltage - self.voltage.mean()
+        power = np.abs(np.fft.rfft(fluctuation)) ** 2
+        total = np.cumsum(power)
+        if not total[-1] > 0.0:
+            return 0.0
+        return float(np.searchsorted(total, POWER * total[-1]) * self.rate / self.voltage.size)
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) at `time` (s, any shape)."""
+        place = (np.asarray(time, dtype=float) - self.start) * self.rate
+        size = self.voltage.size
+        return plain(np.interp(place, np.arange(size), self.voltage, period=size if self.repeat else None))
+
+    @classmethod
+    def from_csv(cls, path: str | Path, *, repeat: bool = False) -> Sampled:
+        """Read a file with the header ``time,voltage`` and a row in s and V for each sample.
+
+        Raises InputError for a missing file, another header, a row that is not two numbers, and
+        times that are not evenly spaced.
+        """
+        time, voltage = read_columns(Path(path), HEADER, "file")
+        if time.size < 2:
+            raise InputError("file", f"{path} with {time.size} rows", "at least two rows")
+        spacing = float(time[-1] - time[0]) / (time.size - 1)
+        if not (spacing > 0.0 and np.abs(np.diff(time) - spacing).max() <= EVEN * spacing):
+            raise InputError("file", f"{path}, whose times are not evenly spaced", "times in equal steps")
+        return cls(voltage, 1.0 / spacing, float(time[0]), repeat)
+
+    @classmethod
+    def from_wav(
+        cls, path: str | Path, full_scale: float | None = None, *, start: float = 0.0, repeat: bool = False
+    ) -> Sampled:
+        """Read a WAV with one channel; `full_scale` (V) is the voltage of the largest sample.
+
+        A file that evfem wrote says so itself; one with a carrier is the voltage of the moment.
+        Raises InputError for a missing, cut off or foreign file, for one without either full
+        scale, and for more than 1,000,000 samples.
+        """
+        allowed = "a WAV with one channel"
+        data = wav.read_bytes(Path(path), allowed)
+        try:
+            rate, shares = wav.shares(data)
+        except ValueError:
+            given = f"{path}, cut off, with several channels or of another kind"
+            raise InputError("path", given, allowed) from None
+        if shares.size > MOST_ROWS:
+            raise InputError("path", f"{path} with {shares.size} samples", f"at most {MOST_ROWS} of them")
+        volts = wav.full_scale(data) if full_scale is None else full_scale
+        if volts is None:
+            needed = "the voltage of the largest sample, in V, for a WAV that evfem did not write"
+            raise InputError("full_scale", ABSENT, needed)
+        return cls(shares * above("full_scale", volts, 0.0, "a voltage in V above zero"), rate, start, repeat)
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the file that `from_csv` reads back."""
+        time = self.start + np.arange(self.voltage.size) / self.rate
+        rows = (f"{t!r},{u!r}\n" for t, u in zip(time.tolist(), self.voltage.tolist(), strict=True))
+        write_text(path, ",".join(HEADER) + "\n" + "".join(rows))

@@ -1,0 +1,90 @@
+"""One `load` for every file that evfem reads or writes, by what is in it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from evfem.common.storage import format_of
+from evfem.errors import InputError
+
+Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep or Mesh
+ALLOWED = (
+    "a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene or a sweep (.toml), "
+    "a mesh (.vtu, .msh)"
+)
+
+
+def load(path: str | Path) -> Found:
+    """What is in a file: a `Result` or a `FastModel` (as their `save` wrote them, under any name),
+    a `FitResult` (.json), a `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene`
+    or a `Sweep` (.toml), a `Mesh` (.vtu, .msh).
+
+    Raises InputError for any other or a damaged file, StorageError when the disk refuses.
+
+    >>> import evfem as ev
+    >>> ev.VoltageProfile([0.0, 5.0], [100.0, 400.0]).to_csv("ramp.csv")
+    >>> load("ramp.csv")(2.5)
+    250.0
+    """
+    if not isinstance(path, (str, Path)):
+        raise InputError("path", path, f"the path of {ALLOWED}")
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("path", f"{path}, which is no file", ALLOWED)
+    reader = READERS.get(path.suffix.lower())
+    return _archive(path) if reader is None else reader(path)
+
+
+def _archive(path: Path) -> Found:
+    from evfem.fast.model import FORMAT, FastModel
+    from evfem.simulation.result import CHECKPOINT_FORMAT, RESULT_FORMAT
+    from evfem.simulation.result import load as load_result
+
+    form = format_of(path)
+    if form == FORMAT:
+        return FastModel.load(path)
+    if form == CHECKPOINT_FORMAT:
+        raise InputError(
+            "path", f"{path}, the checkpoint of a run", "`evfem run --resume`, which goes on there"
+        )
+    if form != RESULT_FORMAT and path.suffix.lower() != ".npz":
+        raise InputError("path", f"{path}, of another kind", ALLOWED)
+    return load_result(path)
+
+
+def _signal(path: Path) -> Found:
+    from evfem.electrostatics.signalfile import read_voltage
+
+    return read_voltage(path)
+
+
+def _tables(path: Path) -> Found:
+    from evfem.scene import file as scenefile
+    from evfem.sweeps import file as sweepfile
+
+    tables = scenefile.tables_of("scene", scenefile.read_text("scene", path))
+    return sweepfile.load(path) if "scene" in tables else scenefile.load(path)
+
+
+def _fit(path: Path) -> Found:
+    from evfem.calibration.result import load
+
+    return load(path)
+
+
+def _mesh(path: Path) -> Found:
+    from evfem.mesh.file import read
+
+    return read(path)
+
+
+READERS: Mapping[str, Callable[[Path], Found]] = {
+    ".csv": _signal,
+    ".json": _fit,
+    ".wav": _signal,
+    ".toml": _tables,
+    ".vtu": _mesh,
+    ".msh": _mesh,
+}

@@ -1,0 +1,189 @@
+"""Fields of a frame as they are coloured: values, smooth colours, scales.
+
+A field of cells becomes smooth by nodal averages, weighted by the area of the cells; on a border
+between regions each region keeps its own average, for stress jumps there. Colours between nodes
+are linear in triangles.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.plotting.colours import BOTH_SIGNS, ONE_SIGN, STATUS
+from evfem.simulation.result import POINT_FIELDS, Frame, Result
+
+STRESSES = tuple(f"cauchy_stress_{c}" for c in ("xx", "yy", "zz", "xy"))
+CELL_FIELDS = ("von_mises", *STRESSES, "J")
+FIELDS = (*CELL_FIELDS, "displacement", *POINT_FIELDS)
+#: fields whose colours begin at 0; fields with a sign, and the value in their middle, which is white
+FROM_ZERO = ("von_mises", "gap", "contact_pressure", "electrostatic_traction")
+MIDDLES = {**dict.fromkeys(STRESSES, 0.0), "J": 1.0, "shear_traction": 0.0}
+Window = tuple[float, float, float, float]
+
+
+def values_of(frame: Frame, field: str) -> Floats:
+    """Values of one of `FIELDS` in the cells (E,) or at the nodes (N,)."""
+    if field in STRESSES:
+        return frame.cauchy_stress[:, STRESSES.index(field)]
+    if field == "displacement":
+        return np.hypot(*frame.displacement.T)
+    return getattr(frame, field)
+
+
+def check_field(field: str) -> None:
+    """Raises InputError unless the field is one of `FIELDS`."""
+    if field not in FIELDS:
+        raise InputError("field", field, " | ".join(FIELDS))
+
+
+def frame_of(result: Result, number: int) -> Frame:
+    """A frame by its number among those kept, from the end if negative; InputError for another."""
+    if not -len(result.frames) <= number < len(result.frames):
+        raise InputError("frame", number, f"the number of one of the {len(result.frames)} frames kept")
+    return result.frames[number]
+
+
+def rounds(mesh: Mesh) -> Ints:
+    """Nodes of each cell once around (E, corners or twice as many), middle nodes between their
+    corners.
+    """
+    m = mesh.corners
+    if mesh.order == 1:
+        return mesh.cells
+    return mesh.cells[:, np.column_stack([np.arange(m), m + np.arange(m)]).ravel()]
+
+
+def areas(outlines: Floats) -> Floats:
+    """Areas (E,) of polygons (E, n, 2), positive if they go round counter-clockwise.
+
+    >>> areas(np.array([[[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]]])).tolist()
+    [2.0]
+    """
+    x, y = outlines[..., 0], outlines[..., 1]
+    return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1), axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Patches:
+    """Triangles (T, 3) between V vertices: every region has vertices of its own.
+
+    `nodes` (V,) are the mesh nodes of the vertices, `cells` (E, n) the vertices of each cell in the
+    order of the mesh.
+    """
+
+    nodes: Ints
+    triangles: Ints
+    cells: Ints
+
+    def averages(self, values: Floats, weights: Floats) -> Floats:
+        """Weighted averages (V,) of what the cells around a vertex say (E,)."""
+        weight = np.broadcast_to(weights[:, None], self.cells.shape).ravel()
+        value = np.broadcast_to(values[:, None], self.cells.shape).ravel()
+        size, vertices = self.nodes.size, self.cells.ravel()
+        return np.bincount(vertices, weight * value, size) / np.bincount(vertices, weight, size)
+
+
+def patches(mesh: Mesh) -> Patches:
+    """The cells of a mesh in triangles through all of their nodes.
+
+    >>> import numpy as np
+    >>> points = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [2.0, 0.0], [2.0, 1.0]])
+    >>> cells = np.array([[0, 1, 2, 3], [1, 4, 5, 2]])
+    >>> two = patches(Mesh(points, cells, "quad", np.array([0, 1]), {"soft": 0, "hard": 1}))
+    >>> len(two.nodes), len(two.triangles)  # nodes 1 and 2 belong to both regions
+    (8, 4)
+    >>> two.averages(np.array([1.0, 3.0]), np.ones(2)).tolist()
+    [1.0, 1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0]
+    """
+    count = len(mesh.points)
+    owned, vertices = np.unique(mesh.cells + count * mesh.region[:, None], return_inverse=True)
+    cells = vertices.reshape(mesh.cells.shape)
+    if mesh.kind == "quad9":  # a fan around the middle node
+        fans = [[8, i, 4 + i] for i in range(4)] + [[8, 4 + i, (i + 1) % 4] for i in range(4)]
+    elif mesh.kind == "triangle6":  # three corners and the triangle of middle nodes
+        fans = [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]]
+    else:
+        fans = [[0, i, i + 1] for i in range(1, mesh.corners - 1)]
+    return Patches(owned % count, np.concatenate([cells[:, fan] for fan in fans]), cells)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Colours of a field: map, lowest and highest value, and at which ends values lie beyond."""
+
+    cmap: str
+    low: float
+    high: float
+    extend: str = "neither"
+
+    def colour_map(self) -> Any:
+        """The map of matplotlib."""
+        import matplotlib
+        from matplotlib.colors import ListedColormap
+
+        if self.cmap == "status":
+            return ListedColormap(list(STATUS.values()))
+        return matplotlib.colormaps[self.cmap]
+
+    def apply(self, mapped: Any) -> None:
+        """Give an artist with values these colours."""
+        mapped.set_cmap(self.colour_map())
+        mapped.set_clim(self.low, self.high)
+
+
+def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float | None = None) -> Scale:
+    """The scale of a field for the values that are shown, from their smallest to their largest.
+
+    A wished end takes the place of one of these. A field with a sign has as much of its colours
+    on either side of its middle, unless both ends are wished. Raises InputError unless vmin is
+    below vmax.
+
+    >>> scale_of("von_mises", np.array([0.1, 0.4]), vmin=0.0)
+    Scale(cmap='viridis', low=0.0, high=0.4, extend='neither')
+    >>> scale_of("cauchy_stress_yy", np.array([-0.4, 0.1])).high
+    0.4
+    """
+    if field == "contact_status":
+        return Scale("status", -0.5, len(STATUS) - 0.5)
+    if vmin is not None and vmax is not None and not vmin < vmax:
+        raise InputError("vmin", vmin, f"a value below vmax, which is {vmax:g}")
+    least, most = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
+    least = min(least, 0.0) if field in FROM_ZERO else least
+    middle = MIDDLES.get(field)
+    if middle is None:
+        low, high = (least if vmin is None else vmin), (most if vmax is None else vmax)
+    else:
+        reach = max(most - middle, middle - least) or 1.0
+        wished = vmin if vmax is None else vmax
+        reach = reach if wished is None else abs(wished - middle)
+        low, high = (middle - reach if vmin is None else vmin), (middle + reach if vmax is None else vmax)
+    if not low < high:  # one value throughout, or all beyond a wished end
+        low, high = (high - 1.0, high) if vmin is None and vmax is not None else (low, low + 1.0)
+    slack = 1e-9 * (high - low)
+    ends = (least < low - slack, most > high + slack)
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}.get(ends, "neither")
+    return Scale(ONE_SIGN if middle is None else BOTH_SIGNS, low, high, extend)
+
+
+def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats:
+    """Values inside a window (left, right, bottom, top in mm): of the cells whose middle is there,
+    of nodes, of the pad's nodes for a field of the pad.
+    """
+    place, values = mesh.points + frame.displacement, values_of(frame, field)
+    if field in CELL_FIELDS:
+        return values[within(place[mesh.cells].mean(axis=1), window)]
+    there = within(place, window)
+    return values[there & np.isfinite(frame.gap)] if field in POINT_FIELDS else values[there]
+
+
+def within(place: Floats, window: Window) -> Any:
+    """Which of the points (N, 2) are in the window (N,)."""
+    left, right, bottom, top = window
+    x, y = place.T
+    return (x >= left) & (x <= right) & (y >= bottom) & (y <= top)

@@ -1,0 +1,109 @@
+"""Figures: where a picture is drawn, and how it shows itself.
+
+A figure is made without pyplot, so that nothing stays open and no global state changes. Where
+pyplot has been imported and can show figures, it knows the figure, as it knows one of its own:
+`plt.show()` shows it, a notebook shows it below its cell. Elsewhere the last line of a notebook's
+cell shows it; never both.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: backends of pyplot that can only write files; what pyplot then knew would stay open for ever
+FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
+WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
+SLENDER = 25.0  # height of a colour bar over its width
+
+
+class Panels(tuple["Axes", ...]):
+    """The axes of a picture with several panels, from the top; `figure` is the figure of all.
+
+    In a notebook it shows itself as its picture.
+    """
+
+    @property
+    def figure(self) -> Figure:
+        """The figure that the panels are in."""
+        return whole_figure(self[0])
+
+    def _repr_png_(self) -> bytes | None:
+        return _png(self.figure)
+
+
+def new_figure(height: float = HEIGHT, width: float = WIDTH) -> Figure:
+    """An empty figure of so many inches whose parts keep clear of each other."""
+    size = (width, height)
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None and pyplot.get_backend().lower() not in FILES_ONLY:
+        return pyplot.figure(figsize=size, layout="constrained")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def axes_or_new(ax: Axes | None, height: float = HEIGHT) -> Axes:
+    """The given axes, or those of a new figure, which show themselves in a notebook."""
+    if ax is not None:
+        return ax
+    figure = new_figure(height)
+    ax = figure.add_subplot()
+    ax._repr_png_ = partial(_png, figure)  # type: ignore[attr-defined]
+    return ax
+
+
+def new_panels(rows: int, height: float) -> Panels:
+    """Panels below each other that share their abscissa, `height` inches in all."""
+    axes = new_figure(height).subplots(rows, 1, sharex=True, squeeze=False)
+    return Panels(axes[:, 0])
+
+
+def whole_figure(ax: Axes) -> Figure:
+    """The figure of axes, the outermost one where it has parts."""
+    return ax.figure.figure
+
+
+def _png(figure: Figure) -> bytes | None:
+    """The picture for a notebook; None while pyplot holds the figure and shows it itself."""
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    manager = figure.canvas.manager
+    if pyplot is not None and manager is not None and pyplot.fignum_exists(manager.num):
+        return None
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", dpi=figure.dpi)
+    return buffer.getvalue()
+
+
+class Beside:
+    """Keeps a colour bar exactly as high as the axes beside it, also where these are in true
+    proportions and so smaller than their place.
+    """
+
+    def __init__(self, ax: Axes) -> None:
+        self.ax = ax
+
+    def __call__(self, bar: Any, renderer: Any) -> Any:
+        """Where the bar is: the right neighbour of the axes, in parts of the figure."""
+        from matplotlib.transforms import Bbox
+
+        figure, box = whole_figure(self.ax), self.ax.get_position()
+        across = figure.get_figheight() / figure.get_figwidth() * box.height / SLENDER
+        return Bbox.from_bounds(box.x1 + 0.012, box.y0, across, box.height)
+
+
+def add_colorbar(mapped: Any, ax: Axes, label: str, extend: str = "neither") -> Any:
+    """A colour bar at the right of the axes, as high as they are."""
+    from matplotlib.colorbar import make_axes
+
+    place, options = make_axes(ax, pad=0.02, fraction=0.05, aspect=SLENDER, anchor=(0.0, 0.5))
+    place.set_axes_locator(Beside(ax))
+    bar = ax.figure.colorbar(mapped, cax=place, label=label, extend=extend, **options)
+    bar.ax.ticklabel_format(axis="y", scilimits=(-3, 4))
+    return bar

@@ -1,0 +1,234 @@
+"""The deformed finger over its surface, coloured by a field."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.plotting.colours import EDGE, GROUND, STATUS
+from evfem.plotting.fields import (
+    Scale,
+    Window,
+    areas,
+    check_field,
+    frame_of,
+    patches,
+    rounds,
+    scale_of,
+    shown_values,
+    values_of,
+    within,
+)
+from evfem.plotting.figures import WIDTH, add_colorbar, axes_or_new
+from evfem.plotting.ground import Height, height_of
+from evfem.plotting.labels import field_label
+from evfem.plotting.outline import TRACTIONS, draw_arrows, draw_outline
+from evfem.simulation.result import POINT_FIELDS, Frame, Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Near = Literal["contact"] | Window | None
+#: what is shown below the surface and beside the finger, as a share of the picture or the finger
+BELOW, MARGIN = 0.16, 0.03
+#: width of a close-up over that of the contact; its height over its width, for the tissue and the pad
+WIDER, OF_TISSUE, OF_PAD = 1.2, 0.42, 0.3
+
+
+def deformed(
+    result: Result,
+    field: str = "von_mises",
+    frame: int = -1,
+    ax: Axes | None = None,
+    *,
+    near: Near = None,
+    vmin: float | None = None,
+    vmax: float | None = None,
+    smooth: bool = True,
+) -> Axes:
+    """The deformed finger of a frame over its surface, coloured by a field (see `FIELDS`), in true
+    proportions.
+
+    A field of the tissue (stress, `J`, `displacement`) fills it, with `smooth` colours by nodal
+    averages in each region, or one colour for each cell. A field of the pad (`contact_pressure`,
+    `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`) colours its outline;
+    tractions on the finger are arrows too, the longest where they are largest.
+
+    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
+    bottom, top) in mm shows that. Colours go from `vmin` to `vmax`, by default over what is shown.
+    Thin lines are borders of regions. Returns the axes; raises InputError for another field or
+    frame.
+    """
+    check_field(field)
+    view = View(result, frame_of(result, frame), field)
+    window = view.window(near)
+    scale = scale_of(field, shown_values(result.mesh, view.frame, field, window), vmin, vmax)
+    ax = axes_or_new(ax, figure_height(window))
+    mapped = view.draw(ax, window, scale, smooth)
+    ax.set_title(told(result, view.frame), fontsize="medium")
+    label_bar(add_colorbar(mapped, ax, field_label(field), scale.extend), field)
+    return ax
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A frame of a result, and the field that it is coloured by."""
+
+    result: Result
+    frame: Frame
+    field: str
+
+    @property
+    def points(self) -> Floats:
+        """Current positions (N, 2) of the nodes in mm."""
+        return self.result.mesh.points + self.frame.displacement
+
+    def window(self, near: Near) -> Window:
+        """What is shown: left, right, bottom and top in mm."""
+        if near is None:
+            return _whole(self.points, height_of(self.result, self.frame))
+        if isinstance(near, str):
+            if near != "contact":
+                raise InputError("near", near, "contact, or a window (left, right, bottom, top) in mm")
+            flat = OF_PAD if self.field in POINT_FIELDS else OF_TISSUE
+            return _close(self.points, self.frame, height_of(self.result, self.frame), flat)
+        return checked_window(near)
+
+    def draw(self, ax: Axes, window: Window, scale: Scale, smooth: bool = True) -> Any:
+        """Draw the view into axes, and return what a colour bar needs."""
+        mesh, points = self.result.mesh, self.points
+        height = height_of(self.result, self.frame)
+        if self.field in POINT_FIELDS:
+            mapped = draw_outline(ax, mesh, self.frame, self.field, scale)
+        else:
+            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, smooth)
+        _draw_borders(ax, mesh, points)
+        _name_bone(ax, mesh, points, window)
+        _draw_surface(ax, height, window)
+        if self.field in TRACTIONS:
+            draw_arrows(ax, mesh, self.frame, self.field, height, window)
+        ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
+        return mapped
+
+
+def checked_window(window: Any) -> Window:
+    """A window of four numbers, left before right and bottom before top."""
+    allowed = "contact, or a window (left, right, bottom, top) in mm"
+    try:
+        left, right, bottom, top = (float(value) for value in window)
+    except (TypeError, ValueError) as error:
+        raise InputError("near", window, allowed) from error
+    if not (left < right and bottom < top and np.isfinite([left, right, bottom, top]).all()):
+        raise InputError("near", window, allowed)
+    return left, right, bottom, top
+
+
+def _whole(points: Floats, height: Height) -> Window:
+    """The whole finger and the surface below it."""
+    (left, lowest), (right, top) = points.min(axis=0), points.max(axis=0)
+    x = np.linspace(left, right, 500)
+    aside, tall = MARGIN * (right - left), top - lowest
+    ground = max(float(height(x).min()), lowest - tall)
+    return left - aside, right + aside, ground - 0.6 * BELOW * tall, top + MARGIN * tall
+
+
+def _close(points: Floats, frame: Frame, height: Height, flat: float) -> Window:
+    """What touches, or the node with the smallest gap; `flat` is the window's height over its
+    width.
+    """
+    touching = frame.contact_status > 0
+    if not touching.any():
+        touching = frame.gap == np.nanmin(frame.gap)
+    left, right = points[touching, 0].min(), points[touching, 0].max()
+    least = max(0.05 * np.ptp(points[:, 0]), 2.0 * float(np.nanmin(frame.gap)))
+    middle, half = 0.5 * (left + right), max(0.5 * WIDER * (right - left), least)
+    x = np.linspace(middle - half, middle + half, 500)
+    tall = 2.0 * half * flat
+    bottom = float(height(x).min()) - BELOW * tall
+    return middle - half, middle + half, bottom, bottom + tall
+
+
+def figure_height(window: Window) -> float:
+    """Height in inches of a figure that a window fills, with its labels and a colour bar."""
+    left, right, bottom, top = window
+    return float(np.clip((WIDTH - 1.3) * (top - bottom) / (right - left) + 0.85, 2.2, 9.0))
+
+
+def told(result: Result, frame: Frame) -> str:
+    """Where the finger of a frame is, in a line."""
+    rows = np.flatnonzero(result.step == frame.step)
+    text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
+    if rows.size:
+        row = rows[0]
+        text += f", load {result.applied_force[row] + 0.0:.3g} N/mm"
+        text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
+    return text
+
+
+def label_bar(bar: Any, field: str) -> None:
+    """The statuses by their names."""
+    if field == "contact_status":
+        bar.set_ticks(range(len(STATUS)), labels=list(STATUS))
+        bar.ax.tick_params(length=0)
+
+
+def _draw_tissue(ax: Axes, mesh: Mesh, points: Floats, values: Floats, scale: Scale, smooth: bool) -> Any:
+    """Every cell in its colour, or colours that change from node to node."""
+    of_cells = len(values) == len(mesh.cells)
+    outlines = points[rounds(mesh)]
+    if not smooth:
+        from matplotlib.collections import PolyCollection
+
+        array = values if of_cells else values[mesh.cells].mean(axis=1)
+        mapped: Any = PolyCollection(list(outlines), array=array, edgecolors="face", linewidths=0.3)
+        ax.add_collection(mapped)
+    else:
+        from matplotlib.tri import Triangulation
+
+        pieces = patches(mesh)
+        array = pieces.averages(values, areas(outlines)) if of_cells else values[pieces.nodes]
+        x, y = points[pieces.nodes].T
+        mapped = ax.tripcolor(Triangulation(x, y, pieces.triangles), array, shading="gouraud")
+    scale.apply(mapped)
+    mapped.set_rasterized(True)
+    return mapped
+
+
+def _draw_borders(ax: Axes, mesh: Mesh, points: Floats) -> None:
+    """The outer outline and the lines between regions."""
+    from matplotlib.collections import LineCollection
+
+    edges = mesh.cell_edges.reshape(-1, mesh.cell_edges.shape[-1])
+    owner = np.repeat(mesh.region, mesh.corners)
+    number = mesh.edges[1].ravel()
+    low, high = np.full(number.max() + 1, np.inf), np.full(number.max() + 1, -np.inf)
+    np.minimum.at(low, number, owner)
+    np.maximum.at(high, number, owner)
+    first = np.unique(number, return_index=True)[1]
+    border = edges[first[(np.bincount(number) == 1) | (low < high)]]
+    order = [0, 2, 1] if mesh.order == 2 else [0, 1]
+    ax.add_collection(LineCollection(list(points[border[:, order]]), colors=EDGE, linewidths=0.5))
+
+
+def _name_bone(ax: Axes, mesh: Mesh, points: Floats, window: Window) -> None:
+    """What the hole in the middle is, where the tissue has one around the bone."""
+    edges = mesh.edges_of("bone")[:, :2] if "bone" in mesh.node_sets else np.zeros((0, 2), dtype=int)
+    around, count = np.unique(edges, return_counts=True)
+    if not count.size or np.any(count != 2):
+        return
+    middle = 0.5 * (points[around].min(axis=0) + points[around].max(axis=0))
+    if within(middle[None], window)[0]:
+        ax.text(middle[0], middle[1], "bone", ha="center", va="center", color="0.5", fontsize="small")
+
+
+def _draw_surface(ax: Axes, height: Height, window: Window) -> None:
+    """The rigid surface, filled down to the lower end of the window."""
+    x = np.linspace(window[0], window[1], 2001)
+    y = height(x)
+    ax.fill_between(x, y, min(window[2], y.min()), color=GROUND, linewidth=0.0, zorder=0.5)
+    ax.plot(x, y, color="black", linewidth=0.8, zorder=2.5)

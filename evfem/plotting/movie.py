@@ -1,0 +1,194 @@
+"""A moving picture of a result: the deformed finger frame by frame, the forces below.
+
+A .gif needs nothing beyond Pillow, which comes with matplotlib; an .mp4 needs ffmpeg. Window and
+colours are the same in every frame; a close-up goes along with the finger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from subprocess import CalledProcessError
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem.common import notices
+from evfem.common.arrays import Floats
+from evfem.common.checks import count
+from evfem.common.storage import replacing
+from evfem.errors import InputError, StorageError
+from evfem.plotting.colours import BLACK, BLUE, GREEN, VERMILION
+from evfem.plotting.curves import abscissa, forces
+from evfem.plotting.fields import Scale, Window, check_field, scale_of, shown_values
+from evfem.plotting.figures import WIDTH, add_colorbar
+from evfem.plotting.finger import Near, View, figure_height, label_bar, told
+from evfem.plotting.labels import field_label
+from evfem.simulation.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ENDINGS = (".gif", ".mp4")
+DPI, CURVES_HEIGHT = 100, 2.0  # pixels per inch; height of the forces in inches
+OF_SCALE, SHADES = 160, 12  # of the 256 colours of a .gif: those of the scale, and of each curve
+
+
+def animate(
+    result: Result,
+    path: str | Path,
+    field: str = "von_mises",
+    *,
+    near: Near = None,
+    vmin: float | None = None,
+    vmax: float | None = None,
+    fps: int = 10,
+    progress: bool = True,
+) -> Path:
+    """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return
+    the path.
+
+    Each shows the deformed finger as `deformed` does, and the forces with a mark where it is.
+    `near="contact"` goes along with the finger, as does no other window. `fps` frames are shown in
+    a second; keep more of them with `Output(every=...)`. A terminal or notebook shows a bar. The
+    file is written whole or not at all. Raises InputError for another ending, for .mp4 where
+    ffmpeg is not installed, and for a result without frames; StorageError when the disk refuses.
+    """
+    path, fps = Path(path), count("fps", fps, 60)
+    check_field(field)
+    if not result.frames:
+        raise InputError("result", "a result without frames", "a result with frames (Output(every=...))")
+    write = _writer(path)
+    movie = make_movie(result, field, near, (vmin, vmax))
+    wanted = progress and notices.drawable()
+    with replacing(path) as temporary, notices.bar(len(result.frames), "frame", wanted=wanted) as bar:
+        write(temporary, movie, fps, bar.update)
+    return path
+
+
+def _writer(path: Path) -> Callable[[Path, Movie, int, Any], None]:
+    """What writes files with this ending."""
+    if path.suffix not in ENDINGS:
+        raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
+    if not path.absolute().parent.is_dir():
+        raise StorageError(f"cannot write {path}: there is no folder {path.parent}")
+    if path.suffix == ".gif":
+        return _write_gif
+    from matplotlib.animation import FFMpegWriter
+
+    if not FFMpegWriter.isAvailable():
+        raise InputError("path", f"{path}, and no ffmpeg", "a .gif, or an .mp4 where ffmpeg is installed")
+    return _write_mp4
+
+
+def _write_gif(path: Path, movie: Movie, fps: int, update: Any) -> None:
+    """All frames with Pillow in the same 256 colours, for ever from the beginning."""
+    from PIL import Image
+    from scipy.spatial import cKDTree
+
+    pictures: list[Image.Image] = []
+    for figure in movie.frames():
+        pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
+        if not pictures:
+            colours = _palette(movie.scale, pixels)
+            tree = cKDTree(colours)
+        code, where = np.unique(pixels.astype(np.int32) @ (65536, 256, 1), return_inverse=True)
+        nearest = tree.query(np.column_stack([code >> 16, code >> 8 & 255, code & 255]))[1]
+        picture = Image.fromarray(nearest.astype(np.uint8)[where].reshape(pixels.shape[:2]))
+        picture.putpalette(colours.astype(np.uint8).tobytes())
+        pictures.append(picture)
+        update()
+    rest, duration = pictures[1:], round(1000.0 / fps)
+    pictures[0].save(path, "GIF", save_all=True, append_images=rest, duration=duration, loop=0)
+
+
+def _palette(scale: Scale, pixels: Any) -> Floats:
+    """256 colours (256, 3) from 0 to 255: those of the scale, of the curves and grey lines on
+    white, and the most frequent others of a picture.
+    """
+    from matplotlib.colors import to_rgb
+    from PIL import Image
+
+    curves = np.array([to_rgb(colour) for colour in (BLUE, VERMILION, GREEN, BLACK)])
+    paler = [1.0 - share * (1.0 - curves) for share in np.linspace(1.0, 0.0, SHADES)]
+    fixed = np.concatenate([scale.colour_map()(np.linspace(0.0, 1.0, OF_SCALE))[:, :3], *paler])
+    others = 256 - len(fixed)
+    frequent = Image.fromarray(pixels).quantize(others).convert("RGB").getcolors(others) or []
+    found = np.array([colour for _, colour in frequent], dtype=float).reshape(-1, 3)
+    return np.concatenate([(255.0 * fixed).round(), found, np.zeros((others - len(found), 3))])
+
+
+def _write_mp4(path: Path, movie: Movie, fps: int, update: Any) -> None:
+    """All frames through ffmpeg."""
+    from matplotlib.animation import FFMpegWriter
+
+    writer = FFMpegWriter(fps=fps, extra_args=["-f", "mp4"])
+    try:
+        with writer.saving(movie.figure, str(path), DPI):
+            for _ in movie.frames():
+                writer.grab_frame()
+                update()
+    except CalledProcessError as error:
+        raise StorageError(f"cannot write the .mp4: ffmpeg ended with {error.returncode}") from error
+
+
+@dataclass(frozen=True, eq=False)
+class Movie:
+    """The frames of a result, each with its window, on one scale, in one figure."""
+
+    views: list[View]
+    windows: list[Window]
+    scale: Scale
+    figure: Figure
+
+    def frames(self) -> Iterator[Figure]:
+        """The figure, drawn for one frame after the other."""
+        result, field = self.views[0].result, self.views[0].field
+        above, below = self.figure.subplots(2, 1, height_ratios=(self._share(), 1.0))
+        column = abscissa(result)
+        forces(result, column, ax=below)
+        below.get_legend().remove()  # beside the axes, where no mark passes
+        self.figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+        bar = None
+        for view, window in zip(self.views, self.windows, strict=True):
+            above.clear()
+            mapped = view.draw(above, window, self.scale)
+            above.set_title(told(result, view.frame), fontsize="medium")
+            if bar is None:
+                bar = add_colorbar(mapped, above, field_label(field), self.scale.extend)
+                label_bar(bar, field)
+            at = getattr(result, column)[result.step == view.frame.step]
+            marks = [below.axvline(x, color="0.3", linewidth=1.0) for x in at]
+            self.figure.canvas.draw()
+            self.figure.set_layout_engine("none")  # the first frame's layout is that of all
+            yield self.figure
+            for mark in marks:
+                mark.remove()
+
+    def _share(self) -> float:
+        return figure_height(self.windows[0]) / CURVES_HEIGHT
+
+
+def make_movie(result: Result, field: str, near: Near, limits: tuple[float | None, float | None]) -> Movie:
+    """Views, windows and scale of all frames of a result, and an empty figure for them."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    views = [View(result, frame, field) for frame in result.frames]
+    windows = _windows(views, near)
+    shown = [shown_values(result.mesh, v.frame, field, w) for v, w in zip(views, windows, strict=True)]
+    scale = scale_of(field, np.concatenate(shown), *limits)
+    tall = 2.0 * round(0.5 * DPI * (figure_height(windows[0]) + CURVES_HEIGHT)) / DPI  # even, for ffmpeg
+    figure = Figure(figsize=(WIDTH, tall), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return Movie(views, windows, scale, figure)
+
+
+def _windows(views: list[View], near: Near) -> list[Window]:
+    """A window for each view, all of one size: around all of them, or a close-up that goes along."""
+    found = np.array([view.window(near) for view in views])
+    x = np.array([view.frame.position for view in views]) if near == "contact" else np.zeros(len(views))
+    low = (found[:, [0, 2]] - np.column_stack([x, 0.0 * x])).min(axis=0)
+    high = (found[:, [1, 3]] - np.column_stack([x, 0.0 * x])).max(axis=0)
+    return [(low[0] + at, high[0] + at, low[1], high[1]) for at in x.tolist()]

@@ -1,0 +1,106 @@
+"""What an experiment measures of presses and slides: force over indentation, contact area over
+load, friction over what changes, and the voltage that makes it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from evfem.errors import InputError
+from evfem.plotting.curves import Results, along, checked_over, finish, named, styled
+from evfem.plotting.figures import Panels, axes_or_new, new_panels
+from evfem.plotting.labels import axis_label, column_label, values_of
+from evfem.simulation.result import Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
+    """Applied force over indentation, of the presses of one result or of several by their names."""
+    ax = axes_or_new(ax)
+    found = named(results)
+    for (name, result), colour, style in styled(found):
+        rows = _presses(result)
+        x, y = values_of(result, "indentation")[rows], values_of(result, "applied_force")[rows]
+        ax.plot(x, y, style, color=colour, label=name, marker=".")
+    _label(ax, "indentation", axis_label("applied_force"), found)
+    return ax
+
+
+def contact_area(results: Results, ax: Axes | None = None) -> Axes:
+    """Contact width over the applied force of the presses: from edge to edge, and of all that
+    touches.
+    """
+    ax = axes_or_new(ax)
+    found = named(results)
+    for (name, result), colour, _ in styled(found):
+        rows = _presses(result)
+        load = values_of(result, "applied_force")[rows]
+        for column, text, style in (
+            ("contact_width", "edge to edge", "-"),
+            ("real_contact_width", "touching", "--"),
+        ):
+            label = f"{name}, {text}" if name else text
+            ax.plot(load, values_of(result, column)[rows], style, color=colour, label=label, marker=".")
+    _label(ax, "applied_force", axis_label("contact_width"), found)
+    ax.legend()
+    return ax
+
+
+def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
+    """Apparent friction coefficient, tangential over normal force on the bone, over `over`
+    (`forces`).
+
+    Steps without a load on the bone are left out.
+    """
+    ax = axes_or_new(ax)
+    found = named(results)
+    first = next(iter(found.values()))
+    over = checked_over(over, first)
+    for (name, result), colour, style in styled(found):
+        load = along(result, "applied_force", over)
+        rows = load > 0.0
+        ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
+        ax.plot(along(result, over, over)[rows], ratio, style, color=colour, label=name)
+    finish(ax, first, over, "apparent friction coefficient")
+    _legend(ax, found)
+    return ax
+
+
+def signal(results: Results, over: str | None = None) -> Panels:
+    """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
+    found = named(results)
+    first = next(iter(found.values()))
+    over = checked_over(over, first)
+    panels = new_panels(2, 4.8)
+    for (name, result), colour, style in styled(found):
+        x = along(result, over, over)
+        for ax, column in zip(panels, ("voltage", "applied_tangential_force"), strict=True):
+            ax.plot(x, along(result, column, over), style, color=colour, label=name)
+    for ax, label in zip(panels, ("voltage (V)", "friction force (N/mm)"), strict=True):
+        finish(ax, first, over, label)
+    panels[0].set_xlabel("")
+    _legend(panels[1], found)
+    return panels
+
+
+def _presses(result: Result) -> np.ndarray:
+    rows = np.flatnonzero(np.array(result.motion) == "press")
+    if not rows.size:
+        raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")
+    return rows
+
+
+def _label(ax: Axes, over: str, label: str, found: dict[str, Result]) -> None:
+    ax.set(xlabel=column_label(over), ylabel=label)
+    ax.grid(alpha=0.3)
+    _legend(ax, found)
+
+
+def _legend(ax: Axes, found: dict[str, Result]) -> None:
+    """One curve needs no name."""
+    if len(found) > 1:
+        ax.legend()

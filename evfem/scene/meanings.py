@@ -1,0 +1,184 @@
+"""What the keys of a scene file are: unit and meaning of each, by table, and limits that no model
+states as numbers.
+
+Types, defaults and the words for what is allowed are those of the models that read a file
+(`evfem.scene.schema` puts them together; a test holds these tables against the models).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from evfem.common.checks import Within
+from evfem.scene.scene import DEPTH as SCENE_DEPTH
+
+
+class Text(NamedTuple):
+    """Unit ("" for none) and meaning of a key; what is allowed, where its model has no words for
+    it, and within which limits.
+    """
+
+    unit: str
+    meaning: str
+    allowed: str = ""
+    limits: Within | None = None
+
+
+POSITIVE, NOT_NEGATIVE, RELATIVE = Within(0.0, above=True), Within(0.0), Within(1.0)
+TABLE = "a table"
+
+DEPTH = Text(
+    "mm", "of the finger; adds forces in N, areas in mm2", SCENE_DEPTH["allowed"], SCENE_DEPTH["test"]
+)
+
+SCENE = {
+    "version": Text("", "version of the format", "1"),
+    "finger": Text("", "the finger; without it that of the paper's Table 2"),
+    "surface": Text("", "what the finger touches"),
+    "electrostatics": Text("", "insulator, voltage and force law; without it no attraction"),
+    "solver": Text("", "how the scene is solved; the defaults are the recommended ones"),
+    "output": Text("", "which fields are kept"),
+    "motion": Text("", "what happens, one table [[motion]] after the other"),
+}
+FINGER = {
+    "participant": Text("", "sizes of one of Table 1's fingers; other keys go before", "i to xi"),
+    "width": Text("mm", "full width of the cross-section"),
+    "height": Text("mm", "full height of the cross-section"),
+    "ridges": Text("", "whether there are fingerprint ridges", "true | false"),
+    "ridge_height": Text("mm", "depth of the grooves; crests lie on the ellipse"),
+    "ridge_width": Text("mm", "the pitch, from crest to crest"),
+    "ridge_exponent": Text("", "depth = height t^exponent, t = 0 at a crest, 1 in a groove"),
+    "ridge_phase": Text("pitches", "0: a crest in the middle, 0.5: a groove"),
+    "ridge_crest": Text("pitches", "flat part of a crest; 0: rounded ridges"),
+    "ridge_groove": Text("pitches", "flat part of a groove, with flat crests"),
+    "stratum_corneum_thickness": Text("mm", "at a crest"),
+    "epidermis_thickness": Text("mm", "of the living epidermis"),
+    "dermis_thickness": Text("mm", "of the dermis"),
+    "nail_thickness": Text("mm", "of the nail"),
+    "nail_width": Text("mm", "chord of the nail"),
+    "bone_width": Text("mm", "full width of the bone"),
+    "bone_height": Text("mm", "full height of the bone"),
+    "bone_offset": Text("mm", "centre of the bone above that of the finger"),
+    "resolution": Text("", "about 3k, 10k, 23k, 50k nodes"),
+    "materials": Text(
+        "", "laws of regions that are not to have Table 2's", f"{TABLE} [finger.materials.NAME]"
+    ),
+    "electrical": Text("", "the dielectric skin", f"{TABLE} [finger.electrical]"),
+    "viscosity": Text("s", "relaxation time of materials without their own"),
+    "depth": DEPTH,
+}
+MESHED_FINGER = {
+    "mesh": Text("", "a mesh of your own, in mm"),
+    "regions": Text("", "names of the numbers in the cell data `region`"),
+    "materials": Text("", "the law of each region"),
+    "electrical": Text("", "the dielectric skin"),
+    "viscosity": Text("s", "relaxation time of materials without their own", "", Within(0.0, 1e3)),
+    "depth": DEPTH,
+}
+ELECTRICAL = {
+    "stratum_corneum_thickness": Text("mm", "without it the region's local thickness", "", POSITIVE),
+    "stratum_corneum_eps_r": Text("", "relative permittivity", "", RELATIVE),
+}
+MATERIAL = {
+    "law": Text("", "the law", "its name"),
+    "E": Text("MPa", "Young's modulus", "a number above 0", POSITIVE),
+    "nu": Text("", "Poisson's ratio", "a number above -1 and below 0.5", Within(-1.0, 0.5, above=True)),
+    "c1": Text("MPa", "first coefficient of I1 - 3", "a number above 0", POSITIVE),
+    "c2": Text("MPa", "second coefficient", "a number"),
+    "c3": Text("MPa", "third coefficient", "a number"),
+    "mu": Text("MPa", "moduli of the terms", "a number or a list, sum of mu alpha above 0"),
+    "alpha": Text("", "exponents of the terms", "as many numbers as in mu, not 0"),
+    "bulk": Text("MPa", "bulk modulus, instead of nu", "a number above 0", POSITIVE),
+    "viscosity": Text("s", "relaxation time; without it the finger's", "a number, at least 0", NOT_NEGATIVE),
+    "density": Text("t/mm3", "with dynamics = inertial", "a number above 0", POSITIVE),
+}
+SURFACE = {
+    "kind": Text("", "the kind of surface", "its name"),
+    "friction": Text("", "Coulomb's coefficient, or its table over x (mm), linear in between"),
+    "y": Text("mm", "shift of the profile; without it the finger just touches at the start"),
+    "terms": Text("", "sum of a sin(k x + phase); without it eq. (25) of the paper"),
+    "file": Text("", "heights over x"),
+    "points": Text("mm", "the same in the scene file"),
+    "period": Text("mm", "after which the surface repeats"),
+    "groove_depth": Text("mm", "of the grooves below the ridges"),
+    "groove_width": Text("mm", "at half depth; without it half the period"),
+    "wall_width": Text("mm", "part of x that a wall takes; without it half of ridge or groove"),
+    "phase": Text("periods", "place of a ridge's middle", "", Within(-1.0, 1.0)),
+    "hurst": Text("", "Hurst exponent", "", Within(0.0, 1.0)),
+    "rms": Text("mm", "root mean square height", "", POSITIVE),
+    "shortest": Text("mm", "shortest wave"),
+    "longest": Text("mm", "longest wave; without it the period"),
+    "seed": Text("", "the same seed gives the same surface", "", NOT_NEGATIVE),
+}
+ELECTROSTATICS = {
+    "law": Text("", "force law of the paper, eqs (2) to (5)"),
+    "voltage": Text("V", "effective, across skin and insulator", "", Within(-1e6, 1e6)),
+    "voltage_file": Text("", "voltage over the position, instead of a number"),
+    "voltage_profile": Text("mm, V", "the same in the scene file"),
+    "signal": Text("", "voltage over time, instead of a number"),
+    "insulator": Text("", "a usual insulator by its name"),
+    "insulator_thickness": Text("mm", "of the display's insulator", "", NOT_NEGATIVE),
+    "insulator_eps_r": Text("", "its relative permittivity", "", RELATIVE),
+    "gap_eps_r": Text("", "relative permittivity of what fills the gap", "", RELATIVE),
+    "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
+    "direction": Text("", "normal: Maxwell stress on the deformed outline"),
+    "coupling": Text("", "staggered_once: the paper's, once in each step"),
+}
+SIGNAL = {
+    "frequency": Text("Hz", "of the sine, or of the carrier"),
+    "amplitude": Text("V", "of the sine"),
+    "bias": Text("V", "mean voltage"),
+    "phase": Text("rad", "at time 0"),
+    "envelope": Text("V", "height of the carrier: a number, or a signal that modulates it"),
+    "resolved": Text("", "false: the root mean square over its cycles", "true | false"),
+    "file": Text("", "the samples"),
+    "full_scale": Text("V", "of a .wav"),
+    "voltage": Text("V", "the samples in the scene file"),
+    "rate": Text("Hz", "of the samples in the scene file", "", POSITIVE),
+    "start": Text("s", "time of the first sample"),
+    "repeat": Text("", "whether it begins anew at its end"),
+}
+SOLVER = {
+    "element": Text("", "without it q2p1 on quads, p2 on triangles"),
+    "dynamics": Text("", "without time, with viscosity, or with inertia too"),
+    "contact": Text("", "exact (Signorini, Coulomb), or springs"),
+    "penalty_normal": Text("N/mm3", "with contact = penalty"),
+    "penalty_tangential": Text("N/mm3", "with contact = penalty and friction"),
+    "tolerance": Text("", "largest free residual over the largest reaction, of every step"),
+    "threads": Text("", "of linear algebra"),
+    "strategy": Text("", "how hard steps are tried"),
+}
+STRATEGY = {
+    "iterations": Text("", "most of one part of a step"),
+    "patience": Text("", "iterations with an old factorisation before it is renewed"),
+    "smallest_part": Text("", "of a step, before it counts as not converged"),
+    "easy": Text("", "iterations of a part after which the next one may be longer"),
+    "growth": Text("", "by which factor"),
+    "reach": Text("", "first guess: so many of the last part's displacements ahead"),
+}
+OUTPUT = {
+    "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),
+    "precision": Text("", "of the fields; without it single where they would take more than 25 MB"),
+    "compression": Text("", "of the fields' files: a third of the size, slower to write"),
+}
+_STEPS, _HOLD = Text("", "in how many equal parts"), Text("", "what stays as it is")
+MOTION = {
+    "press": {
+        "force": Text("N/mm", "load on the bone at the end; this or indentation"),
+        "indentation": Text("mm", "travel of the bone beyond first touch at the end"),
+        "steps": _STEPS,
+        "speed": Text("mm/s", "of a press to an indentation; without it no time passes"),
+    },
+    "slide": {
+        "distance": Text("mm", "from where it is, negative towards -x"),
+        "steps": _STEPS,
+        "speed": Text("mm/s", "needed with dynamics other than quasistatic"),
+        "hold": _HOLD,
+    },
+    "hover": {"gap": Text("mm", "of the undeformed outline to the surface"), "steps": _STEPS},
+    "voltage": {"voltage": Text("V", "at the end, from the present one"), "steps": _STEPS, "hold": _HOLD},
+    "wait": {"duration": Text("s", "how long it stays"), "steps": _STEPS, "hold": _HOLD},
+}
+MOTION_KIND = Text("", "the kind of motion", "its name")
+Meanings = Mapping[str, Text]

@@ -1,0 +1,132 @@
+"""The voltage of a scene file: a number, a file, rows over the position, or a signal over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from evfem.common.views import changed
+from evfem.electrostatics.signalfile import read_voltage
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
+from evfem.errors import ABSENT, InputError
+from evfem.protocols import TimeSignal
+from evfem.scene.keys import (
+    Table,
+    at,
+    check_size,
+    columns,
+    derived,
+    kind_of,
+    optional,
+    parse,
+    required,
+    shown,
+)
+
+#: keys of [electrostatics] that give a voltage
+KEYS = ("voltage", "voltage_file", "voltage_profile", "signal")
+#: largest file in bytes
+LARGEST = 64 * 2**20
+
+SineTable = derived(Sine)
+CarrierTable = derived(Carrier, envelope=(float | dict[str, Any], required("a voltage in V, or a signal")))
+
+
+class SampledTable(Table):
+    """A signal of the kind sampled."""
+
+    kind: Literal["sampled"]
+    file: str | None = optional("the path of a csv file with the header time,voltage, or of a .wav")
+    full_scale: float | None = optional("the voltage of the largest sample of a .wav, in V")
+    voltage: list[float] | None = optional("samples in V")
+    rate: float | None = optional("a rate in Hz, with samples in voltage")
+    start: float | None = optional("the time of the first sample in s; not with a csv file")
+    repeat: bool = optional("true | false", False)
+
+
+SIGNALS: Mapping[str, type[Table]] = {"sine": SineTable, "carrier": CarrierTable, "sampled": SampledTable}
+
+
+def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
+    """The voltage of the table [electrostatics], 0 where none is given nor `needed`; paths start
+    at `folder`.
+    """
+    given = [name for name in KEYS if getattr(table, name) is not None]
+    if len(given) > 1 or (needed and not given):
+        allowed = "exactly one of voltage (V), voltage_file and signal"
+        raise InputError("electrostatics.voltage", " and ".join(given) or ABSENT, allowed)
+    if table.voltage_file is not None:
+        path = folder / table.voltage_file
+        check_size("electrostatics.voltage_file", path, LARGEST)
+        key = "electrostatics.voltage_file"
+        with at(key, voltage_file=key, path=key):
+            return read_voltage(path)
+    if table.voltage_profile is not None:
+        with at("electrostatics.voltage_profile"):
+            return VoltageProfile(*columns("electrostatics.voltage_profile", table.voltage_profile))
+    if table.signal is not None:
+        return _signal(table.signal, "electrostatics.signal", folder)
+    return table.voltage or 0.0
+
+
+def _signal(table: Mapping[str, Any], prefix: str, folder: Path) -> TimeSignal:
+    kind = kind_of(table, prefix, SIGNALS)
+    parsed: Any = parse(SIGNALS[kind], table, prefix)
+    values = {name: getattr(parsed, name) for name in SIGNALS[kind].model_fields if name != "kind"}
+    if kind == "sampled":
+        return _sampled(values, prefix, folder)
+    if isinstance(values.get("envelope"), dict):
+        values["envelope"] = _signal(values["envelope"], f"{prefix}.envelope", folder)
+    with at(prefix):
+        return Sine(**values) if kind == "sine" else Carrier(**values)
+
+
+def _sampled(values: dict[str, Any], prefix: str, folder: Path) -> Sampled:
+    """Samples from a file, or as they stand in the table."""
+    file, rate = values["file"], values["rate"]
+    wav = file is not None and Path(file).suffix.lower() == ".wav"
+    usable = {"repeat", "file"} | ({"full_scale", "start"} if wav else set())
+    if file is None:
+        usable = {"repeat", "voltage", "rate", "start"}
+        if values["voltage"] is None or rate is None:
+            raise InputError(prefix, "neither file nor voltage with rate", "one of the two")
+    for name, value in values.items():
+        if value is not None and name not in usable:
+            beside = "voltage" if file is None else f"the file {file}"
+            raise InputError(f"{prefix}.{name}", f"{shown(value)} beside {beside}", "nothing here")
+    start = values["start"] or 0.0
+    with at(prefix, path=f"{prefix}.file"):
+        if file is None:
+            return Sampled(values["voltage"], rate, start, values["repeat"])
+        path = folder / file
+        check_size(f"{prefix}.file", path, LARGEST)
+        if wav:
+            return Sampled.from_wav(path, values["full_scale"], start=start, repeat=values["repeat"])
+        return Sampled.from_csv(path, repeat=values["repeat"])
+
+
+def voltage_keys(voltage: Any) -> dict[str, Any]:
+    """The keys of [electrostatics] that give this voltage, without files."""
+    if isinstance(voltage, VoltageProfile):
+        rows = zip(voltage.position.tolist(), voltage.voltage.tolist(), strict=True)
+        return {"voltage_profile": [list(row) for row in rows]}
+    if isinstance(voltage, (Sine, Carrier, Sampled)):
+        return {"signal": _signal_table(voltage)}
+    if not isinstance(voltage, float):
+        allowed = "a number, a VoltageProfile, Sine, Carrier or Sampled in a scene file"
+        raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
+    return {"voltage": voltage}
+
+
+def _signal_table(signal: Sine | Carrier | Sampled) -> dict[str, Any]:
+    table = {"kind": signal.kind, **changed(signal)}
+    if isinstance(signal, Sampled):
+        table["voltage"] = signal.voltage.tolist()
+    elif isinstance(signal, Carrier) and isinstance(signal.envelope, TimeSignal):
+        if not isinstance(signal.envelope, (Sine, Carrier, Sampled)):
+            given = f"a carrier with an envelope of the class {type(signal.envelope).__name__}"
+            raise InputError("electrostatics.voltage", given, "Sine, Carrier or Sampled in a scene file")
+        table["envelope"] = _signal_table(signal.envelope)
+    return table

@@ -1,0 +1,144 @@
+"""The history: one row for each requested step, its columns with their units and meanings.
+
+In the plane model forces are per mm of depth (N/mm), works and energies too (N, that is N mm/mm).
+Over a whole depth they are N and mJ, and widths are areas in mm2, under the same names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.storage import write_text
+from evfem.common.tables import csv_text, frame
+from evfem.errors import readable, unknown
+
+Row = Mapping[str, Any]
+#: unit per mm of depth -> unit over a depth
+WHOLE = {"N/mm": "N", "N": "mJ"}
+#: columns from which a run goes on
+RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
+INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
+#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
+NEEDED = ("motion", *INTEGERS, *RESUMED)
+
+
+def column(unit: str, meaning: str, whole: str | None = None) -> dict[str, str]:
+    """Metadata of a field of `History`: its unit, what it is, and its unit over a whole depth."""
+    return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE.get(unit, unit)}
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Every column of the history as an array over the steps.
+
+    A field is a column: of `COLUMNS`, of rows and `history.csv`, of saved results and checkpoints.
+    `Ledger.row` computes its value; a whole number also stands in `INTEGERS`. Its unit and meaning
+    are in `UNITS` and `MEANINGS`. `result["normal_force"]` is `result.normal_force`.
+    """
+
+    step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
+    motion_index: Ints = field(metadata=column("", "number of the motion, from 0"))
+    motion: list[str] = field(metadata=column("", "kind of the motion"))
+    time: Floats = field(metadata=column("s", "at the end of the step"))
+    position: Floats = field(metadata=column("mm", "x of the bone"))
+    indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
+    voltage: Floats = field(metadata=column("V", "effective"))
+    applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
+    applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
+    normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
+    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x"))
+    electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards"))
+    electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
+    contact_width: Floats = field(
+        metadata=column("mm", "from the first to the last touching node's share", "mm2")
+    )
+    real_contact_width: Floats = field(metadata=column("mm", "sum of the touching nodes' shares", "mm2"))
+    min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
+    peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
+    mean_contact_pressure: Floats = field(
+        metadata=column("MPa", "pressing forces over the touching nodes' shares")
+    )
+    external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
+    electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
+    stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
+    friction_dissipation: Floats = field(metadata=column("N", "by friction"))
+    viscous_dissipation: Floats = field(metadata=column("N", "in the tissue"))
+    kinetic_energy: Floats = field(metadata=column("N", "of the tissue, with inertia"))
+    integrator_dissipation: Floats = field(metadata=column("N", "by the finite step, of either sign"))
+    snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
+    substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
+    newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
+    seconds: Floats = field(metadata=column("s", "wall time"))
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The history as one dictionary per step, plain Python numbers."""
+        columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
+        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+
+    def __getitem__(self, name: str) -> Any:
+        """A column by its name."""
+        if name not in COLUMNS:
+            raise unknown("column", str(name), COLUMNS, readable(name))
+        return getattr(self, name)
+
+    def table(self) -> Any:
+        """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
+        installed a numpy record array of the same columns; `table["normal_force"]` is one.
+        """
+        return frame({name: np.asarray(self[name]) for name in COLUMNS})
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the history as `evfem run` does (`history.csv`), whole or not at all."""
+        write_text(path, csv_header() + "".join(map(csv_line, self.rows)))
+
+
+COLUMNS = tuple(spec.name for spec in fields(History))
+#: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
+UNITS: Mapping[str, str] = {spec.name: spec.metadata["unit"] for spec in fields(History)}
+WHOLE_UNITS: Mapping[str, str] = {spec.name: spec.metadata["whole"] for spec in fields(History)}
+MEANINGS: Mapping[str, str] = {spec.name: spec.metadata["meaning"] for spec in fields(History)}
+
+
+def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
+    """Columns, or one row of them, over a whole `depth` (mm): in N, mm2 and mJ.
+
+    >>> over_depth({"normal_force": 0.05, "contact_width": 4.5, "min_gap": 0.1}, 10.0)
+    {'normal_force': 0.5, 'contact_width': 45.0, 'min_gap': 0.1}
+    """
+    return {
+        name: value if WHOLE_UNITS[name] == UNITS[name] else value * depth for name, value in columns.items()
+    }
+
+
+def csv_line(row: Row) -> str:
+    """One row of history.csv with its line end; floats with every digit that counts.
+
+    >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
+    '1,0,press,0.0,0.0,0.0,0.1'
+    """
+    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
+
+
+def csv_header() -> str:
+    """The first line of history.csv."""
+    return csv_text([COLUMNS])
+
+
+def _plain_value(name: str, value: Any) -> str | int | float:
+    if name == "motion":
+        return str(value)
+    return int(value) if name in INTEGERS else float(value)
+
+
+def column_of(name: str, values: list[Any]) -> Any:
+    """A column from its values in the rows."""
+    if name == "motion":
+        return [str(value) for value in values]
+    return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)

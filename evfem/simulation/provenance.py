@@ -1,0 +1,67 @@
+"""How numbers came about: versions, date, the scene, its mesh and the solver's own record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from datetime import UTC, datetime
+from functools import cache
+from importlib import metadata
+from platform import python_version
+from typing import Any
+
+import evfem
+from evfem.common.digest import digest
+from evfem.common.views import called
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.scene.scene import Scene
+
+
+@cache
+def versions() -> dict[str, str]:
+    """Versions of evfem, Python and the packages that compute, as far as they are installed."""
+    found = {"evfem": evfem.__version__, "python": python_version()}
+    for package in ("numpy", "scipy", "scikit-fem", "meshio", "pypardiso"):
+        try:
+            found[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def origin() -> dict[str, Any]:
+    """Versions and date, for the provenance of whatever is computed now."""
+    return {"versions": dict(versions()), "date": datetime.now(UTC).isoformat(timespec="seconds")}
+
+
+def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
+    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
+    JSON.
+
+    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
+    user's own.
+    """
+    from evfem.scene.file import dump
+
+    try:
+        parameters = dump(scene)
+    except InputError:
+        parameters = called("Scene", {spec.name: getattr(scene, spec.name) for spec in fields(scene)})
+    return {
+        **origin(),
+        "scene": {
+            "name": scene.name,
+            "digest": scene.digest(),
+            "total_steps": scene.total_steps,
+            "depth": scene.depth,
+        },
+        "parameters": parameters,
+        "mesh": {
+            "digest": digest(mesh),
+            "nodes": len(mesh.points),
+            "cells": len(mesh.cells),
+            "kind": mesh.kind,
+        },
+        "solver": dict(solver),
+    }

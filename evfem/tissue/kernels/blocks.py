@@ -1,0 +1,65 @@
+"""Cells in blocks of `LANES`, the last axis of every array, as the compiled element loops take them.
+
+The loops (`loops.c`) are built when the package is installed; where no compiler is, the weak forms
+do the same (`evfem.tissue.assembly`). Arrays: B blocks, n nodes of a cell, Q quadrature points, S
+samples of ln J, M modes of theta, L lanes.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+
+LANES = 8
+
+
+class Cells(NamedTuple):
+    """A space in blocks. `sizes` (N, B, n, Q, S, M); `nodes` (B, n, L); `weight` (B, Q, L);
+    `reference` (Q, n, 2) gradients of the shape functions in the reference cell and `inverse` (B,
+    Q, 4, L) dxi/dX at the points; the same where ln J is sampled, `sample_reference` (S, n, 2) and
+    `sample_inverse` (B, S, 4, L); `psi` (B, M, S, L) and `mean` (B, M, L) of the modes of theta,
+    see `elastic.h`. S = M = 0 where theta is ln J of the quadrature point.
+    """
+
+    sizes: tuple[int, ...]
+    nodes: Ints
+    weight: Floats
+    reference: Floats
+    inverse: Floats
+    sample_reference: Floats
+    sample_inverse: Floats
+    psi: Floats
+    mean: Floats
+
+
+@cache
+def loops() -> Any:
+    """The compiled element loops, or None where they were not built."""
+    try:
+        return import_module("evfem.tissue.kernels.loops")
+    except ImportError:
+        return None
+
+
+def blocked(values: Any) -> Any:
+    """(E, ...) as (B, ..., L); the last cell fills the last block up."""
+    blocks = -(-len(values) // LANES)
+    filled = np.concatenate([values, np.repeat(values[-1:], blocks * LANES - len(values), axis=0)])
+    return np.ascontiguousarray(np.moveaxis(filled.reshape(blocks, LANES, *values.shape[1:]), 1, -1))
+
+
+def padded(values: Floats) -> Floats:
+    """(E, ...) as (B, ..., L); what fills the last block up is 0, so that it has no force."""
+    missing = np.zeros((-len(values) % LANES, *values.shape[1:]))
+    return blocked(np.concatenate([values, missing]))
+
+
+def unblocked(blocks: Floats, count: int) -> Floats:
+    """(B, ..., L) as (E, ...) of E = `count` cells."""
+    values = np.moveaxis(blocks, -1, 1)
+    return np.ascontiguousarray(values.reshape(-1, *values.shape[2:])[:count])

@@ -1,0 +1,298 @@
+/* Compiled element loops for Python: twins of the weak forms `neo_hookean` (`elastic.h`) and
+   `kelvin_voigt` (`viscous.h`) in the plane. Each is compiled for three instruction sets of x86, chosen
+   when the module is loaded; elsewhere for the one there is. */
+
+#define PY_SSIZE_T_CLEAN
+#define Py_LIMITED_API 0x030b0000
+#include "viscous.h"
+
+/* -- one version for each instruction set ---------------------------------------------------- */
+
+#define SIZED(NAME, ...)                            \
+    switch (m->n) {                                 \
+    case 4: return NAME(m, 4, __VA_ARGS__);         \
+    case 6: return NAME(m, 6, __VA_ARGS__);         \
+    default: return NAME(m, 9, __VA_ARGS__);        \
+    }
+
+#define VERSION(SUFFIX, ISA)                                                                             \
+    ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
+                                      const stored *lmbda, double *out, double *smallest) {              \
+        SIZED(elastic_forces, u, mu, lmbda, out, smallest)                                               \
+    }                                                                                                    \
+    ISA static void tangent_##SUFFIX(const mesh *m, const double *u, const stored *mu,                   \
+                                     const stored *lmbda, const stored *given, const int32_t *places,    \
+                                     double *data) {                                                     \
+        SIZED(elastic_tangent, u, mu, lmbda, given, places, data)                                        \
+    }                                                                                                    \
+    ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) {\
+        SIZED(log_volumes, u, du, out)                                                                   \
+    }                                                                                                    \
+    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pull,           \
+                                           double *out) {                                                \
+        SIZED(volume_forces, u, pull, out)                                                               \
+    }                                                                                                    \
+    ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
+    ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                      \
+        SIZED(viscous_strains, u, out)                                                                   \
+    }                                                                                                    \
+    ISA static double viscous_##SUFFIX(const mesh *m, const double *u, const stored *rate,               \
+                                       const stored *strain0, double *out) {                             \
+        SIZED(viscous_forces, u, rate, strain0, out)                                                     \
+    }                                                                                                    \
+    ISA static void viscous_tangent_##SUFFIX(const mesh *m, const double *u, const stored *rate,         \
+                                             const stored *strain0, const int32_t *places, double *data) { \
+        SIZED(viscous_tangent, u, rate, strain0, places, data)                                           \
+    }                                                                                                    \
+    static const versions version_##SUFFIX = {                                                           \
+        forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
+        smallest_##SUFFIX, strains_##SUFFIX, viscous_##SUFFIX,     viscous_tangent_##SUFFIX};
+
+typedef struct {
+    double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
+    void (*tangent)(const mesh *, const double *, const stored *, const stored *, const stored *,
+                    const int32_t *, double *);
+    void (*log_volumes)(const mesh *, const double *, const double *, stored *);
+    void (*volume_forces)(const mesh *, const double *, const stored *, double *);
+    double (*smallest)(const mesh *, const double *);
+    void (*strains)(const mesh *, const double *, stored *);
+    double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
+    void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
+                            double *);
+} versions;
+
+VERSION(plain, )
+#if defined(__x86_64__)
+VERSION(avx2, __attribute__((target("avx2,fma"))))
+VERSION(avx512, __attribute__((target("avx512f,fma"))))
+#endif
+
+static const versions *chosen(void) {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) return &version_avx512;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &version_avx2;
+#endif
+    return &version_plain;
+}
+
+/* -- for Python ------------------------------------------------------------------------------ */
+
+#define MOST_VIEWS 14
+
+/* Arrays held while a loop runs. */
+typedef struct {
+    Py_buffer views[MOST_VIEWS];
+    int count;
+} held;
+
+static void release(held *all) {
+    while (all->count > 0) PyBuffer_Release(&all->views[--all->count]);
+}
+
+/* The data of a contiguous array of `length` items of one format; NULL with an error set, also by
+   an earlier call. A length of -1 is any. */
+static void *hold(held *all, PyObject *array, char format, Py_ssize_t length, int writable) {
+    Py_buffer *view = &all->views[all->count];
+    int flags = PyBUF_C_CONTIGUOUS | PyBUF_FORMAT | (writable ? PyBUF_WRITABLE : 0);
+    if (PyErr_Occurred() || PyObject_GetBuffer(array, view, flags) < 0) return NULL;
+    all->count++;
+    if (view->format[0] != format || (length >= 0 && view->len != length * view->itemsize)) {
+        PyErr_Format(PyExc_ValueError, "an array of %zd items, format %s; expected %zd, format %c",
+                     view->itemsize ? view->len / view->itemsize : 0, view->format, length, format);
+        return NULL;
+    }
+    return view->buf;
+}
+
+/* Read a tuple `evfem.tissue.kernels.blocks.Cells`; size is N of its sizes (N, B, n, Q, S, M). */
+static mesh read_cells(held *all, PyObject *cells, Py_ssize_t *size) {
+    mesh m = {0};
+    PyObject *nodes, *weight, *at[2], *sample[2], *psi, *mean;
+    if (!PyArg_ParseTuple(cells, "(nniiii)OOOOOOOO", size, &m.blocks, &m.n, &m.at.count, &m.sample.count,
+                          &m.modes, &nodes, &weight, &at[0], &at[1], &sample[0], &sample[1], &psi, &mean))
+        return m;
+    Py_ssize_t B = m.blocks, n = m.n, Q = m.at.count, S = m.sample.count, M = m.modes;
+    if ((n != 4 && n != 6 && n != 9) || Q > MOST_POINTS || S > MOST_POINTS || M > MOST_POINTS)
+        PyErr_SetString(PyExc_ValueError, "cells of a kind that the loops do not know");
+    m.nodes = hold(all, nodes, 'i', B * n * LANES, 0);
+    m.weight = hold(all, weight, 'd', B * Q * LANES, 0);
+    m.at.reference = hold(all, at[0], 'd', 2 * Q * n, 0);
+    m.at.inverse = hold(all, at[1], 'd', B * Q * 4 * LANES, 0);
+    m.sample.reference = hold(all, sample[0], 'd', 2 * S * n, 0);
+    m.sample.inverse = hold(all, sample[1], 'd', B * S * 4 * LANES, 0);
+    m.psi = hold(all, psi, 'd', B * M * S * LANES, 0);
+    m.mean = hold(all, mean, 'd', B * M * LANES, 0);
+    return m;
+}
+
+static const versions *version;
+
+typedef struct {
+    held all;
+    mesh m;
+    const double *u;     /* (N, 2) */
+    const stored *first; /* mu or rate, (B, LANES) */
+    const stored *second; /* lmbda (B, LANES), or strains (B, Q, 3, LANES) */
+} request;
+
+/* Read what all loops begin with: cells, u and, where asked for, moduli or strains. */
+static Py_ssize_t read_request(request *r, PyObject *cells, PyObject *u, PyObject *first, PyObject *second,
+                               Py_ssize_t points) {
+    Py_ssize_t size = 0;
+    r->all.count = 0;
+    r->m = read_cells(&r->all, cells, &size);
+    r->u = hold(&r->all, u, 'd', 2 * size, 0);
+    if (first) r->first = hold(&r->all, first, 'd', r->m.blocks * LANES, 0);
+    if (second)
+        r->second = hold(&r->all, second, 'd', r->m.blocks * (points ? 3 * r->m.at.count : 1) * LANES, 0);
+    return size;
+}
+
+static Py_ssize_t pairs(const mesh *m) { return m->blocks * m->n * (m->n + 1) / 2; }
+
+static PyObject *finish(request *r, PyObject *result) {
+    release(&r->all);
+    return result;
+}
+
+static PyObject *call_forces(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *lmbda, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &mu, &lmbda, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, mu, lmbda, 0);
+    double *force = hold(&r.all, out, 'd', 2 * size, 1), energy, smallest;
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    energy = version->forces(&r.m, r.u, r.first, r.second, force, &smallest);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_BuildValue("dd", energy, smallest));
+}
+
+/* An array (B, S, LANES) of what acts or is found where ln J is sampled. */
+static void *hold_samples(request *r, PyObject *array, int writable) {
+    int samples = r->m.modes ? r->m.sample.count : r->m.at.count;
+    return hold(&r->all, array, 'd', r->m.blocks * samples * LANES, writable);
+}
+
+static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *lmbda, *pull, *places, *data;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pull, &places, &data)) return NULL;
+    read_request(&r, cells, u, mu, lmbda, 0);
+    const stored *given = pull == Py_None ? NULL : hold_samples(&r, pull, 0);
+    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * 4 * LANES, 0);
+    double *values = hold(&r.all, data, 'd', -1, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->tangent(&r.m, r.u, r.first, r.second, given, place, values);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_log_volumes(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *du, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &du, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const double *along = du == Py_None ? NULL : hold(&r.all, du, 'd', 2 * size, 0);
+    stored *found = hold_samples(&r, out, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->log_volumes(&r.m, r.u, along, found);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_volume_forces(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *pull, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &pull, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *given = hold_samples(&r, pull, 0);
+    double *force = hold(&r.all, out, 'd', 2 * size, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->volume_forces(&r.m, r.u, given, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_smallest_J(PyObject *self, PyObject *args) {
+    PyObject *cells, *u;
+    request r;
+    if (!PyArg_ParseTuple(args, "OO", &cells, &u)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    double smallest;
+    Py_BEGIN_ALLOW_THREADS
+    smallest = version->smallest(&r.m, r.u);
+    Py_END_ALLOW_THREADS
+    return finish(&r, PyFloat_FromDouble(smallest));
+}
+
+static PyObject *call_strains(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOO", &cells, &u, &out)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    stored *strain = hold(&r.all, out, 'd', r.m.blocks * r.m.at.count * 3 * LANES, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->strains(&r.m, r.u, strain);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_viscous(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *rate, *strain0, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &rate, &strain0, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, rate, strain0, 1);
+    double *force = hold(&r.all, out, 'd', 2 * size, 1), dissipation;
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    dissipation = version->viscous(&r.m, r.u, r.first, r.second, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, PyFloat_FromDouble(dissipation));
+}
+
+static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *rate, *strain0, *places, *data;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &rate, &strain0, &places, &data)) return NULL;
+    read_request(&r, cells, u, rate, strain0, 1);
+    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * 4 * LANES, 0);
+    double *values = hold(&r.all, data, 'd', -1, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->viscous_tangent(&r.m, r.u, r.first, r.second, place, values);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyMethodDef methods[] = {
+    {"forces", call_forces, METH_VARARGS,
+     "forces(cells, u, mu, lmbda, out): add the nodal forces (N, 2); stored energy and smallest J."},
+    {"add_tangent", call_add_tangent, METH_VARARGS,
+     "add_tangent(cells, u, mu, lmbda, pull, places, data): add what changes of the tangent; its\n"
+     "curvature of ln J is weighted with pull (B, S, LANES), or with the law's own if that is None."},
+    {"log_volumes", call_log_volumes, METH_VARARGS,
+     "log_volumes(cells, u, du, out): ln J (B, S, LANES), or its change along du if that is not None."},
+    {"volume_forces", call_volume_forces, METH_VARARGS,
+     "volume_forces(cells, u, pull, out): add the nodal forces (N, 2) of pull (B, S, LANES)."},
+    {"smallest_J", call_smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
+    {"strains", call_strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, 3, LANES)."},
+    {"viscous", call_viscous, METH_VARARGS,
+     "viscous(cells, u, rate, strain0, out): add the nodal forces (N, 2); dissipated energy."},
+    {"add_viscous", call_add_viscous, METH_VARARGS,
+     "add_viscous(cells, u, rate, strain0, places, data): add the tangent of `viscous`."},
+    {NULL, NULL, 0, NULL}};
+
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "loops", "Compiled element loops.", -1, methods};
+
+PyMODINIT_FUNC PyInit_loops(void) {
+    version = chosen();
+    PyObject *made = PyModule_Create(&module);
+    if (made && PyModule_AddIntConstant(made, "LANES", LANES) < 0) Py_CLEAR(made);
+    return made;
+}

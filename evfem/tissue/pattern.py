@@ -1,0 +1,139 @@
+"""Where the entries of cell matrices go in the upper triangle of one symmetric sparse matrix.
+
+The nodes have dim unknowns each, in runs: node i of the reduced system has dim i ... dim i + dim - 1;
+all nodes of the bone are one node of it, the last. So the structure is that of node pairs (i <= j),
+found once for the pairs k <= l of a cell's nodes, and the places of their entries follow by counting:
+with p_i pairs before those of node i, c_i pairs of its own and (i, j) the t-th of these, entry (a, b)
+of the pair has the place
+
+    dim^2 p_i - i dim (dim - 1)/2 + a dim c_i - a (a - 1)/2 + dim t + b - a .
+
+A pair of a node with itself has no entries below the diagonal. Two nodes of the bone are a pair that
+counts twice: its entries on the diagonal are gathered apart.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+
+
+class Pattern:
+    """The upper triangle of a symmetric CSR matrix of `size` rows: `indptr`, `indices` (Z,), the
+    places of its `diagonal` (size,), and the `places` (E, P, dim, dim) of the entries of a cell's
+    P = n (n + 1)/2 node pairs, in arrays of Z + 1 + dim numbers: what is not stored goes to Z, what
+    counts twice behind it.
+    """
+
+    def __init__(self, nodes: Ints, dim: int) -> None:
+        """`nodes` (E, n): the cells' nodes by their numbers in the reduced system, from 0 on."""
+        count = int(nodes.max()) + 1
+        self.dim, self.size = dim, dim * count
+        self._first, self._second = np.triu_indices(nodes.shape[1])
+        left, right = nodes[:, self._first], nodes[:, self._second]
+        low, high = np.minimum(left, right), np.maximum(left, right)
+        alone = np.arange(count, dtype=np.int64) * (count + 1)  # a node that no cell has keeps a diagonal
+        pairs = np.concatenate([(low.astype(np.int64) * count + high).ravel(), alone])
+        keys, position = np.unique(pairs, return_inverse=True)
+        self._pairs: Ints = np.searchsorted(keys, np.arange(count + 1, dtype=np.int64) * count)
+        self._fill(keys % count)
+        t = position[: low.size].reshape(low.shape) - self._pairs[low]
+        self.places: Ints = np.empty((*low.shape, dim, dim), dtype=np.int32)
+        for a, b in np.ndindex(dim, dim):
+            self.places[..., a, b] = self._places(left, right, t, a, b)
+
+    def _places(self, left: Ints, right: Ints, t: Ints, a: int, b: int) -> Ints:
+        """Places (E, P) of entry (a, b) of the pairs (left, right)."""
+        itself = self._first == self._second
+        twice = (left == right) & ~itself
+        row, column = np.where(left > right, b, a), np.where(left > right, a, b)
+        row, column = np.where(twice, min(a, b), row), np.where(twice, max(a, b), column)
+        found: Ints = self._place(np.minimum(left, right), row, t, column)
+        if a > b:
+            found[:, itself] = self.indices.size
+        if a == b:
+            found[twice] = self.indices.size + 1 + a
+        return found
+
+    def _place(self, i: Any, a: Any, t: Any, b: Any) -> Any:
+        """Place of entry (a, b) of the t-th pair of node i."""
+        dim, before = self.dim, self._pairs
+        begin = dim * dim * before[i] - i * (dim * (dim - 1) // 2)
+        return begin + a * dim * (before[i + 1] - before[i]) - a * (a - 1) // 2 + dim * t + b - a
+
+    def _fill(self, second: Ints) -> None:
+        """Rows, columns and diagonal of the matrix from the second nodes of all pairs."""
+        dim, count = self.dim, self.size // self.dim
+        first = np.repeat(np.arange(count), np.diff(self._pairs))
+        t = np.arange(second.size) - self._pairs[first]
+        nodes = np.arange(count)
+        self.diagonal: Ints = np.stack([self._place(nodes, a, 0, a) for a in range(dim)], axis=1).ravel()
+        entries = dim * dim * second.size - count * (dim * (dim - 1) // 2)
+        self.indptr: Ints = np.append(self.diagonal, entries).astype(np.int32)
+        self.indices: Ints = np.empty(entries, dtype=np.int32)
+        for a, b in np.ndindex(dim, dim):
+            there = (second > first) | (a <= b)
+            self.indices[self._place(first[there], a, t[there], b)] = dim * second[there] + b
+
+    def zeros(self) -> Floats:
+        """What the entries of cell matrices are added to, (Z + 1 + dim,)."""
+        return np.zeros(self.indices.size + 1 + self.dim)
+
+    def add(self, matrices: Floats, cells: Ints, data: Floats) -> None:
+        """Add symmetric matrices (C, n dim, n dim) of some cells to `data`; a cell may have
+        several.
+        """
+        C, n, dim = len(matrices), matrices.shape[1] // self.dim, self.dim
+        split = matrices.reshape(C, n, dim, n, dim)
+        for a, b in np.ndindex(dim, dim):
+            values = split[:, :, a, :, b][:, self._first, self._second]
+            data += np.bincount(self.places[cells, :, a, b].ravel(), values.ravel(), data.size)
+
+    def componentwise(self, matrices: Floats) -> Floats:
+        """The matrices (E, n, n) of all cells, the same for each component and none between two,
+        added up like `zeros`.
+        """
+        data, values = self.zeros(), matrices[:, self._first, self._second].ravel()
+        for a in range(self.dim):
+            data += np.bincount(self.places[..., a, a].ravel(), values, data.size)
+        return data
+
+    def finish(self, data: Floats) -> Floats:
+        """The upper triangle's entries (Z,) of what has been added up."""
+        data[self.diagonal[-self.dim :]] += 2.0 * data[-self.dim :]
+        return data[: self.indices.size]
+
+    @cached_property
+    def blocks(self) -> Ints:
+        """The places (B, P, dim, dim, L) as the compiled loops take them."""
+        from evfem.tissue.kernels.blocks import blocked
+
+        return blocked(self.places)
+
+    def full(self, upper: Floats) -> Any:
+        """Both triangles as a scipy CSR matrix."""
+        import scipy.sparse as sparse
+
+        half = sparse.csr_matrix((upper, self.indices, self.indptr), shape=(self.size, self.size))
+        return (half + half.T - sparse.diags(upper[self.diagonal])).tocsr()
+
+
+class Componentwise:
+    """Matrices (E, n, n) that each component has for itself and that never change, such as masses:
+    added up once for a pattern.
+    """
+
+    def __init__(self, matrices: Floats) -> None:
+        self.matrices = matrices
+        self._pattern: Pattern | None = None
+        self._data = np.empty(0)
+
+    def data(self, pattern: Pattern) -> Floats:
+        """All cells' matrices added up like `Pattern.zeros`."""
+        if pattern is not self._pattern:
+            self._pattern, self._data = pattern, pattern.componentwise(self.matrices)
+        return self._data

@@ -1,0 +1,82 @@
+"""Attraction drawn at random: law, insulator, coupling, and a voltage that is constant, ramped,
+over the position or over time, below 60 V/um in the insulator and 3000 V.
+"""
+
+from __future__ import annotations
+
+from evfem.electrostatics.laws import INSULATORS
+
+from .draws import Draw, six_digits
+from .tables import Tables
+
+LARGEST_FIELD = 60e3  # V/mm
+LARGEST_VOLTAGE = 3000.0
+
+
+def electrostatics(random: Draw) -> Tables:
+    """Everything but the voltage, which depends on the motions."""
+    table: Tables = {"law": random.one_of("strong_troxel", "kaczmarek")}
+    if random.chance(0.1):
+        table["insulator"] = random.one_of(*INSULATORS)
+    else:
+        table["insulator_thickness"] = random.spread(0.005, 0.5)
+        table["insulator_eps_r"] = random.spread(1.5, 20.0)
+    if random.chance(0.15):
+        table["air_layer"] = False
+    if random.chance(0.15):
+        table["direction"] = "normal"
+    if random.chance(0.05):
+        table["gap_eps_r"] = random.between(1.0, 5.0)
+    if random.chance(0.15):
+        table["coupling"] = random.one_of("staggered", "staggered", "staggered_once")
+    return table
+
+
+def largest_voltage(table: Tables) -> float:
+    """The voltage below 3000 V with 60 V/um in the insulator (V)."""
+    if "insulator" in table:
+        return min(LARGEST_VOLTAGE, LARGEST_FIELD * float(INSULATORS[table["insulator"]].thickness))
+    return min(LARGEST_VOLTAGE, LARGEST_FIELD * table["insulator_thickness"])
+
+
+def add_voltage(random: Draw, tables: Tables) -> None:
+    """A constant voltage, one along the way or over time, or the targets of the ramps, up and
+    down.
+    """
+    if "electrostatics" not in tables:
+        return
+    table, ramps = tables["electrostatics"], [one for one in tables["motion"] if one["kind"] == "voltage"]
+    most = largest_voltage(table)
+
+    def volts() -> float:
+        return six_digits(random.between(0.02, 1.0) * most * random.one_of(1.0, 1.0, -1.0))
+
+    for ramp in ramps:
+        ramp["voltage"] = 0.0 if random.chance(0.3) else volts()
+    waits = [one for one in tables["motion"] if one["kind"] == "wait"]
+    if waits and not ramps and random.chance(0.7):
+        table["signal"] = _signal(random, waits[0], abs(volts()))
+    elif ramps or random.chance(0.8):
+        table["voltage"] = 0.0 if ramps and random.chance(0.5) else volts()
+    else:
+        places = random.places(random.whole(2, 12), -6.0, 6.0)
+        kept = [x for i, x in enumerate(places) if i == 0 or x - places[i - 1] > 1e-3]
+        table["voltage_profile"] = [[x, abs(volts())] for x in kept]
+
+
+def _signal(random: Draw, wait: Tables, most: float) -> Tables:
+    """A signal in time whose cycles the steps of a wait resolve."""
+    kind, frequency = random.one_of("sine", "carrier", "sampled"), wait["steps"] / (8.0 * wait["duration"])
+    share = random.between(0.05, 0.95)
+    amplitude = six_digits(most * share)
+    sine: Tables = {"kind": "sine", "frequency": six_digits(frequency), "amplitude": amplitude}
+    sine |= {"bias": six_digits(most - amplitude), "phase": random.between(0.0, 6.28)}
+    if kind == "sine":
+        return sine
+    if kind == "carrier":
+        resolved = random.chance(0.5)
+        table: Tables = {"kind": kind, "frequency": six_digits(frequency), "resolved": resolved}
+        return table | {"envelope": most if resolved else sine | {"frequency": six_digits(0.3 * frequency)}}
+    samples = [six_digits(most * random.between(0.0, 1.0)) for _ in range(random.whole(2, 12))]
+    table = {"kind": kind, "rate": six_digits(2.0 * frequency), "voltage": samples}
+    return table | {"start": six_digits(-0.3 / frequency), "repeat": random.chance(0.5)}

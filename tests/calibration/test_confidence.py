@@ -1,0 +1,78 @@
+"""Intervals against scipy's curve_fit and a closed form, coverage, and what is not determined."""
+
+import numpy as np
+import pytest
+from scipy.optimize import curve_fit
+from scipy.stats import t
+
+from evfem.calibration.confidence import confidence
+
+X = np.linspace(0.0, 2.0, 12)
+
+
+def test_errors_and_correlation_are_those_of_another_code():
+    """scipy's curve_fit on a curve, its Jacobian by hand."""
+    y = 1.3 * np.exp(-0.8 * X) + 0.01 * np.random.default_rng(5).normal(size=X.size)
+    best, covariance = curve_fit(lambda x, a, b: a * np.exp(-b * x), X, y, p0=(1.0, 1.0), xtol=1e-12)
+    a, b = best
+    jacobian = np.column_stack([np.exp(-b * X), -a * X * np.exp(-b * X)])
+    known = confidence(jacobian, a * np.exp(-b * X) - y, ["a", "b"])
+    np.testing.assert_allclose(known.errors, np.sqrt(np.diag(covariance)), rtol=1e-5)
+    share = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert known.correlation[0, 1] == pytest.approx(share, rel=1e-4)
+    assert known.warnings == ()
+
+
+def test_a_mean_has_its_textbook_interval():
+    """The mean of n numbers is known to s / sqrt(n)."""
+    values = np.array([1.0, 2.0, 4.0, 7.0])
+    known = confidence(np.ones((4, 1)), values.mean() - values, ["mean"])
+    assert known.errors[0] == pytest.approx(np.std(values, ddof=1) / 2.0, rel=1e-14)
+    assert known.singular_values.tolist() == pytest.approx([1.0])
+
+
+def test_ninety_five_of_a_hundred_intervals_have_the_true_slope_in_them():
+    """A straight line with five points: so few that Student's distribution matters. A normal
+    distribution would cover 0.85.
+    """
+    random, x = np.random.default_rng(0), np.arange(1.0, 6.0)
+    jacobian, inside, tries = np.column_stack([x, np.ones(5)]), 0, 4000
+    reach = t.ppf(0.975, 3)
+    for _ in range(tries):
+        y = 2.0 * x + 1.0 + random.normal(size=5)
+        best = np.linalg.lstsq(jacobian, y, rcond=None)[0]
+        known = confidence(jacobian, jacobian @ best - y, ["slope", "height"])
+        inside += abs(best[0] - 2.0) <= reach * known.errors[0]
+    # two sigmas of 4000 tries are 0.007
+    assert inside / tries == pytest.approx(0.95, abs=0.01)
+
+
+def test_columns_of_any_size_are_compared_by_their_directions():
+    jacobian = np.column_stack([X, 1e-5 * np.ones_like(X)])
+    known = confidence(jacobian, np.ones(12), ["slope", "height"])
+    assert known.warnings == ()
+    assert known.singular_values.min() > 0.1
+
+
+def test_a_parameter_that_changes_nothing_is_named():
+    known = confidence(np.column_stack([X, np.zeros(12)]), np.ones(12), ["slope", "colour"])
+    assert known.warnings == ("colour changes nothing that was measured",)
+    assert np.isfinite(known.errors[0])
+    assert np.isinf(known.errors[1])
+    assert known.singular_values[1] == 0.0
+
+
+def test_parameters_that_only_act_together_are_named():
+    jacobian = np.column_stack([X, 3.0 * X, np.ones(12), 2.0 * X])
+    known = confidence(jacobian, np.ones(12), ["a", "b", "height", "c"])
+    assert known.warnings[0].startswith("the data do not tell a, b and c apart")
+    assert len(known.warnings) == 2  # two directions of three parameters
+    assert np.isfinite(known.errors).tolist() == [False, False, True, False]
+
+
+def test_strong_correlation_is_said_with_its_sign():
+    known = confidence(np.column_stack([X, X + 0.01 * X**2]), np.ones(12), ["a", "b"])
+    (warning,) = known.warnings
+    assert warning.startswith(f"a and b are correlated by {known.correlation[0, 1]:.3f}: ")
+    assert known.correlation[0, 1] < -0.99
+    assert np.isfinite(known.errors).all()

@@ -1,0 +1,306 @@
+"""Fits: synthetic measurements recovered, closed forms, bounds, folders, processes, refused input."""
+
+import json
+
+import numpy as np
+import pytest
+from tools.meshes import block
+from tools.workers import die_once
+
+import evfem as ev
+from evfem.calibration import runs
+from evfem.calibration.result import load
+from evfem.errors import InputError
+from evfem.mesh import file as meshfile
+from evfem.scene import file as scenefile
+from evfem.sweeps.folder import Answer
+
+E, MU = "finger.materials.tissue.E", "surface.friction"
+BOUNDS = {E: (0.02, 0.5), MU: (0.05, 1.0)}
+SCENE = """
+version = 1
+[finger]
+mesh = "block.vtu"
+[finger.materials.tissue]
+law = "neo_hookean"
+E = 0.1
+nu = 0.4
+[finger.electrical]
+stratum_corneum_thickness = 0.38
+[surface]
+kind = "flat"
+friction = 0.3
+[[motion]]
+kind = "press"
+indentation = 0.2
+steps = 3
+[[motion]]
+kind = "slide"
+distance = 0.6
+steps = 3
+hold = "force"
+"""
+HOVER = SCENE[: SCENE.index("[[motion]]")] + (
+    '[electrostatics]\nlaw = "strong_troxel"\nvoltage = 100.0\ninsulator_thickness = 0.1\n'
+    'insulator_eps_r = 3.0\n[[motion]]\nkind = "hover"\ngap = 0.2\n'
+)
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A block of 45 nodes, pressed and slid."""
+    meshfile.write(block(), tmp_path / "block.vtu")
+    (tmp_path / "scene.toml").write_text(SCENE)
+    return tmp_path / "scene.toml"
+
+
+def measured(path, noise=0.0, friction=0.4, **sd):
+    """Force over indentation and friction over position of the scene with E 0.07; noise as a part
+    of their root mean squares.
+    """
+    text = SCENE.replace("E = 0.1", "E = 0.07").replace("friction = 0.3", f"friction = {friction}")
+    run = ev.simulate(scenefile.loads(text, path.parent))
+    random = np.random.default_rng(1)
+    force, slid = (
+        y + noise * np.sqrt(np.mean(y**2)) * random.normal(size=3)
+        for y in (run.normal_force[:3], run.tangential_force[3:])
+    )
+    return [
+        ev.MeasuredCurve("normal_force", "indentation", run.indentation[:3], force, motion=0, **sd),
+        ev.MeasuredCurve("tangential_force", "position", run.position[3:], slid, motion=1, **sd),
+    ]
+
+
+def test_a_synthetic_finger_is_recovered(path):
+    found = ev.fit(path, measured(path), BOUNDS, workers=1)
+    assert found[E] == pytest.approx(0.07, rel=1e-4)
+    assert found[MU] == pytest.approx(0.4, rel=1e-4)
+    assert found.warnings == ()
+    assert found.rms < 1e-5
+    fitted = ev.simulate(found.scene)
+    np.testing.assert_allclose(found.predicted[:3], fitted.normal_force[:3], rtol=1e-9)
+    np.testing.assert_allclose(found.predicted[3:], fitted.tangential_force[3:], rtol=1e-9)
+
+
+def test_with_noise_it_is_recovered_within_its_interval(path):
+    found = ev.fit(path, measured(path, noise=0.01), BOUNDS, workers=1)
+    assert found[E] == pytest.approx(0.07, rel=0.01)
+    assert found[MU] == pytest.approx(0.4, rel=0.01)
+    assert found.rms == pytest.approx(0.01 * np.sqrt(4 / 6), rel=0.7)
+    for key, true in ((E, 0.07), (MU, 0.4)):
+        low, high = found.intervals()[key]
+        assert low < true < high
+        assert high / low < 1.1
+        wider = found.intervals(0.99)[key]
+        assert wider[0] < low < high < wider[1]
+
+
+def test_friction_under_a_held_load_is_a_ratio_of_sums(path):
+    """In full slip T = mu N with N given: mu = sum T / (n N), its error s / (N sqrt(n))."""
+    path.write_text(SCENE.replace("indentation = 0.2", "force = 0.02"))
+    force = np.array([0.0082, 0.0079, 0.0076])
+    curve = ev.MeasuredCurve("tangential_force", "position", [0.4, 0.5, 0.6], force, motion=1)
+    found = ev.fit(path, curve, {MU: (0.1, 1.0)}, workers=1)
+    assert found[MU] == pytest.approx(force.mean() / 0.02, rel=1e-4)
+    spread = np.std(force, ddof=1) / np.sqrt(3) / 0.02
+    # the error is that of a logarithm
+    assert found.errors[0] == pytest.approx(spread / found[MU], rel=1e-3)
+    reach = 4.302652729911275 * found.errors[0]  # Student's 0.975 with two degrees of freedom
+    low, high = found.intervals()[MU]
+    assert (low, high) == pytest.approx((found[MU] * np.exp(-reach), found[MU] * np.exp(reach)), rel=1e-9)
+
+
+def test_hovering_forces_give_the_insulator(path):
+    """Strong and Troxel's law on a rigid outline knows the layers by their reduced thickness alone."""
+    path.write_text(HOVER)
+    settings = {"electrostatics.voltage": [100.0, 100.0, 50.0], "motion.0.gap": [0.1, 0.2, 0.1]}
+    other = HOVER.replace("insulator_eps_r = 3.0", "insulator_eps_r = 4.5")
+    forces = []
+    for voltage, gap in zip(*settings.values(), strict=True):
+        text = other.replace("voltage = 100.0", f"voltage = {voltage}").replace("gap = 0.2", f"gap = {gap}")
+        forces.append(ev.simulate(scenefile.loads(text, path.parent)).electrostatic_force[-1])
+    values = ev.MeasuredValues("electrostatic_force.last", forces, settings)
+    found = ev.fit(path, values, {"electrostatics.insulator_eps_r": (1.0, 10.0)}, workers=1)
+    assert found["electrostatics.insulator_eps_r"] == pytest.approx(4.5, rel=1e-3)
+    both = {"electrostatics.insulator_eps_r": (1.0, 10.0), "electrostatics.insulator_thickness": (0.01, 1.0)}
+    found = ev.fit(path, values, both, workers=1)
+    (warning,) = found.warnings
+    assert warning.startswith("the data do not tell electrostatics.insulator_eps_r and ")
+    reduced = found["electrostatics.insulator_thickness"] / found["electrostatics.insulator_eps_r"]
+    assert reduced == pytest.approx(0.1 / 4.5, rel=1e-3)
+    assert "not determined" in repr(found)
+
+
+def test_offsets_and_factors_act_on_what_the_data_set(path):
+    """Gaps that are 0.05 mm larger than they were set, voltages that are a fifth smaller."""
+    path.write_text(HOVER)
+    settings = {"electrostatics.voltage": [100.0, 100.0, 50.0, 80.0], "motion.0.gap": [0.1, 0.3, 0.1, 0.2]}
+    forces = []
+    for voltage, gap in zip(*settings.values(), strict=True):
+        text = HOVER.replace("voltage = 100.0", f"voltage = {0.8 * voltage}").replace(
+            "gap = 0.2", f"gap = {gap + 0.05}"
+        )
+        forces.append(ev.simulate(scenefile.loads(text, path.parent)).electrostatic_force[-1])
+    free = {
+        "motion.0.gap": ev.Parameter(-0.1, 0.2, apply="offset"),
+        "electrostatics.voltage": ev.Parameter(0.5, 2.0, apply="factor"),
+    }
+    found = ev.fit(path, ev.MeasuredValues("electrostatic_force.last", forces, settings), free, workers=1)
+    assert found["motion.0.gap"] == pytest.approx(0.05, rel=1e-3)
+    assert found["electrostatics.voltage"] == pytest.approx(0.8, rel=1e-3)
+    assert "motion.0.gap = 0.05 as offset (0.05 to 0.05 with 95 % confidence)" in repr(found)
+
+
+def test_a_parameter_at_its_bound_is_said(path):
+    found = ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.06)}, workers=1)
+    assert found[E] == pytest.approx(0.06, rel=1e-3)
+    assert f"{E} is at its bound 0.06: its interval says nothing beyond it" in found.warnings
+
+
+def test_residuals_beyond_their_sd_are_said(path):
+    data = measured(path, noise=0.1, sd=1e-5)
+    found = ev.fit(path, data, BOUNDS, workers=1)
+    (warning,) = found.warnings
+    assert warning.endswith("times the given sd: the scene does not explain the data")
+    assert f"residuals are {found.rms * np.sqrt(6 / 4):.2g} times" in warning
+    assert "rms residual" in repr(found).splitlines()[0]
+    assert repr(found).splitlines()[0].endswith(" sd")
+    again = ev.fit(path, measured(path, noise=0.01, sd=2e-4), BOUNDS, workers=1)
+    assert again.warnings == ()
+
+
+def test_a_result_is_written_and_read_back(path, tmp_path):
+    found = ev.fit(path, measured(path, noise=0.01), BOUNDS, workers=1)
+    found.save(tmp_path / "fit.json")
+    read = ev.load(tmp_path / "fit.json")
+    assert repr(read) == repr(found)
+    assert list(read.table()["lowest"]) == list(found.table()["lowest"])
+    assert read.scene.digest() == found.scene.digest()
+    np.testing.assert_array_equal(read.residuals, found.residuals)
+    assert list(found.table()["parameter"]) == [E, MU]
+    assert list(found.table()["value"]) == [found[E], found[MU]]
+    assert found.provenance["versions"]["evfem"] == ev.__version__
+    with pytest.raises(InputError, match="parameter: given nu"):
+        found["nu"]
+
+
+@pytest.mark.parametrize("text", ["", "{}", '{"format": "evfem-fit-1"}', "[1]", "{"])
+def test_a_damaged_result_is_refused(tmp_path, text):
+    (tmp_path / "fit.json").write_text(text)
+    with pytest.raises(InputError, match=r"fit: given .*, damaged or of another kind"):
+        load(tmp_path / "fit.json")
+
+
+def test_an_interrupted_fit_goes_on_where_it_was(path, tmp_path, monkeypatch):
+    """Stopped after five runs, it computes the others alone, and finds the same."""
+    data, out, work = measured(path), tmp_path / "out", runs.work
+    whole = ev.fit(path, data, BOUNDS, workers=1)
+    count = whole.provenance["runs"]
+    seen = []
+
+    def interrupted(job):
+        if len(seen) == 5:
+            raise KeyboardInterrupt
+        seen.append(job)
+        return work(job)
+
+    monkeypatch.setattr(runs, "work", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        ev.fit(path, data, BOUNDS, out=out, workers=1)
+    monkeypatch.setattr(runs, "work", work)
+    found = ev.fit(path, data, BOUNDS, out=out, workers=1)
+    assert found.provenance["runs"] == count - 5
+    assert found.values == whole.values
+    assert load(out / "fit.json").values == whole.values
+    assert json.loads((out / "sweep.json").read_text())["digest"]
+    with pytest.raises(InputError, match="points of another sweep"):
+        ev.fit(path, data, {E: (0.02, 0.4)}, out=out, workers=1)
+
+
+def test_processes_find_the_same(path):
+    alone, together = (ev.fit(path, measured(path), BOUNDS, workers=n) for n in (1, 2))
+    assert together.values == alone.values
+
+
+def test_a_broken_pool_is_opened_again(path, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs, "work", die_once)
+    monkeypatch.setenv("DIE_ONCE", str(tmp_path / "died"))
+    found = ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.5)}, workers=2)
+    assert (tmp_path / "died").exists()
+    assert found[E] == pytest.approx(0.07, rel=0.01)
+
+
+def test_progress_is_a_line_for_each_step(path, capsys):
+    ev.fit(path, measured(path), BOUNDS, workers=1, progress=True)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith(f"evfem: fit: {E} 0.1, {MU} 0.22361: rms residual 0.")
+    assert lines[0].endswith(", 1 runs so far")
+    assert 3 < len(lines) < 12
+
+
+def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
+    """Above a modulus of 0.09 nothing converges: a fit that starts there makes its first
+    differences on the other side.
+    """
+    work, failed = runs.work, []
+
+    def fragile(job):
+        modulus = scenefile.loads(job[0], job[1]).finger.materials["tissue"].E
+        if modulus > 0.09001:
+            failed.append(modulus)
+            return Answer("not_converged", 0.0, "step 1 did not converge", {})
+        return work(job)
+
+    monkeypatch.setattr(runs, "work", fragile)
+    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
+    assert found[E] == pytest.approx(0.07, rel=1e-3)
+    assert failed
+    monkeypatch.setattr(runs, "work", lambda job: Answer("not_converged", 0.0, "none", {}))
+    with pytest.raises(InputError, match="cannot be run at the start: none"):
+        ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.5)}, workers=1)
+
+
+@pytest.mark.parametrize(
+    ("free", "sentence"),
+    [
+        ({}, "parameters: given {}; allowed: {key: "),
+        ({"E": (0.1, 0.2)}, r"parameters\.E: .*TABLE\.KEY"),
+        ({E: 0.1}, f"parameters.{E}: given 0.1"),
+        ({E: (0.2, 0.1)}, "parameters.high: given 0.1; allowed: a number above 0.2"),
+        ({E: ev.Parameter(-0.1, 0.1)}, "allowed: other bounds|finger.materials.tissue.E: given"),
+        ({MU: (0.1, 200.0)}, rf"parameters\.{MU}: given the bound 200: .*; allowed: other bounds"),
+        ({"surface.colour": (0.1, 0.2)}, "surface.colour: given an unknown key"),
+        ({"motion.5.steps": (1, 2)}, "motion.5: given no such entry"),
+        ({"surface.y": ev.Parameter(0.5, 2.0, apply="factor")}, "surface.y: given no number there"),
+        ({"surface.kind": ev.Parameter(0.5, 2.0, apply="factor")}, "surface.kind: given .*flat"),
+        (dict.fromkeys((E, MU, "finger.materials.tissue.nu"), (0.1, 0.4)), "given 3 for 3 parameters"),
+    ],
+)
+def test_parameters_that_cannot_be_are_refused_before_any_run(path, free, sentence, monkeypatch):
+    monkeypatch.setattr(runs, "work", None)
+    data = ev.MeasuredCurve("normal_force", "indentation", [0.05, 0.1, 0.2], [0.1, 0.2, 0.3], motion=0)
+    with pytest.raises(InputError, match=sentence):
+        ev.fit(path, data, free, workers=1)
+
+
+def test_data_that_do_not_fit_the_scene_are_refused(path):
+    curve = ev.MeasuredCurve("normal_force", "indentation", [0.1, 0.2], [0.1, 0.2], motion=2)
+    with pytest.raises(InputError, match=r"data\.motion: given 2; allowed: motions from 0 to 1"):
+        ev.fit(path, curve, {E: (0.1, 0.2)}, workers=1)
+    with pytest.raises(InputError, match='outputs: given "normal_force"'):
+        ev.fit(path, ev.MeasuredValues("normal_force", [1, 2], {MU: [0.1, 0.2]}), {E: (0.1, 0.2)}, workers=1)
+    with pytest.raises(InputError, match="data: given 3; allowed: MeasuredCurve"):
+        ev.fit(path, [3], {E: (0.1, 0.2)}, workers=1)
+    values = ev.MeasuredValues("normal_force.last", [0.1, 0.2], {MU: [0.1, 0.2]})
+    with pytest.raises(InputError, match=rf"parameters\.{MU}: given a key that the data set"):
+        ev.fit(path, values, {MU: (0.1, 0.2)}, workers=1)
+    beyond = ev.MeasuredCurve("normal_force", "indentation", [0.1, 0.3], [0.1, 0.2], motion=0)
+    with pytest.raises(
+        InputError, match=r"scene: given one that cannot be run at the start: data\.at: .*0\.3"
+    ):
+        ev.fit(path, beyond, {E: (0.1, 0.2)}, workers=1)
+
+
+def test_a_scene_without_a_file_is_refused(path):
+    with pytest.raises(InputError, match=r"scene: given .*No such file"):
+        ev.fit(path.parent / "none.toml", measured(path), {E: (0.1, 0.2)})

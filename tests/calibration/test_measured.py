@@ -1,0 +1,121 @@
+"""Measurements: what is read of a run at measured places, csv files, refused input."""
+
+import numpy as np
+import pytest
+from tools.builders import finger
+from tools.meshes import block
+
+from evfem.calibration.measured import MeasuredCurve, MeasuredValues, along
+from evfem.contact.surfaces import Flat
+from evfem.errors import InputError
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene
+from evfem.simulation.run import simulate
+
+
+@pytest.fixture(scope="module")
+def result():
+    """A press to 0.2 mm in four steps, a slide of 0.4 mm in four."""
+    motion = [Press(indentation=0.2, steps=4), Slide(distance=-0.4, steps=4)]
+    return simulate(Scene(finger(block()), Flat(friction=0.3), motion=motion))
+
+
+def test_a_curve_meets_the_steps_and_the_state_before_a_motion(result):
+    force = along(result, "normal_force", "indentation", np.array([0.0, 0.05, 0.1, 0.2]), motion=0)
+    np.testing.assert_allclose(force, [0.0, *result.normal_force[[0, 1, 3]]], atol=1e-15)
+    # the slide begins where the press ended, and its positions fall
+    friction = along(result, "tangential_force", "position", np.array([0.0, -0.1, -0.4]), motion=1)
+    np.testing.assert_allclose(friction, result.tangential_force[[3, 4, 7]], atol=1e-15)
+
+
+def test_between_the_steps_a_curve_stays_between_them(result):
+    x = np.linspace(0.05, 0.1, 9)
+    force = along(result, "normal_force", "indentation", x, motion=0)
+    assert (np.diff(force) > 0.0).all()
+    assert force[0] == pytest.approx(result.normal_force[0], rel=1e-14)
+    # four times as many steps: the press has a closed run of its own, near by
+    fine = simulate(Scene(finger(block()), Flat(friction=0.3), motion=Press(indentation=0.2, steps=16)))
+    np.testing.assert_allclose(force, along(fine, "normal_force", "indentation", x), rtol=2e-3)
+
+
+def test_places_beyond_the_run_are_refused(result):
+    with pytest.raises(InputError, match=r"indentation from 0.1 to 0.3; allowed: .* of the run, 0 to 0.2"):
+        along(result, "normal_force", "indentation", np.array([0.1, 0.3]), motion=0)
+    with pytest.raises(InputError, match="indentation, which does not advance in the run"):
+        along(result, "normal_force", "indentation", np.array([0.1]))
+    with pytest.raises(InputError, match="indentation, which does not advance in motion 1"):
+        along(result, "normal_force", "indentation", np.array([0.1]), motion=1)
+
+
+def test_a_curve_from_a_file(tmp_path):
+    (tmp_path / "press.csv").write_text("indentation, normal_force,sd\n0.1,0.01,1e-3\n0.2,0.03,2e-3\n")
+    curve = MeasuredCurve.from_csv(tmp_path / "press.csv", motion=0)
+    assert (curve.over, curve.column, curve.motion) == ("indentation", "normal_force", 0)
+    assert (curve.at.tolist(), curve.values.tolist()) == ([0.1, 0.2], [0.01, 0.03])
+    assert curve.sd.tolist() == [1e-3, 2e-3]
+    (tmp_path / "plain.csv").write_text("position,tangential_force\n0,0\n1,0.02\n")
+    assert MeasuredCurve.from_csv(tmp_path / "plain.csv", sd=0.1).sd.tolist() == [0.1, 0.1]
+
+
+def test_values_from_a_file(tmp_path):
+    head = "finger.participant,electrostatics.voltage,motion.0.gap,electrostatic_force.last"
+    (tmp_path / "hover.csv").write_text(f"{head}\ni,2000,0.5,2e-4\nii,1414,0.25,1e-4\n")
+    values = MeasuredValues.from_csv(tmp_path / "hover.csv")
+    assert values.output == "electrostatic_force.last"
+    assert values.where == {
+        "finger.participant": ["i", "ii"],
+        "electrostatics.voltage": [2000.0, 1414.0],
+        "motion.0.gap": [0.5, 0.25],
+    }
+    assert values.values.tolist() == [2e-4, 1e-4]
+    assert values.sd is None
+    assert values.names[1].startswith("electrostatic_force.last, finger.participant ")
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "then no line of values"),
+        ("indentation,normal_force\n", "then no line of values"),
+        ("indentation,normal_force\n0.1\n", "then '0.1'; allowed: a readable csv file"),
+        ("indentation,indentation\n0.1,2\n", "then a name twice"),
+        ("indentation,normal_force,time\n0.1,2,3\n", "indentation,normal_force,time; allowed: two columns"),
+        ("indentation,force\n0.1,2\n", "data.column: given an unknown key; allowed: "),
+        ("indentation,normal_force\n0.1,much\n", "data.values: given"),
+    ],
+)
+def test_damaged_files_are_refused(tmp_path, text, sentence):
+    (tmp_path / "press.csv").write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        MeasuredCurve.from_csv(tmp_path / "press.csv")
+    with pytest.raises(InputError, match="No such file"):
+        MeasuredCurve.from_csv(tmp_path / "none.csv")
+
+
+GAPS = {"motion.0.gap": [0.1, 0.2]}
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (lambda: MeasuredCurve("motion", "indentation", [0.1], [1.0]), r"data\.column: given an unknown key"),
+        (lambda: MeasuredCurve("time", "depth", [0.1], [1.0]), r"data\.over: given an unknown key"),
+        (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
+        (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),
+        (lambda: MeasuredCurve("time", "position", [1, 1], [1, 2]), "the same place twice"),
+        (lambda: MeasuredCurve("time", "position", [1], [2], sd=0.0), r"data\.sd: .*larger than 0"),
+        (lambda: MeasuredCurve("time", "position", [1], [2], sd=[1.0, 2.0]), r"data\.sd"),
+        (lambda: MeasuredCurve("time", "position", [1], [2], motion=-1), r"data\.motion: given -1"),
+        (lambda: MeasuredCurve("time", "position", [1], [2], where={"gap": 1}), r"data\.where: .*TABLE\.KEY"),
+        (lambda: MeasuredValues("time.last", [1.0], GAPS), r"data\.where\.motion\.0\.gap: .*1 values"),
+        (lambda: MeasuredValues("time.last", [1.0], {}), r"data\.where: given"),
+        (lambda: MeasuredValues("time.last", [1.0, np.nan], GAPS), r"data\.values: .*not finite, number 2"),
+        (
+            lambda: MeasuredValues("time.last", [1, 2], {"motion.0.gap": [np.nan, 1]}),
+            r"where\.motion\.0\.gap: .*finite",
+        ),
+    ],
+)
+def test_what_is_no_measurement_is_refused(make, sentence):
+    with pytest.raises(InputError, match=sentence):
+        make()

@@ -1,0 +1,207 @@
+"""Curves hold the numbers of the result and say their units."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.fakes import fake_result, fake_row
+from tools.meshes import square_mesh
+
+from evfem.errors import InputError
+from evfem.plotting import (
+    compare,
+    contact_area,
+    energies,
+    force_indentation,
+    forces,
+    friction,
+    history,
+    signal,
+    spectrum,
+)
+from evfem.plotting.curves import ENERGIES, OVER, abscissa
+from evfem.plotting.labels import kind_of
+from evfem.simulation.result import COLUMNS, Result
+
+
+def lines_of(ax):
+    return {line.get_label(): line for line in ax.get_lines()}
+
+
+def assert_line(line, x, y):
+    np.testing.assert_array_equal(line.get_xdata(), x)
+    np.testing.assert_array_equal(line.get_ydata(), y)
+
+
+def run_of(kinds, **columns):
+    """A made-up result of motions, some columns given."""
+    rows = [fake_row(step + 1) | {"motion": kind} for step, kind in enumerate(kinds)]
+    result = Result.from_rows(rows, [], square_mesh(), {})
+    return replace(result, **{name: np.array(values) for name, values in columns.items()})
+
+
+def test_forces_are_drawn_over_the_step_when_a_press_precedes_the_slide():
+    result = fake_result()
+    ax = forces(result)
+    lines = lines_of(ax)
+    assert_line(lines["normal (contact)"], result.step, result.normal_force)
+    assert_line(lines["electrostatic"], result.step, result.electrostatic_force)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("step", "force per depth (N/mm)")
+    assert [text.get_text() for text in ax.texts] == ["press", "slide"]
+
+
+def test_forces_are_drawn_over_what_is_asked_for():
+    result = fake_result()
+    ax = forces(result, over="position")
+    assert_line(lines_of(ax)["tangential (contact)"], result.position, result.tangential_force)
+    assert ax.get_xlabel() == "position of the bone (mm)"
+    assert not list(ax.texts)
+    with pytest.raises(InputError, match="position"):
+        forces(result, over="normal_force")
+
+
+def test_forces_that_are_zero_are_left_out():
+    result = fake_result()
+    result.electrostatic_force[:] = 0.0
+    result.tangential_force[:] = 1e-16  # as rounding leaves it
+    assert not {"electrostatic", "tangential (contact)"} & set(lines_of(forces(result)))
+
+
+@pytest.mark.parametrize(
+    ("kinds", "columns", "over"),
+    [
+        (["press"] * 3, {"indentation": [0.1, 0.2, 0.3]}, "indentation"),
+        (["press"] * 3, {"indentation": [0.1, 0.3, 0.2]}, "step"),
+        (["slide"] * 3, {"position": [0.1, 0.2, 0.3]}, "position"),
+        (["slide"] * 3, {"position": [-0.1, -0.2, -0.3]}, "position"),
+        (["slide"] * 3, {"position": [0.1, 0.2, 0.1]}, "step"),
+        (["press", "slide", "slide"], {"position": [0.0, 0.1, 0.2]}, "position"),
+        (["press", "press", "slide"], {"position": [0.0, 0.0, 0.1]}, "step"),
+        (["voltage"] * 3, {"voltage": [0.0, 10.0, 20.0]}, "voltage"),
+        (["hover"], {}, "step"),
+        (["press", "wait", "wait"], {"time": [0.1, 0.2, 0.3], "position": [0.0] * 3}, "time"),
+    ],
+)
+def test_a_run_is_drawn_over_what_its_motions_change(kinds, columns, over):
+    result = run_of(kinds, **columns)
+    assert abscissa(result) == over
+    ax = forces(result)
+    assert_line(lines_of(ax)["normal (contact)"], getattr(result, over), result.normal_force)
+
+
+def test_over_the_time_steps_that_take_none_are_one_moment():
+    result = run_of(["press", "press", "wait", "wait"], time=[0.0, 0.0, 0.1, 0.2], position=[0.0] * 4)
+    kept = [1, 2, 3]
+    assert_line(lines_of(forces(result))["normal (contact)"], result.time[kept], result.normal_force[kept])
+    (panel,) = history(result, ["voltage"])
+    assert_line(panel.get_lines()[0], result.time[kept], result.voltage[kept])
+    drawn = signal(result)[0].get_lines()[0]
+    assert_line(drawn, result.time[kept], result.voltage[kept])
+
+
+def test_energies_are_those_of_the_history():
+    result = fake_result()
+    ax = energies(result)
+    lines = lines_of(ax)
+    for name, (label, _, _) in ENERGIES.items():
+        assert_line(lines[label], result.step, getattr(result, name))
+    assert ax.get_ylabel() == "energy per depth (N)"
+
+
+def test_a_history_has_a_panel_for_each_kind_of_column():
+    result = fake_result()
+    columns = ["applied_force", "voltage", "contact_width", "normal_force", "real_contact_width"]
+    panels = history(result, columns, over="position")
+    assert [list(lines_of(ax)) for ax in panels] == [
+        ["applied force", "normal force"],
+        ["voltage"],
+        ["contact width", "real contact width"],
+    ]
+    for ax in panels:
+        for label, line in lines_of(ax).items():
+            assert_line(line, result.position, getattr(result, label.replace(" ", "_")))
+    labels = ["force per depth (N/mm)", "voltage (V)", "width (mm)"]
+    assert [ax.get_ylabel() for ax in panels] == labels
+    assert panels[-1].get_xlabel() == "position of the bone (mm)"
+    for wrong in ("voltage", [], ["motion"], ["force"]):
+        with pytest.raises(InputError, match="column"):
+            history(result, wrong)
+
+
+def test_several_results_are_compared_by_name():
+    one, two = fake_result(), fake_result(steps=6)
+    ax = compare({"one": one, "two": two}, "contact_width", "position")
+    assert_line(lines_of(ax)["one"], one.position, one.contact_width)
+    assert_line(lines_of(ax)["two"], two.position, two.contact_width)
+    assert ax.get_ylabel() == "contact width (mm)"
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["one", "two"]
+    styles = [(line.get_color(), line.get_linestyle()) for line in ax.get_lines()]
+    assert styles[0][0] != styles[1][0]
+    assert styles[0][1] != styles[1][1]
+
+
+def test_force_over_indentation_is_that_of_the_presses():
+    result = fake_result()
+    ax = force_indentation(result)
+    assert_line(ax.get_lines()[0], result.indentation[:2], result.applied_force[:2])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("indentation (mm)", "force per depth (N/mm)")
+    assert ax.get_legend() is None
+    both = force_indentation({"a": result, "b": fake_result()})
+    assert [text.get_text() for text in both.get_legend().get_texts()] == ["a", "b"]
+    with pytest.raises(InputError, match="a run of slide; allowed: a run with a press"):
+        force_indentation(run_of(["slide"]))
+
+
+def test_contact_over_load_has_both_widths():
+    result = fake_result()
+    ax = contact_area(result)
+    lines = lines_of(ax)
+    assert_line(lines["edge to edge"], result.applied_force[:2], result.contact_width[:2])
+    assert_line(lines["touching"], result.applied_force[:2], result.real_contact_width[:2])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("applied force (N/mm)", "width (mm)")
+    assert "pad, touching" in lines_of(contact_area({"pad": result, "other": result}))
+
+
+def test_friction_is_the_ratio_on_the_bone_where_there_is_a_load():
+    result = fake_result()
+    result.applied_force[0] = 0.0
+    ax = friction(result, "position")
+    ratio = result.applied_tangential_force[1:] / result.applied_force[1:]
+    assert_line(ax.get_lines()[0], result.position[1:], ratio)
+    assert ax.get_ylabel() == "apparent friction coefficient"
+
+
+def test_a_signal_stands_above_the_friction_that_it_makes():
+    one, two = fake_result(), fake_result(steps=6)
+    above, below = signal({"wish": one, "display": two}, over="position")
+    assert_line(lines_of(above)["display"], two.position, two.voltage)
+    assert_line(lines_of(below)["display"], two.position, two.applied_tangential_force)
+    assert_line(lines_of(below)["wish"], one.position, one.applied_tangential_force)
+    assert (above.get_ylabel(), below.get_ylabel()) == ("voltage (V)", "friction force (N/mm)")
+    assert below.get_xlabel() == "position of the bone (mm)"
+
+
+def test_a_spectrum_is_that_of_the_waiting_finger_without_its_mean():
+    time = np.arange(1, 41) * 0.005  # 0.2 s: lines every 5 Hz up to 100 Hz
+    force = 1.0 + 0.25 * np.sin(2.0 * np.pi * 20.0 * time)
+    result = run_of(["wait"] * 40, time=time, tangential_force=force)
+    result = replace(result, motion_index=np.zeros(40, dtype=int))
+    ax = spectrum(result)
+    frequency, amplitude = ax.get_lines()[0].get_data()
+    np.testing.assert_allclose(frequency, np.arange(1, 21) * 5.0)
+    np.testing.assert_allclose(amplitude, np.where(frequency == 20.0, 0.25, 0.0), atol=1e-12)
+    labels = ("frequency (Hz)", "amplitude of tangential force (N/mm)")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == labels
+    both = spectrum({"a": result, "b": result}, "normal_force", stop=0.1)
+    assert both.get_lines()[1].get_xdata()[0] == pytest.approx(10.0)
+
+
+def test_what_can_be_drawn_over_is_in_the_history():
+    assert set(OVER) <= set(COLUMNS)
+
+
+def test_every_column_has_a_kind_and_a_unit():
+    """All but counts end in a word that says their unit."""
+    counts = {"step", "motion_index", "motion", "substeps", "newton_iterations"}
+    assert {name for name in COLUMNS if not kind_of(name)[1]} == counts
+    assert kind_of("electrostatic_force_x") == kind_of("normal_force") == ("force per depth", "N/mm")

@@ -1,0 +1,81 @@
+"""The table of a sweep: every point where its numbers are."""
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.plotting import sweep, sweep_map
+from evfem.sweeps.run import SweepResult
+
+GAP, LAW, OUT = "motion.0.gap", "electrostatics.law", "electrostatic_force.last"
+GRID = [(gap, law, gap * 10 + (law == "b")) for gap in (0.5, 0.1, 0.3) for law in ("a", "b")]
+
+
+def table(rows, names=(GAP, LAW, OUT), samples=None):
+    columns = ("point", *names, "status", "seconds", "message")
+    filled = [
+        {"point": i, **dict(zip(names, row, strict=True)), "status": "done"} for i, row in enumerate(rows)
+    ]
+    return SweepResult(columns, filled, {"samples": samples, "points": {}})
+
+
+def test_a_line_for_each_value_of_a_column_in_rising_order():
+    ax = sweep(table(GRID), GAP, OUT, by=LAW)
+    lines = {line.get_label(): line for line in ax.get_lines()}
+    assert list(lines) == ["law a", "law b"]
+    np.testing.assert_array_equal(lines["law b"].get_xdata(), [0.1, 0.3, 0.5])
+    np.testing.assert_array_equal(lines["law b"].get_ydata(), [2.0, 4.0, 6.0])
+    assert lines["law b"].get_linestyle() == "--"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("gap (mm)", "electrostatic force, last (N/mm)")
+
+
+def test_what_is_varied_beside_is_points_without_a_line():
+    (line,) = sweep(table(GRID), GAP, OUT).get_lines()
+    assert line.get_linestyle() == "None"
+    assert line.get_marker() == "o"
+    assert len(line.get_xdata()) == 6
+
+
+def test_samples_are_points_without_a_line():
+    (line,) = sweep(table(GRID[:2], samples={"count": 2}), GAP, OUT).get_lines()
+    assert line.get_linestyle() == "None"
+
+
+def test_names_stand_in_the_order_of_the_table():
+    ax = sweep(table(GRID[:2]), LAW, OUT)
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["a", "b"]
+    np.testing.assert_array_equal(ax.get_lines()[0].get_xdata(), [0, 1])
+    np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), [5.0, 6.0])
+
+
+def test_points_without_a_number_are_left_out():
+    rows = [(0.1, "a", 1.0), (0.3, "a", None), (0.5, "a", 5.0)]
+    (line,) = sweep(table(rows), GAP, OUT).get_lines()
+    np.testing.assert_array_equal(line.get_xdata(), [0.1, 0.5])
+    with pytest.raises(InputError, match="no point with"):
+        sweep(table(rows[1:2]), GAP, OUT)
+
+
+def test_a_map_has_a_cell_around_each_point():
+    rows = [(x, y, 10 * x + y) for x in (2.0, 1.0, 4.0) for y in (0.1, 0.3) if (x, y) != (4.0, 0.3)]
+    names = ("motion.0.force", "surface.friction", OUT)
+    ax = sweep_map(table([*rows, (4.0, 0.3, None)], names), names[0], names[1], OUT)
+    cells = ax.collections[0].get_array()
+    np.testing.assert_allclose(cells[0], [10.1, 20.1, 40.1])
+    np.testing.assert_allclose(cells[1, :2], [10.3, 20.3])
+    assert cells.mask.tolist() == [[False] * 3, [False, False, True]]
+    edges = ax.collections[0].get_coordinates()
+    np.testing.assert_allclose(edges[0, :, 0], [0.5, 1.5, 3.0, 5.0])
+    np.testing.assert_allclose(edges[:, 0, 1], [0.0, 0.2, 0.4])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("force (N/mm)", "friction")
+    (bar,) = [one for one in ax.figure.axes if one is not ax]
+    assert bar.get_ylabel() == "electrostatic force, last (N/mm)"
+
+
+def test_what_is_no_map_gets_a_sentence():
+    with pytest.raises(InputError, match="two columns of numbers"):
+        sweep_map(table(GRID), GAP, LAW, OUT)
+    with pytest.raises(InputError, match="several points at one place"):
+        sweep_map(table(GRID), GAP, GAP, OUT)
+    with pytest.raises(InputError, match=r"column: given motion.1.gap; allowed: point, motion.0.gap"):
+        sweep(table(GRID), "motion.1.gap", OUT)

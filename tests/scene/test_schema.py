@@ -1,0 +1,262 @@
+"""The keys of scenes and sweeps as rows and as JSON schemas: complete, and as strict as the reader
+of the files, but not stricter.
+"""
+
+import json
+import tomllib
+from dataclasses import fields
+
+import jsonschema
+import pytest
+import tomli_w
+from tools.meshes import square_mesh
+
+from evfem import templates
+from evfem.errors import InputError
+from evfem.finger.fingerpad import FingerPad
+from evfem.mesh import file as meshfile
+from evfem.scene import keys, meanings
+from evfem.scene import schema as scenes
+from evfem.scene.file import dump, load, loads
+from evfem.scene.scene import default_scene
+from evfem.scene.voltage import SIGNALS
+from evfem.sweeps import file as sweepfile
+from evfem.sweeps import schema as sweeps
+from evfem.tissue.laws import LAWS
+
+#: a scene for each table, with the dotted place of the table
+SLIDE = """
+version = 1
+[finger]
+[finger.electrical]
+[surface]
+kind = "sinusoid"
+[electrostatics]
+law = "kaczmarek"
+voltage = 10.0
+insulator_thickness = 0.1
+insulator_eps_r = 3.0
+[solver]
+contact = "penalty"
+penalty_normal = 1.0
+penalty_tangential = 1.0
+[solver.strategy]
+[output]
+[[motion]]
+kind = "press"
+indentation = 0.1
+[[motion]]
+kind = "slide"
+distance = 1.0
+[[motion]]
+kind = "hover"
+gap = 0.1
+[[motion]]
+kind = "voltage"
+voltage = 10.0
+[[motion]]
+kind = "wait"
+duration = 1.0
+"""
+PLACES = {"press": 0, "slide": 1, "hover": 2, "voltage": 3, "wait": 4}
+#: tables that `SLIDE` does not have
+ELSEWHERE = ("finger.materials", "surface", "electrostatics.signal")
+
+
+def judged(schema, text):
+    """Mistakes that a schema finds in a TOML text."""
+    return list(jsonschema.Draft7Validator(schema).iter_errors(tomllib.loads(text)))
+
+
+@pytest.fixture(scope="module")
+def scene_schema():
+    jsonschema.Draft7Validator.check_schema(scenes.schema())
+    return scenes.schema()
+
+
+def test_every_key_of_the_models_has_its_row():
+    found = {(one.name, one.kind): {key.name for key in one.keys} for one in scenes.sections()}
+    models = {
+        ("", ""): keys.SceneTable,
+        ("finger.electrical", ""): keys.ElectricalTable,
+        ("electrostatics", ""): keys.ElectrostaticsTable,
+        ("solver", ""): keys.SolverTable,
+        ("solver.strategy", ""): keys.StrategyTable,
+        ("output", ""): keys.OutputTable,
+    }
+    models |= {("surface", kind): model for kind, model in keys.SURFACES.items()}
+    models |= {("electrostatics.signal", kind): model for kind, model in SIGNALS.items()}
+    models |= {("motion", kind): model for kind, (model, _) in keys.MOTIONS.items()}
+    for place, model in models.items():
+        assert found.pop(place) == set(model.model_fields), place
+    assert found.pop(("finger", "mesh")) == {*keys.MeshTable.model_fields, "depth"}
+    assert found.pop(("finger", "parametric")) == {"participant", "depth"} | {
+        spec.name for spec in fields(FingerPad) if spec.init
+    }
+    for name, law in LAWS.items():
+        parameters = {spec.name for spec in fields(law) if spec.init}
+        assert found.pop(("finger.materials.NAME", name)) == parameters | {"law"}
+    assert found == {}
+
+
+def test_every_key_says_what_it_is_and_no_text_is_left_over():
+    used = set()
+    for one in [*scenes.sections(), *sweeps.sections()]:
+        for key in one.keys:
+            assert key.meaning, key
+            assert key.allowed, key
+            used.add(key.meaning)
+    written = [
+        meanings.SCENE,
+        meanings.FINGER,
+        meanings.MESHED_FINGER,
+        meanings.ELECTRICAL,
+        meanings.MATERIAL,
+    ]
+    written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
+    written += [*meanings.MOTION.values(), meanings.SIGNAL, sweeps.SWEEP, sweeps.SAMPLES, sweeps.DISTRIBUTION]
+    for table in [*written, {name: t for name, t in meanings.SURFACE.items() if name != "kind"}]:
+        for name, text in table.items():
+            assert text.meaning in used, name
+
+
+def test_the_defaults_are_those_of_a_scene(scene_schema):
+    """Every default of the schema, written into a file, makes the scene that the bare file makes."""
+    exact = SLIDE.replace('contact = "penalty"\npenalty_normal = 1.0\npenalty_tangential = 1.0\n', "")
+    bare, tried = loads(exact), 0
+    for one in scenes.sections():
+        elsewhere = one.name.startswith(ELSEWHERE) or one.kind == "mesh"
+        for key in () if elsewhere else one.keys:
+            if "default" in key.schema:
+                text = put(one, key.name, key.schema["default"], exact)
+                assert loads(text) == bare, (one.name, key.name)
+                assert judged(scene_schema, text) == []
+                tried += 1
+    assert tried > 40
+
+
+def put(section, key, value, text=SLIDE):
+    """A scene's text with one key of a section set."""
+    tables = tomllib.loads(text)
+    table = tables["motion"][PLACES[section.kind]] if section.name == "motion" else tables
+    for part in section.name.split(".") if section.name not in ("", "motion") else ():
+        table = table[part]
+    table[key] = value
+    return tomli_w.dumps(tables)
+
+
+@pytest.mark.parametrize("side", ["minimum", "exclusiveMinimum", "maximum", "not"])
+def test_what_the_schema_refuses_the_reader_refuses(scene_schema, side):
+    """Beyond each limit both refuse; a schema that is stricter than the reader would be a lie."""
+    tried = 0
+    for one in scenes.sections():
+        if one.name.startswith(ELSEWHERE) or one.kind == "mesh":
+            continue
+        for key in one.keys:
+            if side not in key.schema:
+                continue
+            limit = 0 if side == "not" else key.schema[side]
+            step = {"minimum": -1, "maximum": 1}.get(side, 0)
+            text = put(one, key.name, limit + step)
+            assert judged(scene_schema, text), (one.name, key.name)
+            with pytest.raises(InputError) as caught:
+                loads(text)
+            assert caught.value.key.endswith(key.name)
+            tried += 1
+    assert tried >= {"minimum": 30, "exclusiveMinimum": 5, "maximum": 30, "not": 1}[side]
+
+
+def test_words_that_are_no_choice_are_refused_by_both(scene_schema):
+    tried = 0
+    for one in scenes.sections():
+        for key in one.keys:
+            if "enum" in key.schema and one.kind != "mesh" and not one.name.startswith(ELSEWHERE):
+                assert key.allowed == " | ".join(key.schema["enum"]), key
+                assert judged(scene_schema, put(one, key.name, "no such word"))
+                with pytest.raises(InputError):
+                    loads(put(one, key.name, "no such word"))
+                tried += 1
+    assert tried >= 8
+
+
+def test_scenes_that_are_read_are_valid_and_misspelt_ones_are_not(scene_schema, tmp_path):
+    meshfile.write(square_mesh("quad"), tmp_path / "pad.vtu")
+    sine = '{ kind = "sine", frequency = 9, amplitude = 5 }'
+    hum = f'signal = {{ kind = "carrier", frequency = 1e4, envelope = {sine} }}'
+    texts = [
+        SLIDE,
+        SLIDE.replace("voltage = 10.0", hum, 1),
+        SLIDE.replace("[finger]", "[finger]\nparticipant = 'ii'"),
+    ]
+    texts += [SLIDE + "[finger.materials.dermis]\nE = 0.1\n"]
+    texts += [dump(default_scene()), *(templates.text(name) for name in templates.TEMPLATES)]
+    assert [judged(scene_schema, text) for text in texts] == [[]] * len(texts)
+    for wrong in ("frictoin = 0.3", "kind = 3"):
+        assert judged(scene_schema, templates.text("hover").replace('kind = "flat"', wrong))
+    for missing in ("version = 1", '[[motion]]\nkind = "hover"\ngap = 0.2', 'law = "strong_troxel"'):
+        text = templates.text("hover").split('[[motion]]\nkind = "voltage"')[0].replace(missing, "")
+        assert judged(scene_schema, text), missing
+
+
+def test_sweeps_have_their_schema():
+    schema = sweeps.schema()
+    jsonschema.Draft7Validator.check_schema(schema)
+    inner = SLIDE.replace("version = 1", "").replace("[[motion]]", "[[scene.motion]]")
+    for table in ("finger", "surface", "electrostatics", "solver", "output"):
+        inner = inner.replace(f"\n[{table}", f"\n[scene.{table}")
+    grid = "[grid]\nsurface.friction = [0.1, 0.2]\n"
+    samples = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\nsurface.y = { normal = [-9.0, 0.1] }\n"
+    for text in (f"version = 1\n{inner}{grid}", f"version = 1\n{inner}{samples}"):
+        assert judged(schema, text) == []
+        sweepfile.loads(text)
+    for wrong in (
+        f"version = 1\n{inner}{samples}".replace("count = 3", "count = 0"),
+        f"version = 1\n{inner}{grid}".replace("insulator_eps_r = 3.0", "insulator_eps_r = 0.3"),
+        grid,
+    ):
+        assert judged(schema, wrong)
+
+
+def test_the_schema_is_plain_json():
+    for made in (scenes.schema(), sweeps.schema()):
+        assert json.loads(json.dumps(made, allow_nan=False)) == made
+
+
+@pytest.mark.parametrize("name", templates.TEMPLATES)
+def test_what_a_template_comments_out_is_a_default(name, tmp_path):
+    """Each line `#key = value` names a key of its table, and its value is the default, if it has one."""
+    section, checked = "", 0
+    tables = {one.name: {} for one in scenes.sections()}
+    for one in scenes.sections():
+        for key in one.keys:
+            tables[one.name].setdefault(key.name, []).append(key)
+    for line in templates.text(name).splitlines():
+        if line.startswith(("[", "#[")):
+            section = line.lstrip("#").split("#")[0].strip().strip("[]")
+            section = "finger.materials.NAME" if section.startswith("finger.materials.") else section
+        elif line.startswith("#") and " = " in line and not line.startswith("# "):
+            key, value = next(iter(tomllib.loads(line[1:]).items()))
+            found = tables[section][key]
+            defaults = [one.schema["default"] for one in found if "default" in one.schema]
+            assert not defaults or value in defaults, line
+            checked += 1
+    assert checked >= 2
+
+
+def test_a_template_makes_a_scene_and_overwrites_nothing(tmp_path):
+    for name in templates.TEMPLATES:
+        path = tmp_path / f"{name}.toml"
+        written = templates.write(name, path)
+        assert load(path).total_steps > 5
+        before = {file: file.read_bytes() for file in tmp_path.iterdir()}
+        for file in written:
+            others = [one for one in written if one != file]
+            for one in others:
+                one.unlink()
+            with pytest.raises(InputError, match="which exists; allowed: a file that is not there yet"):
+                templates.write(name, path)
+            assert all(not one.exists() for one in others)
+            for one in others:
+                one.write_bytes(before[one])
+    with pytest.raises(InputError, match=r'--template: given "none"; allowed: display \| texture'):
+        templates.text("none")

@@ -1,0 +1,147 @@
+"""Runs in which time passes: waiting, voltages over time, and going on in the middle of one."""
+
+import numpy as np
+import pytest
+from tools.builders import balance, finger
+from tools.meshes import block
+
+import evfem as ev
+from evfem.simulation.result import COLUMNS, Saved
+from evfem.simulation.run import Run
+
+#: steps are long on purpose: equal ones are compared with each other
+pytestmark = pytest.mark.filterwarnings("ignore:motion . has .* steps in a period of the voltage")
+
+ROUND = finger(block(8, 3, sag=0.4))
+PRESS = ev.Press(force=0.02, steps=3)
+HUM = ev.Sine(50.0, amplitude=2000.0, bias=300.0)
+
+
+def run(*motion, voltage=HUM, body=ROUND, friction=0.3, **options):
+    return ev.simulate(scene(*motion, voltage=voltage, body=body, friction=friction), **options)
+
+
+def scene(*motion, voltage=HUM, body=ROUND, friction=0.3, **options):
+    return ev.Scene(body, ev.Display(friction=friction), ev.Kaczmarek(), voltage, motion, **options)
+
+
+@pytest.mark.parametrize("hold", ["indentation", "force"])
+def test_a_waiting_finger_feels_the_voltage_of_the_moment(hold):
+    result = run(PRESS, ev.Wait(0.02, steps=40, hold=hold), ev.Slide(0.2, steps=4, speed=20.0, hold=hold))
+    step = np.concatenate([np.zeros(3), np.full(40, 0.02 / 40), np.full(4, 0.2 / 20.0 / 4)])
+    np.testing.assert_allclose(result.time, np.cumsum(step), rtol=1e-12)
+    np.testing.assert_allclose(result.voltage, HUM(result.time), rtol=1e-12, atol=1e-9)
+    assert result.motion[3] == "wait"
+    assert not result.position[:43].any()
+    assert balance(result).max() < 1e-7
+    kept = result.applied_force if hold == "force" else result.indentation
+    free = result.indentation if hold == "force" else result.applied_force
+    np.testing.assert_allclose(kept[3:], kept[2], rtol=1e-8)
+    assert np.ptp(free[3:43]) > 1e-4 * abs(free[2])
+    # the attraction goes with the square of the voltage: at its largest, a quarter of a period on
+    assert int(np.argmax(result.electrostatic_force[3:43])) == 9
+    assert result.electrostatic_force[12] / result.electrostatic_force[2] > (2300.0 / 300.0) ** 2
+
+
+def test_an_equilibrium_does_not_depend_on_how_long_it_took():
+    """Quasi-static: the same voltages as a profile over the position, at the same places."""
+    slide = ev.Slide(0.4, steps=8, speed=20.0)
+    time = run(PRESS, slide, voltage=ev.Sine(40.0, 1000.0, 200.0))
+    x = np.linspace(0.0, 0.4, 4001)
+    place = run(PRESS, slide, voltage=ev.VoltageProfile(x, ev.Sine(40.0, 1000.0, 200.0)(x / 20.0)))
+    np.testing.assert_allclose(time.tangential_force, place.tangential_force, rtol=1e-5)
+    np.testing.assert_allclose(time.electrostatic_force, place.electrostatic_force, rtol=1e-5)
+
+
+def test_tissue_creeps_while_the_finger_waits():
+    """Kelvin-Voigt tissue under a held load goes where it goes without viscosity, in a few
+    relaxation times.
+    """
+    soft = finger(block(8, 3, sag=0.4), viscosity=5e-3)
+    motion = PRESS, ev.Wait(0.1, steps=25, hold="force")
+    plain = ev.simulate(scene(PRESS, voltage=0.0, friction=0.0))
+    slow = ev.simulate(
+        scene(*motion, voltage=0.0, body=soft, friction=0.0, solver=ev.Solver(dynamics="viscous"))
+    )
+    sudden = slow.indentation[2]
+    np.testing.assert_allclose(slow.applied_force[2:], 0.02, rtol=1e-7)
+    assert sudden == pytest.approx(plain.indentation[-1], rel=1e-6)  # a press without speed takes no time
+    assert slow.indentation[-1] == pytest.approx(sudden, rel=1e-6)
+    pressed = ev.Press(indentation=plain.indentation[-1], steps=3, speed=50.0)
+    relaxing = ev.simulate(
+        scene(
+            pressed,
+            ev.Wait(0.1, steps=25),
+            voltage=0.0,
+            body=soft,
+            friction=0.0,
+            solver=ev.Solver(dynamics="viscous"),
+        )
+    )
+    force = relaxing.applied_force
+    assert force[2] > 1.05 * 0.02
+    assert (np.diff(force[2:]) < 1e-9).all()
+    assert force[-1] == pytest.approx(0.02, rel=1e-3)
+
+
+@pytest.mark.parametrize("at", [4, 9])
+def test_a_run_resumed_while_waiting_ends_like_an_uninterrupted_one(at):
+    kept, rows = {}, []
+
+    class Observer:
+        def step(self, row, frame, checkpoint):
+            rows.append(row)
+            kept[row["step"]] = {name: np.copy(array) for name, array in checkpoint().items()}
+
+    motion = PRESS, ev.Wait(0.01, steps=5, hold="force"), ev.Slide(0.1, steps=5, speed=10.0)
+    whole = run(*motion, observers=[Observer()])
+    assert len(whole.step) == 13
+    resumed = run(*motion, resume=Saved(kept[at], rows[:at]))
+    for name in set(COLUMNS) - {"seconds", "newton_iterations", "motion", "substeps"}:
+        np.testing.assert_allclose(
+            getattr(resumed, name), getattr(whole, name), rtol=1e-7, atol=1e-10, err_msg=name
+        )
+    assert resumed.time.tolist() == whole.time.tolist()
+    assert resumed.voltage.tolist() == whole.voltage.tolist()
+
+
+def test_the_parts_of_a_step_follow_the_signal():
+    """A step of half a period, cut into parts: the voltage of the parts is that of their time."""
+    seen = []
+    made = scene(PRESS, ev.Wait(0.01, steps=1))
+    going = Run(made, None)
+    for request in going.requests():
+        if request.kind == "wait":
+            seen = [request.path(0.0, part) for part in (0.25, 0.5, 1.0)]
+        going.advance(request)
+    np.testing.assert_allclose(
+        [t.drive.voltage for t in seen], HUM(np.array([0.0025, 0.005, 0.01])), atol=1e-9
+    )
+    assert [t.duration for t in seen] == pytest.approx([0.0025, 0.005, 0.01])
+
+
+def test_the_first_step_of_a_signal_acts_in_full_as_a_number_does():
+    signal = ev.Sine(50.0, 100.0, bias=1500.0)
+    press = ev.Press(indentation=0.2, steps=2)
+    over_time = run(press, ev.Wait(0.02, steps=1), voltage=signal)
+    number = run(press, voltage=1500.0)
+    for name in ("electrostatic_force", "electrostatic_work", "external_work"):
+        np.testing.assert_allclose(getattr(over_time, name)[:2], getattr(number, name), rtol=1e-9)
+
+
+def test_the_fast_model_takes_signals_over_time():
+    pad = ev.FingerPad(ridges=False, resolution="coarse")
+    display = ev.Display(friction=0.3)
+    trained = ev.reduce(
+        ev.Scene(
+            pad, display, ev.Kaczmarek(), 2000.0, [ev.Press(force=0.05, steps=4), ev.Slide(1.5, steps=8)]
+        )
+    )
+    hum = ev.Sine(50.0, 1500.0)
+    motion = ev.Press(force=0.05, steps=4), ev.Slide(1.0, steps=20, speed=50.0, hold="force")
+    asked = ev.Scene(pad, display, ev.Kaczmarek(), hum, motion)
+    fast = trained.simulate(asked)
+    assert not fast.provenance["fast"]["fallback"]
+    np.testing.assert_allclose(fast.voltage, hum(fast.time), atol=1e-9)
+    full = ev.simulate(asked)
+    np.testing.assert_allclose(fast.electrostatic_force, full.electrostatic_force, rtol=2e-3, atol=1e-6)

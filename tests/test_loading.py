@@ -1,0 +1,84 @@
+"""`ev.load` and the paths that `simulate` and `plan` take: one way in for every file."""
+
+import numpy as np
+import pytest
+from tools.fakes import SQUARE_SCENE, fake_result
+from tools.meshes import square_mesh
+
+import evfem as ev
+from evfem.electrostatics.signalfile import Playback, write_signal
+from evfem.errors import InputError
+from evfem.mesh import file as meshfile
+from evfem.simulation.result import Checkpoint
+
+PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
+SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    meshfile.write(square_mesh("quad9"), tmp_path / "square.vtu")
+    (tmp_path / "square.toml").write_text(PRESS)
+    (tmp_path / "two.toml").write_text(SWEEP)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_each_file_is_known_by_what_is_in_it(place):
+    signal = ev.VoltageProfile([0.0, 1.0], [0.0, 300.0])
+    signal.to_csv("ramp.csv")
+    write_signal("ramp.wav", signal, Playback(400.0, speed=10.0, rate=8000))
+    result = fake_result()
+    result.save("no.ending")
+    meshfile.write(square_mesh("quad"), "square.msh")
+    assert repr(ev.load("ramp.csv")) == repr(signal)
+    assert ev.load("ramp.wav")(0.5) == pytest.approx(150.0, abs=0.1)
+    np.testing.assert_array_equal(ev.load("no.ending").normal_force, result.normal_force)
+    ev.Sampled([1.0, 2.0], rate=10.0).to_csv("recorded.csv")
+    assert ev.load("recorded.csv")(0.05) == pytest.approx(1.5)
+    assert ev.load("square.toml") == ev.scenefile.load("square.toml")
+    assert isinstance(ev.load(place / "two.toml"), ev.Sweep)
+    assert ev.load("square.vtu").kind == "quad9"
+    assert ev.load("square.msh").kind == "quad"
+
+
+def test_a_fast_model_is_loaded_as_such(place, monkeypatch):
+    from evfem.common.storage import save_arrays
+    from evfem.fast import model
+
+    save_arrays("some.npz", {"format": np.array(model.FORMAT)})
+    monkeypatch.setattr(model.FastModel, "load", classmethod(lambda cls, path: ("fast", path)))
+    assert ev.load("some.npz") == ("fast", place.__class__("some.npz"))
+
+
+def test_what_is_no_file_of_ours_gets_a_sentence(place):
+    (place / "notes.txt").write_text("mine")
+    (place / "empty.npz").write_text("")
+    Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
+    cases = {
+        "notes.txt": "notes.txt, of another kind; allowed: a result or a fast model",
+        "none.npz": "none.npz, which is no file",
+        "empty.npz": "empty.npz, cut off or of another kind",
+        "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
+        "square.toml": "frictoin",
+    }
+    (place / "square.toml").write_text(PRESS.replace("friction", "frictoin"))
+    for name, words in cases.items():
+        with pytest.raises(InputError) as caught:
+            ev.load(name)
+        assert words in str(caught.value)
+    with pytest.raises(InputError, match="path: given 3; allowed: the path of a result"):
+        ev.load(3)
+
+
+@pytest.mark.solver
+def test_a_scene_is_simulated_and_planned_by_its_path(place):
+    by_path, by_scene = ev.simulate("square.toml"), ev.simulate(ev.load("square.toml"))
+    np.testing.assert_array_equal(by_path.normal_force, by_scene.normal_force)
+    assert by_path.provenance["scene"]["name"] == "square"
+    assert str(ev.plan(place / "square.toml")).startswith("Scene square: 2 steps, ")
+    for wrong in (3, None, {"version": 1}):
+        with pytest.raises(InputError, match="allowed: a Scene, or the path of a scene file"):
+            ev.simulate(wrong)
+        with pytest.raises(InputError, match="allowed: a Scene, or the path of a scene file"):
+            ev.plan(wrong)

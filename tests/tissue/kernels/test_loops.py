@@ -1,0 +1,211 @@
+"""The compiled loops against what they stand for: derivatives of potentials written from their
+formulae, logarithms with 60 digits, and refusals of what would read beyond an array.
+
+Elastic forces and tangents are compared with the weak forms in `test_weakform` and `test_assembly`.
+"""
+
+from decimal import Decimal, localcontext
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import skfem
+from scipy.spatial import cKDTree
+from skfem.models.poisson import laplace
+from tools.grids import SHAPES, grid_of, rectangle, tangent_of
+
+from evfem.tissue.dynamics import Dynamics
+from evfem.tissue.elements import ELEMENTS
+from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded
+from evfem.tissue.laws import NeoHookean
+from evfem.tissue.weakform import Tissue
+
+every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+RANDOM = np.random.default_rng(2)
+STEP = 1e-2
+
+
+def bend(x, y):
+    return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
+
+
+# -- layout ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("count", [1, LANES, LANES + 5])
+def test_blocks_hold_every_cell_and_the_last_again(count):
+    values = 1.0 + RANDOM.random((count, 3, 2))
+    blocks, numbers = blocked(values), padded(values[:, 0, 0])
+    assert blocks.shape == (-(-count // LANES), 3, 2, LANES)
+    for cell in range(len(blocks) * LANES):
+        block, lane = divmod(cell, LANES)
+        np.testing.assert_array_equal(blocks[block, ..., lane], values[min(cell, count - 1)])
+        assert numbers[block, lane] == (values[cell, 0, 0] if cell < count else 0.0)
+    assert blocked(np.arange(count)).dtype == np.arange(count).dtype
+
+
+@every_element
+def test_gradients_and_weights_are_scikit_fems(element):
+    """The Laplace operator from reference gradients and inverse maps, against scikit-fem's own."""
+    space = rectangle(element, (3, 2), warp=bend)
+    kind, intorder, _ = ELEMENTS[element]
+    basis = skfem.Basis(grid_of(space.mesh), SHAPES[kind](), intorder=intorder)
+    _, node = cKDTree(space.mesh.points).query(basis.doflocs.T)
+    expected = laplace.assemble(basis).toarray()
+    cells = np.einsum("eq,eqni,eqmi->enm", space.weight, space.gradient, space.gradient)
+    found = np.zeros((space.size, space.size))
+    for nodes, K in zip(space.nodes, cells, strict=True):
+        found[np.ix_(nodes, nodes)] += K
+    np.testing.assert_allclose(found[np.ix_(node, node)], expected, atol=1e-12)
+
+
+def test_arrays_that_do_not_fit_are_refused():
+    space = rectangle("q1", (3, 3))
+    u = np.zeros((space.size, 2))
+    for wrong in (u[:-1], u.astype(np.float32), u.astype(np.int64)):
+        with pytest.raises(ValueError, match="expected 32, format d"):
+            loops().smallest_J(space.cells, wrong)
+    with pytest.raises(ValueError, match="do not know"):
+        loops().smallest_J(space.cells._replace(sizes=(space.size, 2, 5, 4, 0, 0)), u)
+    assert loops().smallest_J(space.cells, u) == 1.0
+
+
+# -- the volume ------------------------------------------------------------------------------------------
+
+
+def exact_log_J(H):
+    """ln det(1 + H) of the very numbers in H, to 60 digits, rounded once."""
+    a, b, c, d = (Fraction(float(h)) for h in H)
+    J = (1 + a) * (1 + d) - b * c
+    with localcontext() as context:
+        context.prec = 60
+        return float((Decimal(J.numerator) / Decimal(J.denominator)).ln())
+
+
+def volume_energies(H, lmbda=2.0):
+    """lmbda (ln J)^2 / 2 of one unit cell of F = 1 + H with mu = 0, found by the loops."""
+    space = rectangle("q1", (1, 1))
+    u = space.mesh.points @ np.reshape(H, (2, 2)).T
+    energy, J = loops().forces(space.cells, u, padded(np.zeros(1)), padded(np.array([lmbda])), 0.0 * u)
+    return energy, J
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e-2, 0.1, 0.6])
+def test_the_logarithm_of_the_volume_keeps_its_digits(size):
+    for _ in range(5):
+        H = size * RANDOM.uniform(-1.0, 1.0, 4)
+        energy, J = volume_energies(H)
+        exact = exact_log_J(H)
+        assert np.sqrt(energy) == pytest.approx(abs(exact), rel=1e-14, abs=4e-15 * size)
+        assert pytest.approx(np.exp(exact), rel=1e-14) == J
+
+
+def test_the_series_hands_over_where_it_ends():
+    """Volume ratios on both sides of |ln J| = 1/3 and far beyond."""
+    for e in (0.3955, 0.40, 0.45, -0.28, -0.29, -0.9, -0.999, 3.0, 50.0):
+        assert volume_energies([e, 0.0, 0.0, 0.0])[0] == pytest.approx(np.log1p(e) ** 2, rel=1e-13), e
+
+
+def test_one_far_cell_does_not_disturb_its_neighbours():
+    """Forces of cells that share a block with a far, then with an inverted one."""
+    space = rectangle("q1", (LANES, 1), size=(LANES, 1.0))
+    tissue = Tissue(space, {"lower": NeoHookean(E=1.0, nu=0.4)})
+    u = 1e-3 * RANDOM.normal(size=(space.size, 2))
+    alone = tissue.forces(u)
+    right = space.mesh.points[:, 0] > LANES - 0.5
+    near = space.mesh.points[:, 0] < LANES - 1.5
+    for shift in (2.0, -1.5):
+        moved = u.copy()
+        moved[right, 0] += shift
+        forces = tissue.forces(moved)
+        np.testing.assert_allclose(forces[near], alone[near], rtol=1e-12, atol=1e-18)
+        assert np.isnan(forces[right]).any() == (shift < -1.0)
+
+
+# -- Kelvin-Voigt ----------------------------------------------------------------------------------------
+
+
+def green(space, u):
+    """Green strain (E, Q, 2, 2), real or complex."""
+    F = np.einsum("eni,eqnj->eqij", u[space.nodes], space.gradient) + np.eye(2)
+    return 0.5 * (np.swapaxes(F, -1, -2) @ F - np.eye(2))
+
+
+def potential(space, u, rate, before):
+    change = green(space, u) - before
+    return np.einsum("e,eq,eqij,eqij->", rate, space.weight, change, change)
+
+
+def plain_forces(space, u, rate, before):
+    """Complex-step derivative of the potential (N, 2)."""
+    z, out = u.astype(complex), np.empty(u.shape)
+    for index in np.ndindex(u.shape):
+        z[index] += 1e-30j
+        out[index] = potential(space, z, rate, before).imag / 1e-30
+        z[index] = u[index]
+    return out
+
+
+def problem(element, divisions=(2, 1), least=0.0):
+    """Space, displacements, rates per cell (the first least) and the displacements before."""
+    space = rectangle(element, divisions, warp=bend)
+    rate = np.linspace(least, least + 2.0, len(space.nodes))
+    u, before = 0.1 * RANDOM.normal(size=(2, space.size, 2))
+    return space, u, rate, before
+
+
+def damping(space, rate, before):
+    """The term with these rates, in a step that begins at `before`."""
+    term = Dynamics(space, rate * STEP, None)
+    term.begin(before, 0.0 * before, STEP)
+    return term
+
+
+@every_element
+def test_strains_are_greens(element):
+    space, u, rate, before = problem(element, (6, 3))
+    found, strain = damping(space, rate, before)._strain(u), green(space, u)
+    assert len(found) > 1  # more than one block, the last not full
+    for e in range(len(space.nodes)):
+        block, lane = divmod(e, LANES)
+        for component, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
+            np.testing.assert_allclose(found[block, :, component, lane], strain[e, :, i, j], atol=1e-14)
+
+
+@every_element
+def test_forces_are_the_derivative_of_the_potential(element):
+    """And the dissipation is twice the potential."""
+    space, u, rate, before = problem(element)
+    term, held = damping(space, rate, before), green(space, before)
+    expected = plain_forces(space, u, rate, held)
+    np.testing.assert_allclose(term.forces(u), expected, atol=1e-12 * np.abs(expected).max())
+    assert term.dissipation(u) == pytest.approx(2.0 * potential(space, u, rate, held), rel=1e-12)
+
+
+@every_element
+def test_tangents_are_central_differences(element):
+    space, u, rate, before = problem(element, (1, 1), least=0.7)
+    held = green(space, before)
+    found = tangent_of(space, u, damping(space, rate, before)).toarray()
+    columns = []
+    for unit in np.eye(u.size):
+        step = 1e-6 * unit.reshape(u.shape)
+        ahead, behind = (plain_forces(space, u + s, rate, held) for s in (step, -step))
+        columns.append((ahead - behind).ravel() / 2e-6)
+    expected = np.array(columns).T
+    np.testing.assert_allclose(found, expected, atol=1e-8 * np.abs(expected).max())
+
+
+def test_blocks_without_viscosity_have_no_part():
+    """18 cells, the last two alone in a block: rates there move only their nodes, rates elsewhere
+    only the others'."""
+    space, u, _, before = problem("q1", (6, 3))
+    for chosen in (np.arange(18) < 2 * LANES, np.arange(18) >= 2 * LANES):
+        term = damping(space, np.where(chosen, 1.5, 0.0), before)
+        touched = np.zeros(space.size, dtype=bool)
+        touched[space.nodes[chosen]] = True
+        forces = term.forces(u)
+        assert np.abs(forces[touched]).max(axis=1).min() > 0.0
+        assert not forces[~touched].any()
+        K = np.abs(tangent_of(space, u, term).toarray()).sum(axis=1).reshape(-1, 2)
+        np.testing.assert_array_equal(K.any(axis=1), touched)
