@@ -165,12 +165,15 @@ class CondensedPad:
 
     def under(self, force: Floats) -> Floats:
         """Displacements relative to the bone (P, 2) under forces (P, 2)."""
+        from scipy.linalg.blas import dsymv
+
         weight = self.weights(force)
         used = np.flatnonzero(weight)
         rest = self.kept.gather(force) - 0.5 * (weight[used] @ self.gathered[used])
         linear = np.zeros_like(rest)
         for k in used:
-            linear += weight[k] * (self.compliance[k] @ rest)
+            # reads one triangle; the transposed view is the column order that BLAS wants
+            linear = dsymv(weight[k], self.compliance[k].T, rest, 1.0, linear, overwrite_y=True)
         return np.tensordot(weight[used], self.bases[used], 1) + self.kept.spread(linear)
 
     def mean_compliance(self, weight: Floats) -> Floats:

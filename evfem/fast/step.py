@@ -41,7 +41,7 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
     solve_with_attraction,
 )
-from evfem.fast.memory import CondensedPad, sums
+from evfem.fast.memory import CondensedPad
 from evfem.fast.woodbury import Factors, KeptProblem
 from evfem.solver.control import Force, Target
 from evfem.solver.interface import Interface

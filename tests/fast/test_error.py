@@ -98,9 +98,7 @@ def test_a_path_put_right_at_every_state_is_that_of_the_full_model(fast):
     scene = paths.random_scene(3, FINGER, STEPS)
     run, full = followed(fast, scene), ev.simulate(scene)
     held = HeldFinger(scene, run.whole)
-    beside = np.array(
-        [missing(fast.memory, held, state) for state in run.states[1:]]
-    )
+    beside = np.array([missing(fast.memory, held, state) for state in run.states[1:]])
     again = CorrectedRun(run, fast.memory.pad, beside)
     for request in again.requests():
         again.advance(request)
