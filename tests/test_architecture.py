@@ -47,7 +47,7 @@ ROOMS = {
         {"numpy", "threadpoolctl"},
         "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
-    "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
+    "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file schema folder pools run",

@@ -17,8 +17,6 @@ SHORTEST_FRACTION       an update that must be cut below this fails the step    
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
                         body's height in one iteration
 PAD_BONE_INCREMENT      the same for the remembered pad, which has no cells to collapse           fast model
-PAD_TOLERANCE           no step of the remembered pad is solved further: what is remembered is    fast model
-                        off by more
 PAD_WEIGHT_CHANGE       its mean compliance is kept while its weights change by less than this    fast model
 PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage changes by       fast model
                         less than this fraction
@@ -89,8 +87,7 @@ SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05
 PAD_BONE_INCREMENT = 0.1
-PAD_TOLERANCE = 1e-5
-PAD_WEIGHT_CHANGE = 1.5
+PAD_WEIGHT_CHANGE = 0.3
 PAD_VOLTAGE_CHANGE = 0.1
 PAD_SPARE, PAD_FEWEST = 1.2, 8
 PAD_SPRING = 1e-9

@@ -47,10 +47,15 @@ class Pad:
         return SHARES[self.edges.shape[1]]
 
     def length(self, x: Floats) -> Floats:
-        """Tributary length of every node projected on x, where the outline faces down (P,) in mm."""
-        width = np.maximum(x[self.edges[:, 1]] - x[self.edges[:, 0]], 0.0)
-        shared = np.outer(width, self.shares).ravel()
-        return np.bincount(self.edges.ravel(), shared, self.nodes.size).astype(float, copy=False)
+        """Tributary length of every node projected on x, where the outline faces down, in mm: (...,
+        P) for x (..., P).
+        """
+        rows = x.reshape(-1, x.shape[-1])
+        width = np.maximum(rows[:, self.edges[:, 1]] - rows[:, self.edges[:, 0]], 0.0)
+        shared = width[:, :, None] * self.shares
+        nodes = self.edges + rows.shape[1] * np.arange(len(rows))[:, None, None]
+        found = np.bincount(nodes.ravel(), shared.ravel(), rows.size)
+        return found.astype(float, copy=False).reshape(x.shape)
 
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
         """Derivative of the tributary lengths with respect to x, as triplets (node, moved node,
