@@ -173,6 +173,7 @@ def test_a_finger_that_is_not_held_on_a_steep_texture_is_released(monkeypatch):
     assert broken(scene, result) == []
 
 
+@pytest.mark.filterwarnings("ignore:motion 1 slides with the indentation held")
 def test_friction_that_rises_within_a_nodes_motion_is_a_jump_to_it():
     """From 0.04 to 1.34 over 1.5 micrometres, against the way: from the smooth side a node is
     thrown beyond the ramp, from the rough side back before it. It stays at the ramp's rough end.
