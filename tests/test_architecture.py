@@ -26,15 +26,18 @@ ROOMS = {
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
-        "space pattern assembly weakform userforms dynamics body",
+        "space pattern assembly weakform userforms dynamics drag body",
     ),
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
+    "contact": (
+        {"numpy", "scipy"},
+        "surfaces textures own pad edge attraction signorini follower condensed stability",
+    ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation pressure anderson findings "
-        "equilibrium factorised stepping",
+        "equilibrium factorised relaxation stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
@@ -42,9 +45,9 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},
-        "provenance history result spectrum model works ledger checkpoint run rendering",
+        "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
-    "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training model"),
+    "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file schema folder pools run",

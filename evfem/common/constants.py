@@ -17,8 +17,6 @@ SHORTEST_FRACTION       an update that must be cut below this fails the step    
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
                         body's height in one iteration
 PAD_BONE_INCREMENT      the same for the remembered pad, which has no cells to collapse           fast model
-PAD_TOLERANCE           no step of the remembered pad is solved further: what is remembered is    fast model
-                        off by more
 PAD_WEIGHT_CHANGE       its mean compliance is kept while its weights change by less than this    fast model
 PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage changes by       fast model
                         less than this fraction
@@ -45,7 +43,7 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
-ALIKE                   below this residual iterations with a new tangent each are combined too    thin
+ALIKE                   below this residual iterations with a new tangent each are combined too   thin
                                                                                                   insulators
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
@@ -66,6 +64,17 @@ CHANGES                 so many changes of side in one step show that neither si
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
+COARSER                 after a release the next one within the same step comes at a part so many   texture
+                        times as long
+DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
+DRAG_GROWTH             where its speed grows less or more than these factors in one step
+DRAG_REST               drag of a rate below this is nearly none: a body that slows down may be at  snaps
+                        rest
+DRAG_CALMER             what was not at rest is asked again at so much less drag
+DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+DRAG_STEPS              steps of a release, failed ones included, before it is given up
+VERGE                   a step that failed where what takes stability away grows so fast, relative  snaps
+                        to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
 NAMED                   so many of the largest out-of-balance forces are named in a failure
 ======================  ========================================================================  ==========
@@ -78,8 +87,7 @@ SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05
 PAD_BONE_INCREMENT = 0.1
-PAD_TOLERANCE = 1e-5
-PAD_WEIGHT_CHANGE = 1.5
+PAD_WEIGHT_CHANGE = 0.3
 PAD_VOLTAGE_CHANGE = 0.1
 PAD_SPARE, PAD_FEWEST = 1.2, 8
 PAD_SPRING = 1e-9
@@ -109,5 +117,10 @@ HAIR = 1e-9
 SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
+COARSER = 4.0
+DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
+DRAG_REST, DRAG_CALMER = 0.01, 0.1
+DRAG_MOST, DRAG_STEPS = 1e6, 60
+VERGE = 0.9
 STAGGERED_LIMIT = 200
 NAMED = 3

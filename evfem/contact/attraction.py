@@ -62,18 +62,29 @@ class Attraction:
         """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
         layer.
         """
-        if voltage == 0.0:
-            return np.zeros_like(position)
-        frame = surface_state(self.surface, position)
-        gap = np.maximum(frame.gap, 0.0)
+        return self.forces_along(position[None], np.array([voltage]), touching)[0]
+
+    def forces_along(self, positions: Floats, voltages: Floats, touching: Any) -> Floats:
+        """`forces` at W places of a way (W, P, 2), from positions (W, P, 2) and voltages (W,)."""
+        if not voltages.any():
+            return np.zeros_like(positions)
+        frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
+        gaps = np.maximum(frame.gap, 0.0).reshape(len(positions), -1)
+        pairs = list(zip(gaps, voltages.tolist(), strict=True))
         on = 1.0 if self.air_layer else touching.astype(float)
-        weight = on * self.law.traction(gap, voltage, self.layers) * self.pad.length(position[:, 0])
+        x = positions[..., 0]
+        pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
+        weight = on * pressure * self.pad.length(x)
         if self.direction == "vertical":
-            return np.stack([np.zeros_like(weight), -weight], axis=1)
-        of, moved, value = self.pad.length_gradient(position[:, 0])
-        potential = on * self.law.potential(gap, voltage, self.layers)
-        sideways = -np.bincount(moved, potential[of] * value, weight.size)
-        return np.stack([sideways + weight * frame.slope, -weight], axis=1)
+            return np.stack([np.zeros_like(weight), -weight], axis=-1)
+        potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
+        sideways = [self._sideways(*each) for each in zip(x, potential, strict=True)]
+        return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
+
+    def _sideways(self, x: Floats, potential: Floats) -> Floats:
+        """Forces along x (P,) that lengthen the tributary lengths, at x (P,), by the potential (P,)."""
+        of, moved, value = self.pad.length_gradient(x)
+        return np.asarray(-np.bincount(moved, potential[of] * value, x.size), dtype=float)
 
     def negative_stiffness(self, position: Floats, voltage: float, touching: Any) -> Floats:
         """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm

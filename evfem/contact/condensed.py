@@ -45,16 +45,13 @@ from evfem.contact.signorini import (
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    Unstable,
     lost_stability,
     solve_with_attraction,
 )
 
 #: why there is no solution where the compliance is not positive
-LOST_STABILITY = (
-    "there is no equilibrium at rest near here: on the slopes of the profile the contact forces push the "
-    "finger aside harder than its tissue holds it; let the motion take time (speed, with dynamics = viscous "
-    "or inertial)"
-)
+LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,7 +278,7 @@ class LinearContactStep:
             found = solve_with_attraction(problem, attraction, status, self.snap)
         except ContactNotSolved as error:
             if follower.loaded.size and lost_stability(problem):
-                raise ContactNotSolved(LOST_STABILITY) from error
+                raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()

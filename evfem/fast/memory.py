@@ -141,17 +141,22 @@ class CondensedPad:
         half = np.einsum("sij,sj->si", self.compliance, 0.5 * self.gathered)
         return np.stack([q - self.kept.spread(part) for q, part in zip(self.moved, half, strict=True)])
 
+    @cached_property
+    def axes(self) -> tuple[Floats, Floats, Floats]:
+        """N of `press`, N and T of `slide`, in N/mm."""
+        return self.sums[self.press, 0], self.sums[self.slide, 0], self.sums[self.slide, 1]
+
     def weights(self, force: Floats) -> Floats:
         """Weights (S,) of the equilibria for forces (P, 2) on the pad."""
         N, T = sums(force)
+        pressed, loads, shears = self.axes
         weight = np.zeros(len(self.force))
-        along = _hats(self.sums[self.slide, 1], T)
-        corner = self.press[-1]
+        along = _hats(shears, T)
         # a slide at given indentation changes N a little: that is part of the slide
-        drift = float(along @ self.sums[self.slide, 0]) - self.sums[corner, 0]
+        drift = float(along @ loads) - pressed[-1]
         weight[self.slide] += along
-        weight[self.press] += _hats(self.sums[self.press, 0], N - drift)
-        weight[corner] -= 1.0
+        weight[self.press] += _hats(pressed, N - drift)
+        weight[self.press[-1]] -= 1.0
         return weight
 
     def pressed(self, N: float) -> Floats:
@@ -160,12 +165,15 @@ class CondensedPad:
 
     def under(self, force: Floats) -> Floats:
         """Displacements relative to the bone (P, 2) under forces (P, 2)."""
+        from scipy.linalg.blas import dsymv
+
         weight = self.weights(force)
         used = np.flatnonzero(weight)
         rest = self.kept.gather(force) - 0.5 * (weight[used] @ self.gathered[used])
         linear = np.zeros_like(rest)
         for k in used:
-            linear += weight[k] * (self.compliance[k] @ rest)
+            # reads one triangle; the transposed view is the column order that BLAS wants
+            linear = dsymv(weight[k], self.compliance[k].T, rest, 1.0, linear, overwrite_y=True)
         return np.tensordot(weight[used], self.bases[used], 1) + self.kept.spread(linear)
 
     def mean_compliance(self, weight: Floats) -> Floats:
@@ -202,8 +210,8 @@ def _hats(nodes: Floats, x: float) -> Floats:
     if nodes.size == 1:
         return weight
     weight[:] = 0.0
-    right = int(np.clip(np.searchsorted(nodes, x), 1, nodes.size - 1))
-    share = (x - nodes[right - 1]) / (nodes[right] - nodes[right - 1])
-    share = float(np.clip(share, -BEYOND, 1.0 + BEYOND))
+    right = min(max(int(np.searchsorted(nodes, x)), 1), nodes.size - 1)
+    share = float((x - nodes[right - 1]) / (nodes[right] - nodes[right - 1]))
+    share = min(max(share, -BEYOND), 1.0 + BEYOND)
     weight[right - 1], weight[right] = 1.0 - share, share
     return weight

@@ -4,20 +4,19 @@ design.
 `reduce` runs a scene once in full and remembers a few of its equilibria with their condensed
 tangents (`evfem.fast.memory`). `FastModel.simulate` then runs other scenes of the same finger with
 contact, friction and attraction solved as ever (`evfem.fast.step`), but without the tissue: other
-voltages, laws, insulators, friction coefficients and motions. Some of its steps are done again by
-the full model, from the same state of friction; the differences are the stated error, and where
-they are too large the whole scene is.
+voltages, laws, insulators, friction coefficients and motions. It is compared with the full model
+at a few of its states, which gives the error of the whole path (`evfem.fast.error`); where that is
+too large, the whole scene is run in full.
 
 Make it from a scene with the largest load and the most friction that will be used: between its
-equilibria the fast model errs by some 1e-5 of the force, beyond them by percents.
+equilibria the fast model errs by some 1e-4 of the force, beyond them by percents.
 """
 
 from __future__ import annotations
 
 import json
-import time as clock
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -26,31 +25,22 @@ from threadpoolctl import threadpool_limits
 
 import evfem
 from evfem.common import notices
-from evfem.common.arrays import Floats
-from evfem.common.constants import PAD_TOLERANCE, SMALLEST_FORCE
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, NotConverged, quoted
+from evfem.fast.error import HeldFinger, stated_error
 from evfem.fast.memory import CondensedPad, Kept
-from evfem.fast.step import RememberedPad
+from evfem.fast.run import FastRun, limits_of
+from evfem.fast.step import on_pad
 from evfem.fast.training import Memory, check_shapes, remember
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Press, Slide
-from evfem.scene.plan import largest_voltage, scene_mesh
+from evfem.scene.plan import scene_mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.ledger import Ledger
-from evfem.simulation.model import Model, make_attraction, make_model, placed
 from evfem.simulation.result import Result, provenance
-from evfem.simulation.run import Request, Run, simulate
-from evfem.solver.control import Target
-from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.factorised import FactorisedBody
-from evfem.solver.interface import Interface
-from evfem.solver.state import Limits, State, StepFailed
-from evfem.solver.stepping import Stepper
-from evfem.tissue.body import Body
+from evfem.simulation.run import Run, simulate
 
 FORMAT = "evfem-reduced-1"
 #: equilibria remembered of a press, and of slides in each direction
@@ -60,9 +50,8 @@ PAD, KEPT = (
     ("moved", "force", "compliance", "press", "slide"),
     ("near", "knots", "low", "high", "share", "hold"),
 )
-#: forces that are compared
-COMPARED = ("normal_force", "tangential_force", "electrostatic_force")
-ADVICE = "a fast model made from a scene with more load or friction may go further"
+#: states of a run at which it is compared with the full model, and how many may be
+CHECKS, MOST_CHECKS = 8, 100
 
 
 def reduce(scene: Scene, *, press: int = PRESS, slide: int = SLIDE, progress: bool = False) -> FastModel:
@@ -123,7 +112,7 @@ class FastModel:
     identity: Mapping[str, str]
     provenance: dict[str, Any] = field(default_factory=dict)
     _parts: tuple[Mesh, Pad] | None = field(default=None, init=False, repr=False)
-    _body: Body | None = field(default=None, init=False, repr=False)
+    _finger: HeldFinger | None = field(default=None, init=False, repr=False)
 
     def __repr__(self) -> str:
         sums = np.abs(self.memory.pad.sums)
@@ -131,21 +120,22 @@ class FastModel:
         name, count = self.provenance["scene"]["name"], len(sums)
         return f"FastModel of {name!r}: {count} equilibria, to {N:.4g} N/mm of load and {T:.4g} N/mm of shear"
 
-    def simulate(self, scene: Scene, *, tolerance: float = 0.01, checks: int = 3) -> Result:
-        """Run `scene` fast, do `checks` of its steps again with the full model, and if these
+    def simulate(self, scene: Scene, *, tolerance: float = 0.01, checks: int = CHECKS) -> Result:
+        """Run `scene` fast, compare it with the full model at `checks` of its states, and if these
         forces differ by more than `tolerance` (relative to the largest of the run) run all of it
         in full, with a warning.
 
         The result has the usual columns, forces and works among them; `stored_energy`,
         `integrator_dissipation` and `snap_dissipation` are NaN and there are no fields. Its
-        `provenance["fast"]` says `error` (largest relative difference of each force over the
-        checks), `checked` (which steps), `outside` (how far N and T have left those of the run it
-        was made from, as a share of their range; 0 inside) and `fallback`. With `checks=0` no
-        error is stated. Raises InputError for other scenes than the class allows, `NotConverged`.
+        `provenance["fast"]` says `error` (largest relative difference of each force over the whole
+        path, `evfem.fast.error`), `checked` (at which steps it was compared), `outside` (how far N
+        and T have left those of the run it was made from, as a share of their range; 0 inside) and
+        `fallback`. With `checks=0` no error is stated. Raises InputError for other scenes than the
+        class allows, `NotConverged`.
         """
         parts = self._parts_for(scene)
-        if not (isinstance(checks, int) and 0 <= checks <= scene.total_steps):
-            raise InputError("checks", quoted(checks), "a number of steps from 0 to all of the scene's")
+        if not (isinstance(checks, int) and 0 <= checks <= MOST_CHECKS):
+            raise InputError("checks", quoted(checks), f"a number of states from 0 to {MOST_CHECKS}")
         if not 0.0 < tolerance < np.inf:
             raise InputError("tolerance", quoted(tolerance), "a relative error larger than 0")
         with threadpool_limits(limits=scene.solver.threads):
@@ -159,6 +149,8 @@ class FastModel:
         worst = max(stated["error"].values(), default=0.0)
         if worst > tolerance:
             reason = f"the fast model differs from the full one by {worst:.2g}, allowed are {tolerance:g}"
+            if not np.isfinite(worst):
+                reason = "under the forces of the fast model the full one finds no equilibrium"
             return _in_full(scene, stated | {"reason": reason})
         result = run.result()
         result.provenance["fast"] = stated
@@ -206,151 +198,21 @@ class FastModel:
         return self._parts
 
     def _stated(self, run: FastRun, checks: int) -> dict[str, Any]:
-        """Differences to the full model at the steps where they are likely to be largest."""
-        outside = [self.memory.pad.beyond(on_pad(state)) for state in run.states[1:]]
+        """How far the run is from the full model, and from what the model was made for."""
         error: dict[str, float] = {}
-        steps = _worth_checking(run, outside, checks)
-        if steps:
-            full = self._full_model(run)
-            largest = {name: max(abs(row[name]) for row in run.rows) for name in COMPARED}
-            for step in steps:
-                for name, value in self._checked(full, run, step).items():
-                    error[name] = max(error.get(name, 0.0), value / max(largest[name], SMALLEST_FORCE))
+        steps: list[int] = []
+        if checks:
+            if self._finger is None or self._finger.limits != limits_of(run.scene):
+                self._finger = HeldFinger(run.scene, run.whole)
+            error, steps = stated_error(run, self.memory, self._finger, checks)
         return {
             "error": error,
             "checked": steps,
-            "outside": max(outside),
+            "outside": max(self.memory.pad.beyond(on_pad(state)) for state in run.states[1:]),
             "fallback": False,
             "reason": "",
             "made_from": self.provenance["scene"],
         }
-
-    def _full_model(self, run: FastRun) -> Model:
-        """The full model of the scene of `run`; the body is built once and serves all scenes."""
-        if self._body is None:
-            self._body = make_model(run.scene).body
-        mesh, pad = self._parts_for(run.scene)
-        fast, solver = run.model, run.scene.solver
-        attraction = None if fast.attraction is None else replace(fast.attraction, pad=pad)
-        limits = Limits(solver.tolerance, solver.strategy, solver.threads)
-        interface = Interface(pad, mesh.points, fast.surface, solver.tolerance)
-        factorised = FactorisedBody(self._body, interface, attraction, limits)
-        full = Equilibrium(factorised, interface, attraction, limits)
-        return Model(run.scene, mesh, self._body, pad, fast.surface, attraction, full, fast.first_gap)
-
-    def _checked(self, full: Model, run: FastRun, step: int) -> dict[str, float]:
-        """Absolute differences of the forces (N/mm) after `step`, done again by the full model."""
-        before, after = (self._lifted(run.states[k]) for k in (step - 1, step))
-        # where friction holds the nodes is known exactly
-        old = replace(before, u=before.u.copy())
-        old.u[full.pad.nodes] = run.states[step - 1].u
-        try:
-            new = full.equilibrium.step(old, run.targets[step - 1], start=after)
-        except StepFailed:
-            return dict.fromkeys(COMPARED, np.inf)
-        contact, pull = full.equilibrium.contact_forces(new).sum(axis=0), new.attraction.sum(axis=0)
-        found = dict(zip(COMPARED, (contact[1], -contact[0], -pull[1]), strict=True))
-        return {name: abs(float(value) - run.rows[step - 1][name]) for name, value in found.items()}
-
-    def _lifted(self, state: State) -> State:
-        """A state of the pad as one of the whole finger, the tissue as between the stored
-        equilibria.
-        """
-        weight = self.memory.pad.weights(on_pad(state))
-        u = state.bone + np.tensordot(weight, self.memory.whole, 1)
-        return replace(state, u=u, velocity=np.zeros_like(u), last_increment=np.zeros_like(u))
-
-
-def on_pad(state: State) -> Floats:
-    """All forces on the pad nodes of a flat scene (P, 2)."""
-    return state.contact_force[:, ::-1] + state.attraction
-
-
-class FastRun(Run):
-    """A scene on its way without the tissue; `states` before the first and after every step, and
-    `targets` of the steps.
-    """
-
-    def __init__(self, pad: CondensedPad, scene: Scene, mesh: Mesh, whole: Pad) -> None:
-        self.scene, solver = scene, scene.solver
-        alone = replace(whole, nodes=np.arange(whole.nodes.size))
-        points = mesh.points[whole.nodes]
-        surface, first_gap = placed(scene.ground, points)
-        attraction = None
-        if scene.law is not None and largest_voltage(scene) != 0.0:
-            attraction = make_attraction(scene, mesh, whole, surface)
-            attraction = replace(attraction, pad=alone)
-        limits = Limits(max(solver.tolerance, PAD_TOLERANCE), solver.strategy)
-        interface = Interface(alone, points, surface, limits.tolerance)
-        remembered = RememberedPad(pad, interface, attraction, limits)
-        equilibrium = Equilibrium(remembered, interface, attraction, limits)
-
-        body: Any = NoTissue()
-        self.model = Model(scene, mesh, body, alone, surface, attraction, equilibrium, first_gap)
-        self.ledger = Ledger(self.model)
-        self.stepper = Stepper(equilibrium, scene.coupling)
-        self.rows, self.frames, self.time = [], [], 0.0
-        self.state = equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
-        self.states: list[State] = [self.state]
-        self.targets: list[Target] = []
-
-    def advance(self, request: Request) -> None:
-        """Reach a request's target exactly and record its row."""
-        begin, record = clock.perf_counter(), self.model.equilibrium.record
-        iterations = record.iterations
-        try:
-            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
-        except StepFailed as error:
-            advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
-            raise NotConverged(request.step, error.residuals, advice, self.result()) from error
-        self.time += request.duration
-        row = self._row(request)
-        row |= {"substeps": substeps, "newton_iterations": record.iterations - iterations}
-        self.rows.append(row | {"seconds": clock.perf_counter() - begin})
-        self.states.append(self.state)
-        self.targets.append(request.path(0.0, 1.0))
-
-    def _row(self, request: Request) -> dict[str, Any]:
-        """The row of the present state; where only the place has changed, that of the step before
-        serves.
-        """
-        before, now = self.states[-1], self.state
-        place = (request.step, request.motion_index, request.kind, self.time)
-        if not self.rows or before.contact_force is not now.contact_force:
-            return self.ledger.row(now, *place)
-        if before.attraction is not now.attraction or before.bone[1] != now.bone[1]:
-            return self.ledger.row(now, *place)
-        named = dict(zip(("step", "motion_index", "motion", "time"), place, strict=True))
-        moved = {"position": float(now.bone[0]), "voltage": now.voltage}
-        return self.rows[-1] | named | moved | self.ledger.sums
-
-    def result(self) -> Result:
-        """Everything up to the last converged step."""
-        record = self.model.equilibrium.record
-        solver = {"model": "fast", "iterations": record.iterations, "contact_solves": record.contact_solves}
-        made = provenance(self.scene, self.model.mesh, solver | {"cuts": self.stepper.cuts})
-        return Result.from_rows(self.rows, [], self.model.mesh, made)
-
-
-class NoTissue:
-    """In place of the body: its forces and its energy are not known."""
-
-    dynamics = None
-
-    @staticmethod
-    def forces(u: Floats) -> Floats:
-        """Not numbers."""
-        return np.full_like(u, np.nan)
-
-    @staticmethod
-    def given_forces(u: Floats) -> Floats:
-        """Nothing: there are no forms of the user's."""
-        return np.zeros_like(u)
-
-    @staticmethod
-    def energy(u: Floats) -> float:
-        """Not a number."""
-        return float("nan")
 
 
 def _in_full(scene: Scene, stated: dict[str, Any]) -> Result:
@@ -361,19 +223,6 @@ def _in_full(scene: Scene, stated: dict[str, Any]) -> Result:
     error = {name: value if np.isfinite(value) else None for name, value in stated["error"].items()}
     result.provenance["fast"] = stated | {"error": error, "fallback": True}
     return result
-
-
-def _worth_checking(run: FastRun, outside: Sequence[float], checks: int) -> list[int]:
-    """Steps (from 1) to check: farthest outside the trained forces, at the extremes of the forces,
-    half way to the largest friction force, then evenly spread ones.
-    """
-    columns = {name: np.abs([row[name] for row in run.rows]) for name in COMPARED}
-    shear = columns["tangential_force"]
-    places = [int(np.argmax(outside))] if max(outside) > 0.0 else []
-    places += [int(np.argmax(shear)), int(np.argmin(np.abs(shear - 0.5 * shear.max())))]
-    places += [int(np.argmax(columns["electrostatic_force"])), int(np.argmax(columns["normal_force"]))]
-    places += [int(k) for k in np.linspace(len(run.rows) - 1, 0, checks + 5)]
-    return sorted(k + 1 for k in list(dict.fromkeys(places))[:checks])
 
 
 def _identity(scene: Scene) -> dict[str, str]:

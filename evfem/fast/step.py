@@ -41,7 +41,7 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
     solve_with_attraction,
 )
-from evfem.fast.memory import CondensedPad, sums
+from evfem.fast.memory import CondensedPad
 from evfem.fast.woodbury import Factors, KeptProblem
 from evfem.solver.control import Force, Target
 from evfem.solver.interface import Interface
@@ -60,7 +60,11 @@ class RememberedPad:
         self.pad, self.surface, self.tolerance = interface.pad, interface.surface, limits.tolerance
         self.size, self.record = interface.pad.nodes.size, Record()
         self.largest_bone_increment = PAD_BONE_INCREMENT * float(np.ptp(interface.points[:, 1]))
-        self._frozen = False
+        #: how far the pad nodes are beside what is remembered (P, 2), and where the next step ends, if known
+        self._beside: Floats = np.zeros((self.size, 2))
+        self._near_end: State | None = None
+        self._moved = self._frozen = False
+        self._iterated = True
         self._weight = np.full(len(pad.force), np.inf)
         self._factors = Factors()
         self._stiffness: tuple[float, Floats] = (np.nan, np.zeros(0))
@@ -68,26 +72,38 @@ class RememberedPad:
         self._near: Floats = np.zeros((0, 0))
         self._mean: Floats = np.zeros((0, 0))
 
+    def correct(self, beside: Floats, near_end: State) -> None:
+        """From the next step on, which ends near the state `near_end`, the pad nodes are `beside`
+        (P, 2) what is remembered, in mm.
+        """
+        short = self.tolerance * self.interface.length
+        self._moved = bool(np.abs(beside - self._beside).max() > short)
+        self._beside, self._near_end = beside, near_end
+
     def known(self, old: State, target: Target) -> State | None:
         """The pad carried along as it is, where it is in full slip and nothing else changes."""
-        if not self._goes_on(old, target):
+        if self._moved or not self._goes_on(old, target):
             return None
         moved = np.array([target.x - old.bone[0], 0.0])
         return replace(old, u=old.u + moved, bone=np.array([target.x, old.bone[1]]))
 
     def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
-        """Where iterations start: `start`, or for the first touch under a force the stored
-        equilibria.
+        """Where iterations start: `start`, near the end if that is known, or for the first touch
+        under a force the stored equilibria.
         """
-        self._frozen = frozen
-        begin = start if start is not old else self._first_guess(old, target)
+        self._frozen, self._iterated = frozen, False
+        begin = start
+        if start is old and self._near_end is not None:
+            begin = replace(self._near_end, u=self._near_end.u + self._beside)
+        elif start is old:
+            begin = self._first_guess(old, target)
         bone = target.bone(begin.bone)
         voltage = target.drive.guess(begin.voltage)
         return replace(begin, u=begin.u + (bone - begin.bone), bone=bone, voltage=voltage)
 
     def accepted(self, old: State, state: State) -> State:
-        """The converged state with the forces on the bone."""
-        return replace(state, reaction=-_on_pad(state).sum(axis=0))
+        """The converged state, which has the forces on the bone already."""
+        return state
 
     def admit(self, state: State, gap: float) -> None:
         """The next iteration takes what has penetrated into play."""
@@ -99,6 +115,9 @@ class RememberedPad:
         """Whether contact has left the nodes that are remembered."""
         spread = self.interface.shallowest_penetration(state) is not None
         return "contact spreads beyond the nodes that the fast model keeps" if spread else ""
+
+    def verge(self, state: State, target: Target) -> None:
+        """Not known: the full model says it."""
 
     def reusable(self) -> Reusable:
         """Nothing that another run could use."""
@@ -151,17 +170,24 @@ class RememberedPad:
         return replace(old, u=u + bone, bone=bone, contact_force=force, status=status)
 
     def balance(self, state: State, attraction: Floats, target: Target) -> tuple[State, Balance]:
-        """Whether the attraction is that of the positions, and the prescribed force is there."""
-        force = _on_pad(state)
+        """Forces that the positions do not know of yet: the change of the attraction since they
+        were found, node by node and in sum, and what a prescribed force lacks.
+
+        A step is not accepted before its first iteration, however little it asks for: what is
+        left out of one step is not known in the next one.
+        """
         lacking = attraction - state.attraction
-        missing = float(np.abs(lacking).max())
-        if isinstance(target.height, Force):
-            missing = max(missing, abs(target.height.force - sums(force)[0]))
-        residual = missing / max(np.abs(sums(force)).max(), SMALLEST_FORCE)
-        return state, Balance(lacking, residual, attraction)
+        state = replace(state, attraction=attraction)
+        reaction = -on_pad(state).sum(axis=0)
+        missing = target.height.missing(float(state.bone[1]), reaction)
+        largest = max(np.abs(reaction).max(), SMALLEST_FORCE)
+        free = max(np.abs(lacking).max(), np.abs(lacking.sum(axis=0)).max(), abs(missing))
+        residual = float(free / largest) if self._iterated else max(float(free / largest), 1.0)
+        return replace(state, reaction=reaction), Balance(lacking, residual, attraction)
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """Solve contact for the linear change of the positions, then move as the pad does."""
+        self._iterated = True
         attracted = balance.attraction
         near_compliance, mean = self._compliance(state)
         near = self.body.kept.near[self._play]
@@ -186,7 +212,7 @@ class RememberedPad:
         attraction[near] += found.attraction_drop.reshape(2, -1)[::-1].T
         bone = state.bone.copy()
         bone[1] += lift
-        u = bone + self.body.under(force[:, ::-1] + attraction)
+        u = bone + self.body.under(force[:, ::-1] + attraction) + self._beside
         return replace(state, u=u, contact_force=force, status=status, bone=bone, attraction=attraction)
 
     def _attraction_stiffness(self, old: State, state: State, attracted: Floats) -> tuple[Floats, Floats]:
@@ -247,7 +273,7 @@ class RememberedPad:
         """Compliance among the k nodes in play, near nodes that touch or may do so soon (2 k, 2
         k), and from all kept nodes to them (2 k, 2 K).
         """
-        weight = self.body.weights(_on_pad(state))
+        weight = self.body.weights(on_pad(state))
         near = self.body.kept.near
         gap = surface_state(self.surface, self.interface.positions(state.u)).gap[near]
         needed = (state.status[near] != OPEN) | (gap < 0.0)
@@ -266,6 +292,6 @@ class RememberedPad:
         return self._near, self._mean
 
 
-def _on_pad(state: State) -> Floats:
+def on_pad(state: State) -> Floats:
     """All forces on the pad nodes of a flat scene (P, 2)."""
     return state.contact_force[:, ::-1] + state.attraction

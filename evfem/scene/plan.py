@@ -229,11 +229,11 @@ def _electricity(scene: Scene) -> Term:
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
     clock = ", the clock sets the voltage alone" if isinstance(scene.voltage, TimeSignal) else ""
-    return Term(
-        "time",
-        dynamics != "quasistatic",
-        f"quasi-static{clock}" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
-    )
+    lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
+    if dynamics == "quasistatic":
+        return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
+    lost = lost and f"; without speed quasi-static, {lost}"
+    return Term("time", True, f"{dynamics}, backward Euler{lost}")
 
 
 def _forms(scene: Scene, mesh: Mesh) -> Term:

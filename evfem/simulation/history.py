@@ -26,9 +26,10 @@ DRIFT = 0.05
 WHOLE = {"N/mm": "N", "N": "mJ"}
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
-#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
-NEEDED = ("motion", *INTEGERS, *RESUMED)
+INTEGERS = ("step", "motion_index", "substeps", "newton_iterations", "relaxations")
+#: columns without which a saved result is none; where an older version did not write another one yet, it is
+#: NaN, or 0 if it counts something
+NEEDED = ("motion", "step", "motion_index", "substeps", "newton_iterations", *RESUMED)
 
 
 def column(unit: str, meaning: str, whole: str | None = None) -> dict[str, str]:
@@ -77,6 +78,7 @@ class History:
     snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
     substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
     newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
+    relaxations: Ints = field(metadata=column("", "releases where no equilibrium is near"))
     seconds: Floats = field(metadata=column("s", "wall time"))
 
     @property
@@ -152,7 +154,8 @@ def csv_header() -> str:
 
 
 def read_rows(text: str) -> list[dict[str, Any]]:
-    """The rows of a `history.csv`; a column that an older version did not write yet is nan.
+    """The rows of a `history.csv`; a column that an older version did not write yet is nan, or 0 if
+    it counts something.
 
     Raises ValueError for any other text.
 
@@ -164,7 +167,10 @@ def read_rows(text: str) -> list[dict[str, Any]]:
     names = found.fieldnames or ()
     if not set(NEEDED) <= set(names) <= set(COLUMNS):
         raise ValueError("no history")
-    return [{name: _value_of(name, row.get(name, "nan")) for name in COLUMNS} for row in found]
+    unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in COLUMNS}
+    return [
+        {name: _value_of(name, row[name]) for name in COLUMNS} for row in (unknown_yet | row for row in found)
+    ]
 
 
 def _value_of(name: str, text: str) -> str | int | float:

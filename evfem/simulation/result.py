@@ -134,7 +134,7 @@ class Result(History):
         """This result over the whole `depth`: under the same names forces in N, widths as areas in
         mm2, works and energies in mJ; lengths, pressures and fields are as they were.
 
-        `result.total.rows`, `.table()`, `.to_csv(path)` and the plots then have these units too.
+        ``result.total.rows``, ``.table()``, ``.to_csv(path)`` and the plots then have these units too.
         Raises InputError where the scene says no depth.
         """
         depth = self._known_depth
@@ -192,6 +192,7 @@ class Result(History):
             "load_drift": self.load_drift,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
+            "relaxations": int(self.relaxations.sum()),
             "seconds": float(self.seconds.sum()),
             "units": {
                 "length": "mm",
@@ -268,9 +269,9 @@ class Result(History):
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file
-    without one of those is refused as of another version. No object is unpickled, and no more
-    memory is taken than the file is long (at most 4 GB).
+    A column that an older version did not write yet is NaN, or 0 if it counts something, unless it
+    is one of `NEEDED`: a file without one of those is refused as of another version. No object is
+    unpickled, and no more memory is taken than the file is long (at most 4 GB).
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     lacking = [f"history/{name}" for name in NEEDED if f"history/{name}" not in arrays]
@@ -293,7 +294,10 @@ def load(path: str | Path) -> Result:
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
     column = arrays.get(f"history/{name}")
-    return np.full(len(arrays["history/step"]), np.nan) if column is None else _checked_column(name, column)
+    if column is not None:
+        return _checked_column(name, column)
+    steps = len(arrays["history/step"])
+    return np.zeros(steps, dtype=np.int64) if name in INTEGERS else np.full(steps, np.nan)
 
 
 def _checked_column(name: str, column: np.ndarray) -> Any:

@@ -1,7 +1,7 @@
 r"""Spectrum of a column of the history: which frequencies a force has, and with what amplitude.
 
 The rows of N steps of dt stand for the time T = N dt, each at the end of its step. With
-x_k = x(t_0 + k dt), k = 1 ... N, the one-sided amplitudes at the frequencies j / T are
+x_k = x(t_0 + k dt), k = 1 ... N, the one-sided amplitudes at the frequencies j / T are::
 
     a_j = (c_j / N) |sum_k w_k x_k exp(-2 pi i j k / N)|,    c_0 = c_{N/2} = 1, else 2
 

@@ -43,6 +43,11 @@ tissue's,
 or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small
 parts, and only say which of two columns has L.
 
+Where no equilibrium is near, the body is released and comes to rest at another one
+(`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
+:math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
+:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``.
+
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
 
@@ -95,8 +100,8 @@ WAY, SHARE = _along((0.0, 1.0))
 FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, 1 / 4, 3 / 4, 15 / 16, 63 / 64, 1.0))
 #: the places see an integrand whose highest Legendre coefficients are below this share of the largest
 SEEN = 1e-3
-#: Legendre coefficients (8,) from the values at eight Gauss points
-_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(np.polynomial.legendre.leggauss(8)[0], 7))
+#: Legendre coefficients (8,) over the way from the values at the places `WAY`
+_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * WAY - 1.0, WAY.size - 1))
 #: and where the friction coefficient is
 SLIDE, PART = _gauss(4)
 
@@ -145,18 +150,21 @@ class Part:
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """What the part adds to each of `SUMS`, N mm per mm of depth."""
-        old, new, dynamics = self.old, self.new, self.model.body.dynamics
+        old, new, body = self.old, self.new, self.model.body
         moved = new.u - old.u
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
         given -= _mean_work(begin.given, end.given, moved)
         pulled, friction = self.electrostatic(), self.friction()
-        viscous = 0.0 if dynamics is None else dynamics.dissipation(new.u)
+        viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
-        lost -= self._contact() + friction
-        lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
-        snap = self._snaps(begin.forces, end.forces, lost)
-        added = (given, pulled, friction, viscous, 0.0 if snap else lost, lost if snap else 0.0)
+        if np.isfinite(lost):  # the fast model has no tissue to ask
+            lost -= self._contact() + friction
+            lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        drag = body.drag_dissipation(new.u)
+        lost -= drag
+        snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
+        added = (given, pulled, friction, viscous, 0.0 if snap else lost, drag + lost if snap else 0.0)
         return dict(zip(SUMS, added, strict=True))
 
     def electrostatic(self) -> float:
@@ -173,7 +181,7 @@ class Part:
             return trapezoidal
         values = self._pulls(along, WAY)
         integral = float(SHARE @ values)
-        size = np.abs(_LEGENDRE @ (values * SHARE))
+        size = np.abs(_LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
             integral = float(FINE_SHARE @ self._pulls(along, FINE_WAY))
         return trapezoidal + integral - _mean_work(old.attraction, new.attraction, along)
@@ -186,11 +194,8 @@ class Part:
         assert attraction is not None
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
         volts = np.sqrt((1.0 - ways) * old.voltage**2 + ways * new.voltage**2)
-        forces = [
-            attraction.forces(begin + way * (end - begin), float(volt), old.touching)
-            for way, volt in zip(ways, volts, strict=True)
-        ]
-        return np.sum(forces * along, axis=(1, 2))
+        forces = attraction.forces_along(begin + ways[:, None, None] * (end - begin), volts, old.touching)
+        return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
@@ -198,13 +203,11 @@ class Part:
         length = np.abs(slip)
         if not length.any():
             return 0.0
-        pressed = [np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new)]
-        total = 0.0
-        for way, part in zip(SLIDE, PART, strict=True):
-            mu = self._coefficient(x0 + way * (x1 - x0))
-            normal = (1.0 - way) * pressed[0] + way * pressed[1]
-            total += float(part * np.sum(mu * normal * length))
-        return total
+        before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
+        way = SLIDE[:, None]
+        normal = (1.0 - way) * before + way * after
+        mu = np.array([self._coefficient(x) for x in x0 + way * (x1 - x0)])
+        return float(PART @ np.sum(mu * normal * length, axis=1))
 
     @cached_property
     def _x(self) -> tuple[Floats, Floats]:

@@ -45,6 +45,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
+from evfem.contact.stability import Verge, verge
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Drive, DrivenStep, Target
 from evfem.solver.findings import findings
@@ -342,6 +343,16 @@ class FactorisedBody:
             if fraction < SHORTEST_FRACTION:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
+
+    def verge(self, state: State, target: Target) -> Verge:
+        """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
+        where the way leads to, for the curvature of a profile may jump.
+        """
+        ahead = self.begin(state, target, frozen=False, start=state)
+        self.linearisation.factorise(state)
+        still = np.zeros(len(self.linearisation.tangent.schur))
+        found = [verge(self._contact_step(state, place, target, still)) for place in (state, ahead)]
+        return max(found, key=lambda one: one.share)
 
     # -- a step ends
 

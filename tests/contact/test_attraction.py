@@ -94,6 +94,18 @@ def test_the_pressure_of_a_node_by_hand():
 
 
 @directions
+@surfaces
+def test_forces_along_a_way_are_those_at_each_of_its_places(surface, direction):
+    attraction, position = make(StrongTroxel(), surface, 2, direction)
+    ways, voltages = np.array([0.0, 0.02, 0.05]), np.array([300.0, 0.0, 900.0])
+    touching = np.arange(len(position)) == 2
+    positions = position + ways[:, None, None] * np.array([1.0, -0.5])
+    along = attraction.forces_along(positions, voltages, touching)
+    for found, where, voltage in zip(along, positions, voltages, strict=True):
+        np.testing.assert_array_equal(found, attraction.forces(where, voltage, touching))
+
+
+@directions
 def test_without_air_layer_only_touching_nodes_carry_force(direction):
     surface = SURFACES[1]
     with_air, position = make(Kaczmarek(), surface, 1, direction)

@@ -2,6 +2,7 @@
 along.
 """
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN
-from evfem.fast.model import FastRun
+from evfem.fast.run import FastRun
 from evfem.solver.control import Force, GivenVoltage, Indentation, Target
 
 FINGER = finger(block(12, 2, sag=0.4))
@@ -22,6 +23,13 @@ def scene(friction=FRICTION, voltage=1000.0):
     motion = [ev.Press(force=0.02, steps=4), ev.Slide(0.6, steps=8)]
     surface = ev.Display(friction=friction)
     return ev.Scene(FINGER, surface, law=ev.Kaczmarek(), voltage=voltage, motion=motion)
+
+
+def iterating(body, state):
+    """The state after one iteration of a step that asks for nothing new."""
+    held = outlook(state)
+    begun = body.begin(state, held, False, state)
+    return body.advance(state, begun, held, body.balance(begun, state.attraction, held)[1])
 
 
 @pytest.fixture(scope="module")
@@ -85,14 +93,49 @@ def test_a_prescribed_force_and_the_attraction_of_the_positions_are_in_the_balan
     body, states, _ = slid
     state = states[4]
     largest = max(0.02, abs(float((state.contact_force[:, 1] + state.attraction[:, 0]).sum())))
+    iterated = iterating(body, state)
     for force, missing in ((0.02, 0.0), (0.03, 0.01), (0.015, 0.005)):
-        balance = body.balance(state, state.attraction, outlook(state, height=Force(force)))[1]
-        assert balance.residual == pytest.approx(missing / largest, abs=2e-5)
-    other = state.attraction.copy()
+        balance = body.balance(iterated, iterated.attraction, outlook(state, height=Force(force)))[1]
+        assert balance.residual == pytest.approx(missing / largest, abs=1e-7)
+    other = iterated.attraction.copy()
     other[5, 1] -= 0.004
-    balance = body.balance(state, other, outlook(state))[1]
-    assert balance.residual == pytest.approx(0.004 / largest, rel=1e-3)
+    after, balance = body.balance(iterated, other, outlook(state))
+    assert balance.residual == pytest.approx(0.004 / (largest - 0.004), rel=1e-6)
     assert balance.forces[5, 1] == pytest.approx(-0.004)
+    np.testing.assert_allclose(after.reaction[1], state.reaction[1] + 0.004, rtol=1e-6)
+    np.testing.assert_array_equal(after.attraction, other)
+    # small ones of many nodes add up
+    other = iterated.attraction + np.array([0.0, 1e-6])
+    balance = body.balance(iterated, other, outlook(state))[1]
+    assert balance.residual == pytest.approx(1e-6 * len(other) / largest, rel=0.05)
+
+
+def test_no_step_is_accepted_before_its_first_iteration(slid):
+    body, states, _ = slid
+    state = states[4]
+    held = outlook(state)
+    body.begin(state, held, False, state)
+    assert body.balance(state, state.attraction, held)[1].residual == 1.0
+    after = iterating(body, state)
+    assert body.balance(after, after.attraction, held)[1].residual < 1e-8
+
+
+def test_a_pad_beside_what_is_remembered_begins_and_goes_there(slid):
+    """Every node 2 um to the right of where the memory puts it, relative to the bone."""
+    shared, states, _ = slid
+    body, state = copy(shared), states[6]
+    held, beside = outlook(state), np.broadcast_to([2e-3, 0.0], state.u.shape)
+    body.correct(beside, state)
+    begun = body.begin(states[5], held, False, states[5])
+    np.testing.assert_allclose(begun.u - begun.bone, state.u - state.bone + beside, atol=1e-15)
+    on = outlook(states[-1], x=float(states[-1].bone[0]) + 0.1)
+    assert body.known(states[-1], on) is None
+    after = body.advance(state, begun, held, body.balance(begun, begun.attraction, held)[1])
+    force = after.contact_force[:, ::-1] + after.attraction
+    np.testing.assert_allclose(after.u - after.bone, body.body.under(force) + beside, atol=1e-15)
+    # nothing has changed since
+    body.correct(beside, state)
+    assert body.known(states[-1], on) is not None
 
 
 def test_a_pad_in_full_slip_is_carried_along_as_it_is(slid):

@@ -207,3 +207,28 @@ def test_the_attraction_of_a_plate_that_lands_or_lifts_works_what_its_potential_
     far, near = (StrongTroxel().potential(g, voltage, layers) for g in (gap, 0.0))
     expected = 4.0 * (far - near) * (1.0 if way == "down" else -1.0)
     assert Part(model, *states).electrostatic() == pytest.approx(expected, rel=1e-4)
+
+
+class Counted:
+    """Strong and Troxel's law, and how often it is asked."""
+
+    def __init__(self):
+        self.law, self.asked = StrongTroxel(), 0
+
+    def traction(self, gap, voltage, layers):
+        self.asked += 1
+        return self.law.traction(gap, voltage, layers)
+
+
+@pytest.mark.parametrize(("thickness", "fall", "places"), [(0.09, 0.01, 8), (0.09, 0.1, 8), (2e-4, 0.3, 64)])
+def test_only_a_way_through_a_thin_layer_is_taken_at_more_than_eight_places(thickness, fall, places):
+    law, gap = Counted(), 0.3
+    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
+    surface = Display(ev.Layer(thickness, 3.35), friction=0.0)
+    model = make_model(scene(surface, law, 140.0, (Hover(gap),), column))
+    rest = model.equilibrium.rest(np.array([0.0, gap]), 140.0)
+    # the outline falls faster than the bone
+    fallen = replace(rest, u=rest.u - [0.0, fall])
+    law.asked = 0
+    Part(model, rest, fallen).electrostatic()
+    assert law.asked == places

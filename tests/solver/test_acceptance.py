@@ -16,7 +16,7 @@ from evfem.mesh.mesh import raised
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Balance, Limits, Record, StepFailed
+from evfem.solver.state import Balance, Folded, Limits, Record, StepFailed
 from evfem.solver.strategy import Strategy
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -205,6 +205,21 @@ def test_a_residual_that_is_no_number_fails_the_step(residual):
     interface, old, good = legal(SURFACES[0])
     with pytest.raises(StepFailed, match="not finite"):
         accepted(interface, old, [good, good], (residual, 0.0))
+
+
+def test_an_outline_that_folds_over_itself_is_refused():
+    """Two neighbours that slip without friction have changed places: everything else holds."""
+    interface, old, good = legal(Flat(friction=0.0, y=0.0))
+    status, force = np.full(good.status.size, FORWARD), np.zeros_like(good.contact_force)
+    order = np.argsort(MESH.points[PAD.nodes, 0])
+    left, right = PAD.nodes[order[[2, 3]]]
+    good = replace(good, u=old.u.copy(), status=status, contact_force=force)
+    assert accepted(interface, old, [good, replace(good)])[0] == 0
+    swapped = good.u.copy()
+    swapped[left, 0] += MESH.points[right, 0] - MESH.points[left, 0]
+    swapped[right, 0] -= MESH.points[right, 0] - MESH.points[left, 0]
+    with pytest.raises(Folded, match=r"there is no equilibrium near here without the outline folding over"):
+        accepted(interface, old, [replace(good, u=swapped), good])
 
 
 def test_iterates_that_are_never_right_fail_the_step():
