@@ -218,7 +218,7 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     if rows:
         print(table(rows, depth=scene.depth))
     if (drift := load_drift(rows)) > DRIFT:
-        print(f'the load drifted by {drift:.1%} while the indentation was held; hold = "force" keeps it')
+        print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
     seconds = sum(float(row["seconds"]) for row in rows)
     print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
     return DONE

@@ -215,7 +215,7 @@ class Result(History):
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
         if (drift := self.load_drift) > DRIFT:
-            lines.append(f"the load drifted by {drift:.1%} while the indentation was held")
+            lines.append(f"the load drifted by {drift:.1%} at a held indentation")
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
