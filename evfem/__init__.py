@@ -37,6 +37,7 @@ _NAMES = {
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     "fast.model": ("FastModel", "reduce"),
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
+    "finger.scan": ("RidgeScan",),
     "loading": ("load",),
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),

@@ -213,9 +213,12 @@ def _finish(folder: RunFolder, result: object) -> int:
 def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     """Print the table of a run, how far it came, and where its results are."""
     from evfem.runfolder import table
+    from evfem.simulation.history import DRIFT, load_drift
 
     if rows:
         print(table(rows, depth=scene.depth))
+    if (drift := load_drift(rows)) > DRIFT:
+        print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
     seconds = sum(float(row["seconds"]) for row in rows)
     print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
     return DONE
@@ -314,6 +317,7 @@ def _mesh(given: argparse.Namespace) -> int:
 
 
 def _signal(given: argparse.Namespace) -> int:
+    from evfem.common.views import plus
     from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
 
     playback = None
@@ -325,7 +329,7 @@ def _signal(given: argparse.Namespace) -> int:
     write_signal(given.out, profile, playback)
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
-    print(f"{start:g} to {stop:g} mm, at most {largest:g} V; in {given.out}", flush=True)
+    print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
     return DONE
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
+from evfem.mesh import vtu
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
 from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
@@ -141,6 +142,21 @@ def write_frame(
     with replacing(path) as temporary:
         write_vtu(str(temporary), grid, compression="zlib" if compressed else None)
         meshfile.add_region_names(temporary, mesh)
+
+
+def frame_in(path: str | Path, row: Row, mesh: Mesh) -> Frame:
+    """The fields that `write_frame` wrote of the step of a `row`, on the same mesh.
+
+    Raises ValueError for any other file.
+    """
+    parts = vtu.read(Path(path).read_bytes())
+    if parts.points.shape[0] != len(mesh.points) or [kind for kind, _ in parts.blocks] != [mesh.kind]:
+        raise ValueError(f"{path} on another mesh")
+    nodal = {name: np.asarray(parts.point_data[name]) for name in ("displacement", *POINT_FIELDS)}
+    of_cells = {name: np.asarray(parts.cell_data[name][0], dtype=float) for name in CELL_FIELDS}
+    values = {name: value.astype(int if name == "contact_status" else float) for name, value in nodal.items()}
+    values["displacement"] = np.ascontiguousarray(values["displacement"][:, : mesh.dim])
+    return Frame(row["step"], row["time"], row["position"], **values, **of_cells)
 
 
 class ParaViewSeries:

@@ -11,15 +11,16 @@ from evfem.errors import InputError
 
 Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep or Mesh
 ALLOWED = (
-    "a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene or a sweep (.toml), "
-    "a mesh (.vtu, .msh)"
+    "the folder of a run, a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene "
+    "or a sweep (.toml), a mesh (.vtu, .msh)"
 )
 
 
 def load(path: str | Path) -> Found:
-    """What is in a file: a `Result` or a `FastModel` (as their `save` wrote them, under any name),
-    a `FitResult` (.json), a `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene`
-    or a `Sweep` (.toml), a `Mesh` (.vtu, .msh).
+    """What is in a file or folder: the `Result` that `evfem run` left in its folder, a `Result` or a
+    `FastModel` (as their `save` wrote them, under any name), a `FitResult` (.json), a
+    `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a
+    `Mesh` (.vtu, .msh).
 
     Raises InputError for any other or a damaged file, StorageError when the disk refuses.
 
@@ -31,10 +32,18 @@ def load(path: str | Path) -> Found:
     if not isinstance(path, (str, Path)):
         raise InputError("path", path, f"the path of {ALLOWED}")
     path = Path(path)
+    if path.is_dir():
+        return _run(path)
     if not path.is_file():
-        raise InputError("path", f"{path}, which is no file", ALLOWED)
+        raise InputError("path", f"{path}, which does not exist", ALLOWED)
     reader = READERS.get(path.suffix.lower())
     return _archive(path) if reader is None else reader(path)
+
+
+def _run(path: Path) -> Found:
+    from evfem.runfolder import result_in
+
+    return result_in(path)
 
 
 def _archive(path: Path) -> Found:

@@ -20,10 +20,10 @@ from typing import Any
 from evfem.common.notices import LOG
 from evfem.common.storage import disk, names_in, refuse_others, replacing, write_names, write_text
 from evfem.errors import InputError
-from evfem.export import FieldFiles, ParaViewSeries
+from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth
+from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth, read_rows
 from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
 
 #: bytes of fields that are said before they are written
@@ -203,6 +203,33 @@ def finished(path: Path, scene: Scene, found: Saved) -> bool:
     return False
 
 
+def result_in(path: Path) -> Result:
+    """The result of a run that has ended, from what it left in its folder: the history, the fields
+    that were written, the mesh of its scene.
+
+    Raises InputError for another folder, a run that has not ended, or damaged files.
+    """
+    allowed = "a folder that `evfem run` left, at its end"
+    from evfem.scene.file import loads
+    from evfem.scene.plan import scene_mesh
+
+    if not (path / SUMMARY).is_file() or not (path / HISTORY).is_file():
+        raise InputError("path", f"{path}, without {SUMMARY} or {HISTORY}", allowed)
+    try:
+        with disk(f"read {path}"):
+            origin = json.loads((path / SUMMARY).read_text(encoding="utf-8"))["provenance"]
+            rows = read_rows((path / HISTORY).read_text(encoding="utf-8"))
+        mesh, _ = scene_mesh(loads(origin["parameters"]))
+        frames = [frame_in(file, row, mesh) for row in rows if (file := _fields_of(path, row)).is_file()]
+        return Result.from_rows(rows, frames, mesh, origin)
+    except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
+        raise InputError("path", f"{path}, damaged: {error}", allowed) from error
+
+
+def _fields_of(path: Path, row: Row) -> Path:
+    return ParaViewSeries(path / FIELDS).frame_path(row["step"])
+
+
 def _without_a_row(history: Path) -> bool:
     with disk(f"use {history}"):
         return not history.exists() or history.stat().st_size <= len(csv_header())
@@ -252,7 +279,8 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
     lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
         row = row if depth is None else over_depth(row, depth)
-        numbers = [_number(float(row[name]), _digits(name)) for name in HEADS]
+        sizes = zip(HEADS, WIDTHS, strict=True)
+        numbers = [_number(float(row[name]), _digits(name), width - 1) for name, width in sizes]
         lines.append(_line(str(row["step"]), str(row["motion"]), numbers))
     return "\n".join(line.rstrip() for line in lines)
 
@@ -278,9 +306,18 @@ def _line(step: str, motion: str, values: Sequence[str]) -> str:
     return f"{step:>4} {motion:<7}" + "".join(f"{v:>{w}}" for v, w in zip(values, WIDTHS, strict=True))
 
 
-def _number(value: float, digits: int) -> str:
-    """With so many decimals, and no sign on what rounds to zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
+def _number(value: float, digits: int, width: int) -> str:
+    """With so many decimals, fewer where the column is too narrow for them, and no sign on what
+    rounds to zero.
+
+    >>> _number(-1e-7, 5, 9), _number(-12345.678, 5, 9), _number(-1e12, 5, 9), _number(1.0, 5, 9)
+    ('0.00000', '-12345.68', '-1.00e+12', '1.00000')
+    """
+    for kept in range(digits, -1, -1):
+        text = f"{round(value, kept) + 0.0:.{kept}f}"
+        if len(text) <= width:
+            return text
+    return f"{value:.2e}" if width > 8 else f"{value:.0e}"
 
 
 def _digits(name: str) -> int:

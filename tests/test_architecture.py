@@ -26,23 +26,26 @@ ROOMS = {
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
-        "space pattern assembly weakform userforms dynamics body",
+        "space pattern assembly weakform userforms dynamics drag body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers section fingerpad"),
+    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
-    "contact": ({"numpy", "scipy"}, "surfaces textures own pad edge attraction signorini follower condensed"),
+    "contact": (
+        {"numpy", "scipy"},
+        "surfaces textures own pad edge attraction signorini follower condensed stability",
+    ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state control condensation interface linearisation pressure anderson findings "
-        "equilibrium factorised stepping",
+        "equilibrium factorised relaxation stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution sense plan",
+        "motion terms scene keys voltage meanings schema file resolution drift sense plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},
-        "provenance history result spectrum model works ledger checkpoint run rendering",
+        "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
@@ -60,7 +63,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "loading", "runfolder", "templates", "arguments", "cli", "__main__"),
+    ("export", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones

@@ -88,6 +88,36 @@ def test_a_run_leaves_all_its_files_and_a_table(finished):
     assert "step 5 of 5" in err
 
 
+def test_over_a_depth_a_run_is_told_in_newtons(place):
+    text = SCENE.replace("[finger]", "[finger]\ndepth = 8.0")
+    (place / "square.toml").write_text(text)
+    status, out, _ = run_process(place, "run", "square.toml", "--no-fields", "--no-plots")
+    assert status == 0
+    last, summary = (
+        history(place / "square-out")[-1],
+        json.loads((place / "square-out/summary.json").read_text()),
+    )
+    force = float(last["normal_force"])
+    assert summary["last"]["normal_force"] == force
+    assert summary["total"]["last"]["normal_force"] == 8.0 * force
+    assert summary["total"]["depth"] == 8.0
+    lines = out.splitlines()
+    assert lines[1].split()[-4:] == ["N"] * 4
+    (end,) = (line.split() for line in lines if line.split()[:2] == ["5", "slide"])
+    assert float(end[6]) == pytest.approx(8.0 * force, abs=5e-6)
+
+
+def test_a_load_that_drifts_is_told_after_the_run(place):
+    (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 1.2"))
+    _, out, _ = run_process(place, "run", "square.toml", "--no-fields", "--no-plots")
+    force = [float(row["applied_force"]) for row in history(place / "square-out")]
+    drift = max(abs(f / force[1] - 1.0) for f in force[2:])
+    assert drift > 0.05
+    assert (
+        f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it' in out.splitlines()
+    )
+
+
 def test_the_summary_agrees_with_the_history(finished):
     results = finished[0] / "square-out"
     summary = json.loads((results / "summary.json").read_text())

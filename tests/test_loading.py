@@ -1,7 +1,10 @@
 """`ev.load` and the paths that `simulate` and `plan` take: one way in for every file."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
+from tools.commands import called
 from tools.fakes import SQUARE_SCENE, fake_result
 from tools.meshes import square_mesh
 
@@ -56,8 +59,8 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "empty.npz").write_text("")
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
     cases = {
-        "notes.txt": "notes.txt, of another kind; allowed: a result or a fast model",
-        "none.npz": "none.npz, which is no file",
+        "notes.txt": "notes.txt, of another kind; allowed: the folder of a run, a result",
+        "none.npz": "none.npz, which does not exist",
         "empty.npz": "empty.npz, cut off or of another kind",
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
         "square.toml": "frictoin",
@@ -67,8 +70,52 @@ def test_what_is_no_file_of_ours_gets_a_sentence(place):
         with pytest.raises(InputError) as caught:
             ev.load(name)
         assert words in str(caught.value)
-    with pytest.raises(InputError, match="path: given 3; allowed: the path of a result"):
+    with pytest.raises(InputError, match="path: given 3; allowed: the path of the folder"):
         ev.load(3)
+
+
+@pytest.mark.solver
+@pytest.mark.parametrize("output", ["", "precision = 'single'", "compression = true", "every = 2"])
+def test_the_folder_of_a_run_is_its_result(place, output):
+    """What `evfem run` left is what `simulate` returns, as far as fields were written."""
+    (place / "square.toml").write_text(f"{PRESS}\n[output]\n{output}\n")
+    assert called(place, "run", "square.toml", "--no-plots")[0] == 0
+    found, computed = ev.load("square-out"), ev.simulate("square.toml")
+    for name in ev.result.COLUMNS[:-1]:  # the last one is the time it took
+        np.testing.assert_array_equal(found[name], computed[name])
+    assert found.provenance["scene"] == computed.provenance["scene"]
+    np.testing.assert_array_equal(found.mesh.cells, computed.mesh.cells)
+    assert found.mesh.node_sets.keys() == computed.mesh.node_sets.keys()
+    assert [frame.step for frame in found.frames] == ([2] if "every" in output else [1, 2])
+    one, other = found.frames[-1], computed.frames[-1]
+    close = 1e-6 if "single" in output else 0.0
+    for spec in fields(ev.Frame):
+        np.testing.assert_allclose(getattr(one, spec.name), getattr(other, spec.name), rtol=close, atol=close)
+    assert called(place, "run", "square.toml", "--overwrite", "--no-fields", "--no-plots")[0] == 0
+    assert ev.load("square-out").frames == []
+
+
+@pytest.mark.solver
+def test_a_folder_that_is_no_result_gets_a_sentence(place):
+    assert called(place, "run", "square.toml", "--no-plots")[0] == 0
+    folder = place / "square-out"
+    history, fields_of_2 = folder / "history.csv", folder / "fields_00002.vtu"
+    kept = {path: path.read_bytes() for path in (history, fields_of_2, folder / "summary.json")}
+    wrong = {
+        history: [b"", b"step,motion\n1,press\n", kept[history].replace(b"press", b"press,1")],
+        fields_of_2: [b"", kept[fields_of_2].replace(b"gap", b"gab"), kept[fields_of_2][:2000]],
+        folder / "summary.json": [b"{}", b"[", b'{"provenance": {"parameters": "version = 3"}}'],
+    }
+    for path, contents in wrong.items():
+        for content in contents:
+            path.write_bytes(content)
+            sentence = r"path: given .*square-out, damaged: .*allowed: a folder that"
+            with pytest.raises(InputError, match=sentence):
+                ev.load(folder)
+        path.write_bytes(kept[path])
+    (folder / "summary.json").unlink()
+    with pytest.raises(InputError, match=r"without summary\.json or history\.csv"):
+        ev.load(folder)
 
 
 @pytest.mark.solver

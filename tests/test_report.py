@@ -1,5 +1,7 @@
 """The table of forces fits the terminal and shows the end of every motion."""
 
+import pytest
+
 from evfem.runfolder import chosen, table
 from evfem.simulation.result import COLUMNS
 
@@ -16,6 +18,17 @@ def test_the_table_fits_80_columns_with_long_numbers():
     assert max(map(len, lines)) <= 80
     assert len(lines) == 14
     assert lines[-1].split() == ["2000", "voltage", "-12.346", "-12.346", "-10000"] + ["-12.34568"] * 4
+
+
+def test_columns_never_touch_and_zero_has_no_sign():
+    for value in (-1e9, -123456.789, 1e300, -0.0, -1e-9, -1e-300):
+        row = dict.fromkeys(COLUMNS, value) | {"step": 12345, "motion": "voltage", "motion_index": 0}
+        *_, line = table([row]).splitlines()
+        numbers = line.split()[2:]
+        assert len(numbers) == 7
+        for text in numbers:
+            assert float(text) == pytest.approx(value, rel=0.06, abs=0.6 if abs(value) < 1.0 else 0.0)
+            assert value < -0.5 or not text.startswith("-")
 
 
 def test_over_a_depth_forces_are_in_newtons_and_lengths_as_they_were():

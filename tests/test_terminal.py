@@ -87,6 +87,13 @@ def test_a_run_draws_a_bar_and_a_table_in_the_width_there_is(place, columns):
     assert lines(text)[-1].startswith("4 of 4 steps in")
 
 
+def test_a_bar_says_how_much_time_is_left(place):
+    text = terminal(place, "run", "square.toml", "--no-plots", "--no-fields")[1]
+    bars = [line for line in lines(text) if "step/s" in line or "s/step" in line]
+    assert re.search(r"\| 0/4 \[00:0\d, \? left, +\?step/s\]", bars[0])
+    assert re.search(r"\| 4/4 \[00:\d\d, 00:00 left, ", bars[-1])
+
+
 def test_a_sweep_draws_a_bar_in_a_terminal_without_columns(place):
     status, text = terminal(place, "sweep", "two.toml", "--workers", "1", columns=0)
     assert status == 0

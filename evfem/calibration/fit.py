@@ -30,7 +30,7 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.storage import alone_in
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.scene.file import VERSION, loads, read_text, tables_of
 from evfem.scene.scene import Scene
 from evfem.simulation.result import origin
@@ -84,13 +84,21 @@ def fit(
         if out is not None:
             folder = SweepFolder(Path(out))
             stack.enter_context(alone_in(folder.path))
-            folder.open((), problem.digest)
+            _open(folder, problem.digest)
             folder.write_provenance({"digest": problem.digest, **problem.provenance})
         runs = Runs(OpenPool(pool, stack), problem.paths, folder)
         result = _solve(problem, runs, progress)
     if folder is not None:
         result.save(folder.path / "fit.json")
     return result
+
+
+def _open(folder: SweepFolder, plan: str) -> None:
+    """Make the folder, or go on in that of the same fit."""
+    try:
+        folder.open((), plan)
+    except InputError as error:
+        raise InputError("out", error.given, "another folder, or that of the same fit") from error
 
 
 class _Problem:
@@ -109,7 +117,7 @@ class _Problem:
         self.parameters = Parameters.of(parameters)
         for one in self.data:
             if not isinstance(one, (MeasuredCurve, MeasuredValues)):
-                raise InputError("data", one, "MeasuredCurve, MeasuredValues, or a list of them")
+                raise InputError("data", quoted(one), "MeasuredCurve, MeasuredValues, or a list of them")
             one.check(len(self.tables.get("motion", ())))
         self.questions = [(run.keys, run.question) for one in self.data for run in one.runs()]
         self.runs = grouped(self.questions)

@@ -21,7 +21,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_table
-from evfem.errors import InputError, unknown
+from evfem.errors import InputError, quoted, unknown
 from evfem.scene.keys import shown
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
@@ -112,7 +112,7 @@ class MeasuredCurve:
         if len(np.unique(self.at)) < len(self.at):
             raise InputError("data.at", "the same place twice", "each place once; the mean of its values")
         if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
-            raise InputError("data.motion", self.motion, "the number of a motion, from 0, or None")
+            raise InputError("data.motion", quoted(self.motion), "the number of a motion, from 0, or None")
         set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
 
     @classmethod
@@ -147,7 +147,7 @@ class MeasuredCurve:
     def check(self, motions: int) -> None:
         """InputError for a motion that a scene with so many does not have."""
         if self.motion is not None and self.motion >= motions:
-            raise InputError("data.motion", self.motion, f"motions from 0 to {motions - 1}")
+            raise InputError("data.motion", quoted(self.motion), f"motions from 0 to {motions - 1}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,5 +256,5 @@ def _setting(key: Any, value: Any) -> Any:
     found = plain_value(f"data.where.{key}", value)
     each = found if isinstance(found, list) else [found]
     if any(isinstance(one, float) and not math.isfinite(one) for one in each):
-        raise InputError(f"data.where.{key}", value, "finite numbers")
+        raise InputError(f"data.where.{key}", quoted(value), "finite numbers")
     return found

@@ -158,6 +158,17 @@ def truth(key: str, value: object) -> bool:
     return value
 
 
+def switch() -> dict[str, Any]:
+    """Metadata of a field that is on or off."""
+    return {"allowed": "true | false", "check": _on_or_off}
+
+
+def _on_or_off(key: str, value: object) -> bool:
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(key, value, "true | false")
+    return bool(value)
+
+
 def check_fields(target: Any) -> None:
     """Check and store every field of a frozen dataclass that has a rule; a default None may stay
     None. All mistakes are reported at once.

@@ -23,7 +23,7 @@ PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage
 PAD_SPARE, PAD_FEWEST   so many times more of its nodes are in play than touch, and so many more  fast model
 PAD_SPRING              stiffness of the spring that holds it without contact, relative to that   fast model
                         of a node
-SEARCH_START            where no travel of the bone settles a prescribed force, a search starts    attraction
+SEARCH_START            where no travel of the bone settles a prescribed force, a search starts   attraction
                         with this fraction of the largest increment
 SEARCH_END              and ends at this fraction of the force that was lacking                   attraction
 SEARCH_LIMIT            or after so many contact problems                                         attraction
@@ -43,6 +43,10 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
+ALIKE                   below this residual iterations with a new tangent each are combined too   thin
+                                                                                                  insulators
+MORE                    so many times the iterations may be used where the residuals' fall        thin
+                        promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
@@ -60,6 +64,17 @@ CHANGES                 so many changes of side in one step show that neither si
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
+COARSER                 after a release the next one within the same step comes at a part so      texture
+                        many times as long
+DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
+DRAG_GROWTH             where its speed grows less or more than these factors in one step
+DRAG_REST               drag of a rate below this is nearly none: a body that slows down may      snaps
+                        be at rest
+DRAG_CALMER             what was not at rest is asked again at so much less drag
+DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+DRAG_STEPS              steps of a release, failed ones included, before it is given up
+VERGE                   a step that failed where what takes stability away grows so fast,         snaps
+                        relative to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
 NAMED                   so many of the largest out-of-balance forces are named in a failure
 ======================  ========================================================================  ==========
@@ -89,6 +104,8 @@ FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
+ALIKE = 1e-3
+MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
 STABLE = 0.9
@@ -100,5 +117,10 @@ HAIR = 1e-9
 SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
+COARSER = 4.0
+DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
+DRAG_REST, DRAG_CALMER = 0.01, 0.1
+DRAG_MOST, DRAG_STEPS = 1e6, 60
+VERGE = 0.9
 STAGGERED_LIMIT = 200
 NAMED = 3

@@ -13,6 +13,7 @@ import os
 import shutil
 import sys
 import textwrap
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from threading import Event, Thread
@@ -37,6 +38,14 @@ def wrapped(text: str, stream: TextIO) -> str:
     return textwrap.fill(
         text, columns - 1, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
     )
+
+
+def warn(text: str) -> None:
+    """A warning that points at the user's line: the innermost one outside the package."""
+    frame, level = sys._getframe(), 1
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == "evfem":
+        frame, level = frame.f_back, level + 1
+    warnings.warn(text, stacklevel=level)
 
 
 def tell(text: str) -> None:
@@ -78,10 +87,13 @@ def shown(wanted: bool = True) -> Iterator[None]:
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
-    """A progress bar (tqdm), in a notebook a widget; one that is not `wanted` draws nothing."""
+    """A progress bar (tqdm) with the time that is left, in a notebook a widget; one that is not
+    `wanted` draws nothing.
+    """
     from tqdm.auto import tqdm
 
-    return tqdm(total=total, initial=done, unit=unit, disable=not wanted, ncols=_columns())
+    form = "{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}, {remaining} left, {rate_fmt}{postfix}]"
+    return tqdm(total=total, initial=done, unit=unit, disable=not wanted, ncols=_columns(), bar_format=form)
 
 
 def milestone(unit: str, done: int, total: int) -> None:

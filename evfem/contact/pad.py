@@ -36,6 +36,12 @@ class Pad:
     free: Any
 
     @property
+    def segments(self) -> Ints:
+        """Pairs (S, 2) of neighbouring nodes along the outline, as indices into `nodes`."""
+        line = self.edges[:, [0, *range(2, self.edges.shape[1]), 1]]
+        return np.stack([line[:, :-1], line[:, 1:]], axis=2).reshape(-1, 2)
+
+    @property
     def shares(self) -> Floats:
         """Part of an edge's projected length that each of its nodes carries."""
         return SHARES[self.edges.shape[1]]
@@ -84,6 +90,43 @@ class Pad:
         if not inside.any():
             return 0.0, 0.0
         return float(right[inside].max() - left[inside].min()), float(self.length(x)[inside].sum())
+
+
+def fold(position: Floats, segments: Ints, touching: Any, down: Any) -> float | None:
+    """x (mm) where an outline crosses itself, or None where it does not.
+
+    `position` (P, 2) of the nodes, `segments` (S, 2) of the outline from node to node, the body on
+    their left; which nodes are `touching` (P,) a surface over x, and which segments faced `down`
+    (S,) undeformed. As long as these still do, nothing has folded; elsewhere segments that touch
+    must not face up, and no two may cross.
+
+    >>> zigzag = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [1.5, -0.5], [3.0, 0.0]])
+    >>> line = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
+    >>> fold(zigzag, line, np.zeros(5, bool), np.ones(4, bool))
+    1.25
+    """
+    begin, end = position[segments[:, 0]], position[segments[:, 1]]
+    turned = down & (end[:, 0] <= begin[:, 0])
+    if not turned.any():
+        return None
+    pressed = np.flatnonzero(turned & touching[segments].all(axis=1) & (end[:, 0] < begin[:, 0]))
+    if pressed.size:
+        return float(begin[pressed[0], 0])
+    # begin and end of b are on both sides of the line through a, and the other way round
+    before, after = (_sides(begin, end, point) for point in (begin, end))
+    apart = before * after < 0.0
+    crossed = np.argwhere(apart & apart.T)
+    if not crossed.size:
+        return None
+    a, b = crossed[0]
+    way = before[a, b] / (before[a, b] - after[a, b])
+    return float(begin[b, 0] + way * (end[b, 0] - begin[b, 0]))
+
+
+def _sides(begin: Floats, end: Floats, point: Floats) -> Floats:
+    """On which side of each segment (S, 2), from begin to end, the points (S, 2) are: (S, S)."""
+    way, to = end - begin, point[None] - begin[:, None]
+    return way[:, None, 0] * to[..., 1] - way[:, None, 1] * to[..., 0]
 
 
 def make_pad(mesh: Mesh) -> Pad:

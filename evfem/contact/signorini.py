@@ -67,6 +67,10 @@ class ContactNotSolved(ArithmeticError):
     """The sub-problem cycles: it has no solution near the start, or several."""
 
 
+class Unstable(ContactNotSolved):
+    """It has none because the body gives way the more, the more it is loaded."""
+
+
 @dataclass(frozen=True)
 class ExtraUnknowns:
     """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations

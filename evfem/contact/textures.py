@@ -26,7 +26,7 @@ import numpy as np
 from evfem.common.checks import real, set_frozen
 from evfem.contact.surfaces import FARTHEST, HIGHEST, MOST_TERMS, RigidSurface, Rows, Sinusoid
 from evfem.electrostatics.laws import Layer
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.tensor import Array
 
 #: shortest length of a texture (mm), and largest seed
@@ -151,7 +151,7 @@ class SelfAffine(RigidSurface):
             or not isinstance(self.seed, int)
             or not 0 <= self.seed <= LARGEST_SEED
         ):
-            raise InputError("surface.seed", self.seed, "a whole number, not negative")
+            raise InputError("surface.seed", quoted(self.seed), "a whole number, not negative")
         if not 1 <= len(self._waves) <= MOST_TERMS:
             given = f"{len(self._waves)} waves between {longest:g} and {shortest:g} mm"
             raise InputError("surface.shortest", given, f"1 to {MOST_TERMS} waves that fit into the period")

@@ -15,6 +15,7 @@ import numpy as np
 from evfem.common.checks import Values, above, plain
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, piecewise_linear, read_columns
+from evfem.common.views import plus
 from evfem.errors import ABSENT, InputError
 
 #: Applied over effective voltage of a sinusoidal carrier above 10 kHz (the paper's footnote to (17)).
@@ -62,8 +63,8 @@ class VoltageProfile:
 
     def __repr__(self) -> str:
         x, U = self.position, self.voltage
-        where = f"{x.size} rows, x {x[0]:.4g} to {x[-1]:.4g} mm"
-        return f"VoltageProfile({where}, {U.min():.4g} to {U.max():.4g} V)"
+        where = f"{x.size} rows, x {plus(x[0]):.4g} to {plus(x[-1]):.4g} mm"
+        return f"VoltageProfile({where}, {plus(U.min()):.4g} to {plus(U.max()):.4g} V)"
 
     def __call__(self, position: Values) -> Values:
         """Voltage in V at `position` in mm."""

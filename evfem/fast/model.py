@@ -15,7 +15,6 @@ equilibria the fast model errs by some 1e-4 of the force, beyond them by percent
 from __future__ import annotations
 
 import json
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -218,7 +217,7 @@ class FastModel:
 
 def _in_full(scene: Scene, stated: dict[str, Any]) -> Result:
     """The full model's result, with a warning that says why."""
-    warnings.warn(f"running the full model: {stated['reason']}", stacklevel=3)
+    notices.warn(f"running the full model: {stated['reason']}")
     result = simulate(scene)
     # a check that did not converge has no error that could be stated
     error = {name: value if np.isfinite(value) else None for name, value in stated["error"].items()}

@@ -38,6 +38,12 @@ class NoTissue:
     """In place of the body: its forces and its energy are not known."""
 
     dynamics = None
+    drag_rate = 0.0
+
+    @staticmethod
+    def drag_dissipation(u: Floats) -> float:
+        """Nothing: it is not released."""
+        return 0.0
 
     @staticmethod
     def forces(u: Floats) -> Floats:
@@ -91,7 +97,7 @@ class FastRun(Run):
             raise NotConverged(request.step, error.residuals, advice, self.result()) from error
         self.time += request.duration
         row = self._row(request)
-        row |= {"substeps": substeps, "newton_iterations": record.iterations - iterations}
+        row |= {"substeps": substeps, "newton_iterations": record.iterations - iterations, "relaxations": 0}
         self.rows.append(row | {"seconds": clock.perf_counter() - begin})
         self.states.append(self.state)
 

@@ -116,6 +116,9 @@ class RememberedPad:
         spread = self.interface.shallowest_penetration(state) is not None
         return "contact spreads beyond the nodes that the fast model keeps" if spread else ""
 
+    def verge(self, state: State, target: Target) -> None:
+        """Not known: the full model says it."""
+
     def reusable(self) -> Reusable:
         """Nothing that another run could use."""
         return Reusable(np.zeros(0, dtype=np.int64), None, 0.0)

@@ -22,6 +22,7 @@ from evfem.common.views import called, changed, short, table
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import LAYERS, NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
+from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
@@ -64,6 +65,10 @@ WITH_WIDTH = (
     "epidermis_thickness",
     "dermis_thickness",
 )
+
+#: What a scan of the ridges takes the place of, and the part of its depth that two nodes may miss.
+PROFILE = ("ridges", "ridge_height", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove")
+MISSED = 0.5
 
 #: resolution -> divisions in quadratic cells; the rows of each layer stand in `LAYERS`.
 RESOLUTIONS: Mapping[str, Divisions] = {
@@ -109,7 +114,9 @@ class FingerPad:
     fractions `ridge_crest` and `ridge_groove` of the pitch, with cosine-shaped walls. Ridges fade
     out between 0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape
     that meets the ratio of ridge to gross contact area of Adams et al.
-    (doi:10.1098/rsif.2012.0467) within 10 %.
+    (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (`RidgeScan`, or the path of a csv file
+    with the header x,height or x,y) takes the place of this profile; `ridge_width` then says how
+    finely the pad is divided.
 
     **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the
     ridges: the stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height`
@@ -150,6 +157,7 @@ class FingerPad:
     ridge_phase: float = 0.0
     ridge_crest: float = 0.0
     ridge_groove: float = 0.0
+    ridge_scan: RidgeScan | str | os.PathLike[str] | None = None
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
     stratum_corneum_thickness: float = thickness_of("stratum_corneum")
     epidermis_thickness: float = thickness_of("epidermis")
@@ -175,6 +183,10 @@ class FingerPad:
                 raise InputError("finger.ridges", quoted(self.ridges), "true or false")
         with mistakes.of_a_part():
             choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+        with mistakes.of_a_part():
+            if self.ridge_scan is not None:
+                set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
+                _check_alone(self)
         mistakes.report()
         set_frozen(self, materials=_all_materials(self.materials))
         _check_section(self, self._section)
@@ -199,10 +211,19 @@ class FingerPad:
     def _repr_html_(self) -> str:
         """For notebooks: sizes, and what differs from Table 2."""
         ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
+        ridges = ridges if self.ridge_scan is None else short(self.ridge_scan)
         rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
         rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
         rows.append(("resolution", self.resolution))
-        told = {"width", "height", "ridges", "ridge_height", "ridge_width", "stratum_corneum_thickness"}
+        told = {
+            "width",
+            "height",
+            "ridges",
+            "ridge_scan",
+            "ridge_height",
+            "ridge_width",
+            "stratum_corneum_thickness",
+        }
         own = {name: v for name, v in self._changed().items() if name not in told | {"resolution"}}
         return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
 
@@ -227,8 +248,11 @@ class FingerPad:
     def _section(self) -> Section:
         outer = Ellipse(0.5 * self.width, 0.5 * self.height)
         bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
-        ridges = None
-        if self.ridges:
+        ridges: Ridges | ScannedRidges | None = None
+        if isinstance(self.ridge_scan, RidgeScan):
+            scanned = self.ridge_scan.depths(outer)
+            ridges = ScannedRidges(*scanned, self.ridge_width, FULL * outer.a, ZONE * outer.a)
+        elif self.ridges:
             profile = (self.ridge_height, self.ridge_width, self.ridge_exponent, self.ridge_phase)
             ridges = Ridges(*profile, self.ridge_crest, self.ridge_groove, FULL * outer.a, ZONE * outer.a)
         return Section(
@@ -269,6 +293,14 @@ def _all_materials(own: object) -> dict[str, Any]:
     return laws
 
 
+def _check_alone(pad: FingerPad) -> None:
+    """Refuse a formula of ridges, or none, beside scanned ones."""
+    for name in PROFILE:
+        if getattr(pad, name) != getattr(FingerPad, name):
+            given = f"{name} = {getattr(pad, name)} beside a scan"
+            raise InputError(f"finger.{name}", given, "one of the two: the scan has the ridges as they are")
+
+
 def _check_section(pad: FingerPad, section: Section) -> None:
     """Refuse geometry whose parts do not fit into each other."""
     (outermost, second, *_), (thickness, below, *_) = section.layers, section.thickness
@@ -278,13 +310,12 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
         _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
-        _at_most(
-            "ridge_height", ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness"
-        )
+        height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
+        _at_most(height, ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness")
         _at_most(
             "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
         )
-        _check_walls(ridges, outer)
+        _check_walls(pad, ridges, outer)
     _at_most(
         "nail_thickness",
         pad.nail_thickness,
@@ -313,10 +344,19 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         )
 
 
-def _check_walls(ridges: Ridges, outer: Ellipse) -> None:
+def _check_walls(pad: FingerPad, ridges: Ridges | ScannedRidges, outer: Ellipse) -> None:
     slope = ridges.steepest / (1.0 - ridges.height * outer.b / outer.a**2)
-    limit = STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
-    if slope > limit:
+    limit = STEEPEST_FLAT if pad.ridge_crest > 0.0 else STEEPEST
+    if isinstance(ridges, ScannedRidges):
+        spacing = 0.5 * ridges.pitch / RESOLUTIONS[pad.resolution].per_ridge
+        missed = ridges.missed(spacing)
+        if slope > limit or missed > MISSED * ridges.height:
+            given = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
+            allowed = (
+                f"slopes up to {limit:g}, and at most {MISSED * ridges.height:.3g} mm: a smoother scan, "
+            )
+            raise InputError("finger.ridge_scan", given, allowed + "or a finer finger.resolution")
+    elif slope > limit:
         raise InputError(
             "finger.ridge_height",
             f"walls with a slope of {slope:.3g}",

@@ -87,8 +87,14 @@ class Ridges:
         else:
             s = np.clip((t - self.crest) / (1.0 - self.crest - self.groove), 0.0, 1.0)
             shape = 0.5 * (1.0 - np.cos(np.pi * s))
-        return self.height * shape * self._fade(np.abs(x))
+        return self.height * shape * quintic((self.end - np.abs(x)) / (self.end - self.full))
 
-    def _fade(self, x: Floats) -> Floats:
-        s = np.clip((self.end - x) / (self.end - self.full), 0.0, 1.0)
-        return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+
+def quintic(s: Floats) -> Floats:
+    """A smooth step: 0 up to s = 0, 1 from s = 1 on, with level ends.
+
+    >>> quintic(np.array([-1.0, 0.5, 2.0])).tolist()
+    [0.0, 0.5, 1.0]
+    """
+    s = np.clip(s, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2)

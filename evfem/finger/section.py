@@ -17,6 +17,7 @@ from evfem.common.arrays import Floats
 from evfem.finger.lattice import Lattice, ring
 from evfem.finger.layers import NAIL, NAIL_BED, TissueLayer
 from evfem.finger.outline import Ellipse, Ridges
+from evfem.finger.scan import ScannedRidges
 from evfem.mesh.mesh import Mesh
 
 #: Over the semi-axis: where ridges begin to fade, where they end, and half the width of the finest zone with
@@ -60,7 +61,7 @@ class Section:
     rows: tuple[int, ...]
     nail: float
     nail_width: float
-    ridges: Ridges | None
+    ridges: Ridges | ScannedRidges | None
     divisions: Divisions
 
     def mesh(self, order: int) -> Mesh:

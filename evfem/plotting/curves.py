@@ -1,5 +1,7 @@
 """Curves of the history: forces, any columns, one or several results.
 
+A result is drawn per mm of depth, `result.total` over the whole depth: in N, mm² and mJ.
+
 `over` is the column along the abscissa: any column that grows or falls, by default the one that
 the motions change (`abscissa`).
 """
@@ -13,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.plotting.colours import BLACK, BLUE, CURVES, GREEN, ORANGE, PURPLE, SKY, STYLES, VERMILION
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
-from evfem.plotting.labels import axis_label, column_label, column_text, kind_of, values_of
+from evfem.plotting.labels import Units, axis_label, column_label, column_text, kind_of, values_of
 from evfem.simulation.result import Result
 
 if TYPE_CHECKING:
@@ -71,33 +73,31 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     ramps; the time if the finger waits, else the step, with the motions marked. A force that is 0
     throughout is left out.
     """
-    ax = axes_or_new(ax)
-    _draw_columns(ax, result, FORCES, "applied_force", over)
-    return ax
+    return _draw_columns(ax, result, FORCES, "applied_force", over)
 
 
 def energies(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Works, stored energy and dissipations (N) over `over`, as in `forces`."""
-    ax = axes_or_new(ax)
-    _draw_columns(ax, result, ENERGIES, "external_work", over)
-    return ax
+    return _draw_columns(ax, result, ENERGIES, "external_work", over)
 
 
 def _draw_columns(
-    ax: Axes, result: Result, lines: Mapping[str, tuple[str, str, str]], always: str, over: str | None
-) -> None:
+    ax: Axes | None, result: Result, lines: Mapping[str, tuple[str, str, str]], always: str, over: str | None
+) -> Axes:
     """Lines of columns of one kind; those that are 0 throughout only if they must `always` be
     there.
     """
     over = checked_over(over, result)
+    ax = axes_or_new(ax)
     x, drawn = along(result, over, over), {name: along(result, name, over) for name in lines}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
     for name, (label, colour, style) in lines.items():
         y = drawn[name]
         if name == always or np.any(np.abs(y) > least):
             ax.plot(x, y, style, color=colour, label=label, marker=_marker(x))
-    finish(ax, result, over, axis_label(always))
+    finish(ax, result, over, axis_label(always, result.units))
     ax.legend()
+    return ax
 
 
 def checked_over(over: str | None, result: Result) -> str:
@@ -105,7 +105,7 @@ def checked_over(over: str | None, result: Result) -> str:
     if over is None:
         return abscissa(result)
     if over not in OVER:
-        raise InputError("over", over, " | ".join(OVER))
+        raise InputError("over", quoted(over), " | ".join(OVER))
     return over
 
 
@@ -123,7 +123,7 @@ def finish(ax: Axes, result: Result, over: str, label: str) -> None:
     """Labels, grid, and over the steps the motions."""
     if over == "step":
         _mark_motions(ax, result)
-    ax.set_xlabel(column_label(over))
+    ax.set_xlabel(column_label(over, result.units))
     ax.set_ylabel(label)
     ax.grid(alpha=0.3)
 
@@ -153,27 +153,32 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     Raises InputError for what is no column of numbers.
     """
     if isinstance(columns, str) or not columns:
-        raise InputError("columns", columns, "a list of at least one column of the history")
+        raise InputError("columns", quoted(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
     kinds: dict[tuple[str, str], list[str]] = {}
     for name in columns:
         values_of(result, name)
-        kinds.setdefault(kind_of(name), []).append(name)
+        kinds.setdefault(kind_of(name, result.units), []).append(name)
     panels = new_panels(len(kinds), 1.0 + 1.9 * len(kinds))
     x = along(result, over, over)
     for ax, names in zip(panels, kinds.values(), strict=True):
         for name, colour, style in zip(names, cycle(CURVES), cycle(STYLES), strict=False):
             ax.plot(
-                x, along(result, name, over), style, color=colour, label=column_text(name), marker=_marker(x)
+                x,
+                along(result, name, over),
+                style,
+                color=colour,
+                label=column_text(name, result.units[name]),
+                marker=_marker(x),
             )
-        alone = len(names) == 1
-        ax.set_ylabel(column_label(names[0]) if alone else axis_label(names[0]))
+        label = column_label if len(names) == 1 else axis_label
+        ax.set_ylabel(label(names[0], result.units))
         ax.grid(alpha=0.3)
-        if not alone:
+        if len(names) > 1:
             ax.legend()
     if over == "step":
         _mark_motions(panels[0], result)
-    panels[-1].set_xlabel(column_label(over))
+    panels[-1].set_xlabel(column_label(over, result.units))
     return panels
 
 
@@ -183,11 +188,14 @@ def compare(
     """The same column of several results, each by its name, over `over` (see `forces`)."""
     found = named(results)
     over = checked_over(over, next(iter(found.values())))
+    for result in found.values():
+        values_of(result, column)
     ax = axes_or_new(ax)
     for (name, result), colour, style in styled(found):
         x = along(result, over, over)
         ax.plot(x, along(result, column, over), style, color=colour, label=name, marker=_marker(x))
-    ax.set(xlabel=column_label(over), ylabel=column_label(column))
+    units = units_of(found)
+    ax.set(xlabel=column_label(over, units), ylabel=column_label(column, units))
     ax.grid(alpha=0.3)
     ax.legend()
     return ax
@@ -198,7 +206,14 @@ def named(results: Results) -> dict[str, Result]:
     found = {"": results} if isinstance(results, Result) else dict(results)
     if not found:
         raise InputError("results", "nothing", "a result, or {name: result, ...}")
+    if any(result.units != units_of(found) for result in found.values()):
+        raise InputError("results", "some per mm of depth, some in total", "all of them alike")
     return found
+
+
+def units_of(found: Mapping[str, Result]) -> Units:
+    """The units that all of these results have."""
+    return next(iter(found.values())).units
 
 
 def styled(found: Mapping[str, Any]) -> Any:

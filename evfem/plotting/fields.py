@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.colours import BOTH_SIGNS, ONE_SIGN, STATUS
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
@@ -39,13 +39,15 @@ def values_of(frame: Frame, field: str) -> Floats:
 def check_field(field: str) -> None:
     """Raises InputError unless the field is one of `FIELDS`."""
     if field not in FIELDS:
-        raise InputError("field", field, " | ".join(FIELDS))
+        raise InputError("field", quoted(field), " | ".join(FIELDS))
 
 
 def frame_of(result: Result, number: int) -> Frame:
     """A frame by its number among those kept, from the end if negative; InputError for another."""
     if not -len(result.frames) <= number < len(result.frames):
-        raise InputError("frame", number, f"the number of one of the {len(result.frames)} frames kept")
+        raise InputError(
+            "frame", quoted(number), f"the number of one of the {len(result.frames)} frames kept"
+        )
     return result.frames[number]
 
 
@@ -152,7 +154,7 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
     if field == "contact_status":
         return Scale("status", -0.5, len(STATUS) - 0.5)
     if vmin is not None and vmax is not None and not vmin < vmax:
-        raise InputError("vmin", vmin, f"a value below vmax, which is {vmax:g}")
+        raise InputError("vmin", quoted(vmin), f"a value below vmax, which is {vmax:g}")
     least, most = (float(values.min()), float(values.max())) if values.size else (0.0, 0.0)
     least = min(least, 0.0) if field in FROM_ZERO else least
     middle = MIDDLES.get(field)

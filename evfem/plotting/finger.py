@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.colours import EDGE, GROUND, STATUS
 from evfem.plotting.fields import (
@@ -94,7 +94,9 @@ class View:
             return _whole(self.points, height_of(self.result, self.frame))
         if isinstance(near, str):
             if near != "contact":
-                raise InputError("near", near, "contact, or a window (left, right, bottom, top) in mm")
+                raise InputError(
+                    "near", quoted(near), "contact, or a window (left, right, bottom, top) in mm"
+                )
             flat = OF_PAD if self.field in POINT_FIELDS else OF_TISSUE
             return _close(self.points, self.frame, height_of(self.result, self.frame), flat)
         return checked_window(near)
@@ -122,9 +124,9 @@ def checked_window(window: Any) -> Window:
     try:
         left, right, bottom, top = (float(value) for value in window)
     except (TypeError, ValueError) as error:
-        raise InputError("near", window, allowed) from error
+        raise InputError("near", quoted(window), allowed) from error
     if not (left < right and bottom < top and np.isfinite([left, right, bottom, top]).all()):
-        raise InputError("near", window, allowed)
+        raise InputError("near", quoted(window), allowed)
     return left, right, bottom, top
 
 
@@ -165,7 +167,7 @@ def told(result: Result, frame: Frame) -> str:
     text = f"step {frame.step}: position {frame.position + 0.0:.4g} mm"
     if rows.size:
         row = rows[0]
-        text += f", load {result.applied_force[row] + 0.0:.3g} N/mm"
+        text += f", load {result.applied_force[row] + 0.0:.3g} {result.units['applied_force']}"
         text += f", {result.voltage[row]:.4g} V" if np.any(result.voltage != 0.0) else ""
     return text
 

@@ -1,19 +1,26 @@
-"""Names and units of what is drawn, the same in every picture."""
+"""Names and units of what is drawn, the same in every picture.
+
+`units` are those of a result: per mm of depth, or over a whole depth (`Result.total`).
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
-from evfem.errors import InputError
-from evfem.simulation.result import COLUMNS, UNITS, Result
+from evfem.errors import InputError, quoted
+from evfem.simulation.history import COLUMNS, UNITS
+from evfem.simulation.result import Result
+
+Units = Mapping[str, str]
 
 #: last word of a column's name -> what it is; columns of one kind share an axis
 KINDS = {
-    "force": "force per depth",
+    "force": "force",
     "width": "width",
-    "work": "energy per depth",
-    "energy": "energy per depth",
-    "dissipation": "energy per depth",
+    "work": "energy",
+    "energy": "energy",
+    "dissipation": "energy",
     "pressure": "pressure",
 }
 #: columns with a name of their own in a picture
@@ -31,47 +38,58 @@ KEY_UNITS |= {"speed": "mm/s", "viscosity": "s", "duration": "s", "frequency": "
 def with_unit(text: str, unit: str) -> str:
     """Text and unit of an axis.
 
-    >>> with_unit("force", "N"), with_unit("step", "")
-    ('force (N)', 'step')
+    >>> with_unit("area", "mm2"), with_unit("step", "")
+    ('area (mm²)', 'step')
     """
-    return f"{text} ({unit})" if unit else text
+    return f"{text} ({unit.replace('mm2', 'mm²')})" if unit else text
 
 
-def column_text(name: str) -> str:
-    """A column in words, without its unit.
+def column_text(name: str, unit: str = "") -> str:
+    """A column in words, without its unit: a width over a whole depth is an area.
 
-    >>> column_text("normal_force"), column_text("position")
-    ('normal force', 'position of the bone')
+    >>> column_text("normal_force"), column_text("contact_width", "mm2")
+    ('normal force', 'contact area')
     """
-    return TEXTS.get(name, name.replace("_", " "))
+    text = TEXTS.get(name, name.replace("_", " "))
+    return text.replace("width", "area") if unit == "mm2" else text
 
 
-def kind_of(name: str) -> tuple[str, str]:
+def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
     """Kind and unit of a column.
 
     >>> kind_of("electrostatic_force_x"), kind_of("contact_width"), kind_of("substeps")
     (('force per depth', 'N/mm'), ('width', 'mm'), ('substeps', ''))
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> kind_of("stored_energy", WHOLE_UNITS), kind_of("contact_width", WHOLE_UNITS)
+    (('energy', 'mJ'), ('area', 'mm2'))
     """
-    word = name.removesuffix("_x").rsplit("_", 1)[-1]
-    return KINDS.get(word, column_text(name)), UNITS[name]
+    unit = units[name]
+    kind = KINDS.get(name.removesuffix("_x").rsplit("_", 1)[-1])
+    if kind is None:
+        return column_text(name, unit), unit
+    if kind in ("force", "energy") and unit == UNITS[name]:
+        kind = f"{kind} per depth"
+    return column_text(kind, unit), unit
 
 
-def column_label(name: str) -> str:
+def column_label(name: str, units: Units = UNITS) -> str:
     """A column with its unit, for an axis of its own.
 
-    >>> column_label("min_gap"), column_label("step")
-    ('smallest gap (mm)', 'step')
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> column_label("min_gap"), column_label("step"), column_label("real_contact_width", WHOLE_UNITS)
+    ('smallest gap (mm)', 'step', 'real contact area (mm²)')
     """
-    return with_unit(column_text(name), UNITS[name])
+    return with_unit(column_text(name, units[name]), units[name])
 
 
-def axis_label(name: str) -> str:
+def axis_label(name: str, units: Units = UNITS) -> str:
     """The kind of a column with its unit, for an axis that it shares.
 
-    >>> axis_label("stored_energy")
-    'energy per depth (N)'
+    >>> from evfem.simulation.history import WHOLE_UNITS
+    >>> axis_label("normal_force"), axis_label("normal_force", WHOLE_UNITS)
+    ('force per depth (N/mm)', 'force (N)')
     """
-    return with_unit(*kind_of(name))
+    return with_unit(*kind_of(name, units))
 
 
 def field_label(field: str) -> str:
@@ -106,5 +124,5 @@ def values_of(result: Result, name: str) -> Any:
     """
     names = [column for column in COLUMNS if column != "motion"]
     if name not in names:
-        raise InputError("column", name, " | ".join(names))
+        raise InputError("column", quoted(name), " | ".join(names))
     return getattr(result, name)

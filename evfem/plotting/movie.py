@@ -49,7 +49,9 @@ def animate(
     """Write the frames of a result as a moving picture, `path` ending in .gif or .mp4, and return
     the path.
 
-    Each shows the deformed finger as `deformed` does, and the forces with a mark where it is.
+    In a notebook the path shows itself as the picture.
+
+    Each frame shows the deformed finger as `deformed` does, and the forces with a mark where it is.
     `near="contact"` goes along with the finger, as does no other window. `fps` frames are shown in
     a second; keep more of them with `Output(every=...)`. A terminal or notebook shows a bar. The
     file is written whole or not at all. Raises InputError for another ending, for .mp4 where
@@ -60,14 +62,26 @@ def animate(
     if not result.frames:
         raise InputError("result", "a result without frames", "a result with frames (Output(every=...))")
     write = _writer(path)
-    movie = make_movie(result, field, near, (vmin, vmax))
+    reel = make_reel(result, field, near, (vmin, vmax))
     wanted = progress and notices.drawable()
     with replacing(path) as temporary, notices.bar(len(result.frames), "frame", wanted=wanted) as bar:
-        write(temporary, movie, fps, bar.update)
-    return path
+        write(temporary, reel, fps, bar.update)
+    return MoviePath(path)
 
 
-def _writer(path: Path) -> Callable[[Path, Movie, int, Any], None]:
+class MoviePath(type(Path())):  # type: ignore[misc]
+    """The path of a moving picture, which a notebook shows as what is there."""
+
+    def _repr_html_(self) -> str:
+        from base64 import b64encode
+
+        data = b64encode(self.read_bytes()).decode("ascii")
+        if self.suffix == ".gif":
+            return f'<img src="data:image/gif;base64,{data}">'
+        return f'<video controls loop src="data:video/mp4;base64,{data}"></video>'
+
+
+def _writer(path: Path) -> Callable[[Path, Reel, int, Any], None]:
     """What writes files with this ending."""
     if path.suffix not in ENDINGS:
         raise InputError("path", str(path), "a file name that ends in .gif or .mp4")
@@ -82,16 +96,16 @@ def _writer(path: Path) -> Callable[[Path, Movie, int, Any], None]:
     return _write_mp4
 
 
-def _write_gif(path: Path, movie: Movie, fps: int, update: Any) -> None:
+def _write_gif(path: Path, reel: Reel, fps: int, update: Any) -> None:
     """All frames with Pillow in the same 256 colours, for ever from the beginning."""
     from PIL import Image
     from scipy.spatial import cKDTree
 
     pictures: list[Image.Image] = []
-    for figure in movie.frames():
+    for figure in reel.frames():
         pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3]  # type: ignore[attr-defined]
         if not pictures:
-            colours = _palette(movie.scale, pixels)
+            colours = _palette(reel.scale, pixels)
             tree = cKDTree(colours)
         code, where = np.unique(pixels.astype(np.int32) @ (65536, 256, 1), return_inverse=True)
         nearest = tree.query(np.column_stack([code >> 16, code >> 8 & 255, code & 255]))[1]
@@ -119,14 +133,14 @@ def _palette(scale: Scale, pixels: Any) -> Floats:
     return np.concatenate([(255.0 * fixed).round(), found, np.zeros((others - len(found), 3))])
 
 
-def _write_mp4(path: Path, movie: Movie, fps: int, update: Any) -> None:
+def _write_mp4(path: Path, reel: Reel, fps: int, update: Any) -> None:
     """All frames through ffmpeg."""
     from matplotlib.animation import FFMpegWriter
 
     writer = FFMpegWriter(fps=fps, extra_args=["-f", "mp4"])
     try:
-        with writer.saving(movie.figure, str(path), DPI):
-            for _ in movie.frames():
+        with writer.saving(reel.figure, str(path), DPI):
+            for _ in reel.frames():
                 writer.grab_frame()
                 update()
     except CalledProcessError as error:
@@ -134,7 +148,7 @@ def _write_mp4(path: Path, movie: Movie, fps: int, update: Any) -> None:
 
 
 @dataclass(frozen=True, eq=False)
-class Movie:
+class Reel:
     """The frames of a result, each with its window, on one scale, in one figure."""
 
     views: list[View]
@@ -170,7 +184,7 @@ class Movie:
         return figure_height(self.windows[0]) / CURVES_HEIGHT
 
 
-def make_movie(result: Result, field: str, near: Near, limits: tuple[float | None, float | None]) -> Movie:
+def make_reel(result: Result, field: str, near: Near, limits: tuple[float | None, float | None]) -> Reel:
     """Views, windows and scale of all frames of a result, and an empty figure for them."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -182,7 +196,7 @@ def make_movie(result: Result, field: str, near: Near, limits: tuple[float | Non
     tall = 2.0 * round(0.5 * DPI * (figure_height(windows[0]) + CURVES_HEIGHT)) / DPI  # even, for ffmpeg
     figure = Figure(figsize=(WIDTH, tall), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
-    return Movie(views, windows, scale, figure)
+    return Reel(views, windows, scale, figure)
 
 
 def _windows(views: list[View], near: Near) -> list[Window]:

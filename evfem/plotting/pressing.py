@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evfem.errors import InputError
-from evfem.plotting.curves import Results, along, checked_over, finish, named, styled
+from evfem.plotting.curves import Results, along, checked_over, finish, named, styled, units_of
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
 from evfem.plotting.labels import axis_label, column_label, values_of
 from evfem.simulation.result import Result
@@ -20,24 +20,25 @@ if TYPE_CHECKING:
 
 def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
     """Applied force over indentation, of the presses of one result or of several by their names."""
-    ax = axes_or_new(ax)
     found = named(results)
+    presses = {name: _presses(result) for name, result in found.items()}
+    ax = axes_or_new(ax)
     for (name, result), colour, style in styled(found):
-        rows = _presses(result)
-        x, y = values_of(result, "indentation")[rows], values_of(result, "applied_force")[rows]
+        x, y = (values_of(result, column)[presses[name]] for column in ("indentation", "applied_force"))
         ax.plot(x, y, style, color=colour, label=name, marker=".")
-    _label(ax, "indentation", axis_label("applied_force"), found)
+    _label(ax, "indentation", "applied_force", found)
     return ax
 
 
 def contact_area(results: Results, ax: Axes | None = None) -> Axes:
-    """Contact width over the applied force of the presses: from edge to edge, and of all that
-    touches.
+    """Contact width (in total: area) over the applied force of the presses: from edge to edge, and
+    of all that touches.
     """
-    ax = axes_or_new(ax)
     found = named(results)
+    presses = {name: _presses(result) for name, result in found.items()}
+    ax = axes_or_new(ax)
     for (name, result), colour, _ in styled(found):
-        rows = _presses(result)
+        rows = presses[name]
         load = values_of(result, "applied_force")[rows]
         for column, text, style in (
             ("contact_width", "edge to edge", "-"),
@@ -45,7 +46,7 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
         ):
             label = f"{name}, {text}" if name else text
             ax.plot(load, values_of(result, column)[rows], style, color=colour, label=label, marker=".")
-    _label(ax, "applied_force", axis_label("contact_width"), found)
+    _label(ax, "applied_force", "contact_width", found)
     ax.legend()
     return ax
 
@@ -56,10 +57,10 @@ def friction(results: Results, over: str | None = None, ax: Axes | None = None) 
 
     Steps without a load on the bone are left out.
     """
-    ax = axes_or_new(ax)
     found = named(results)
     first = next(iter(found.values()))
     over = checked_over(over, first)
+    ax = axes_or_new(ax)
     for (name, result), colour, style in styled(found):
         load = along(result, "applied_force", over)
         rows = load > 0.0
@@ -80,7 +81,8 @@ def signal(results: Results, over: str | None = None) -> Panels:
         x = along(result, over, over)
         for ax, column in zip(panels, ("voltage", "applied_tangential_force"), strict=True):
             ax.plot(x, along(result, column, over), style, color=colour, label=name)
-    for ax, label in zip(panels, ("voltage (V)", "friction force (N/mm)"), strict=True):
+    labels = "voltage (V)", f"friction force ({first.units['tangential_force']})"
+    for ax, label in zip(panels, labels, strict=True):
         finish(ax, first, over, label)
     panels[0].set_xlabel("")
     _legend(panels[1], found)
@@ -94,8 +96,9 @@ def _presses(result: Result) -> np.ndarray:
     return rows
 
 
-def _label(ax: Axes, over: str, label: str, found: dict[str, Result]) -> None:
-    ax.set(xlabel=column_label(over), ylabel=label)
+def _label(ax: Axes, over: str, name: str, found: dict[str, Result]) -> None:
+    units = units_of(found)
+    ax.set(xlabel=column_label(over, units), ylabel=axis_label(name, units))
     ax.grid(alpha=0.3)
     _legend(ax, found)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from evfem.plotting.curves import Results, named, styled
+from evfem.plotting.curves import Results, named, styled, units_of
 from evfem.plotting.figures import axes_or_new
 from evfem.plotting.labels import column_label
 from evfem.simulation import spectrum as spectra
@@ -45,7 +45,7 @@ def spectrum(
             )
         else:
             ax.plot(f, a, style, color=colour, label=name, linewidth=1.0)
-    ax.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {column_label(column)}")
+    ax.set(xlabel="frequency (Hz)", ylabel=f"amplitude of {column_label(column, units_of(found))}")
     ax.grid(alpha=0.3)
     if len(found) > 1:
         ax.legend()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.plotting.colours import CURVES, ONE_SIGN, STYLES
 from evfem.plotting.figures import add_colorbar, axes_or_new
 from evfem.plotting.labels import key_label
@@ -26,7 +26,7 @@ def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | 
     order, and everything that is varied beside `x` and `by` are points without lines. Names on the
     abscissa stand in the order of the table.
     """
-    rows = _done(table, x, y)
+    rows = _done(table, x, y, *([by] if by else []))
     ax = axes_or_new(ax)
     groups = list(dict.fromkeys(row[by] for row in rows)) if by else [None]
     names = _names(rows, x)
@@ -74,7 +74,7 @@ def _done(table: SweepResult, *columns: str) -> list[dict[str, Any]]:
     """The rows in which these columns have a value; InputError for other columns, or none left."""
     for name in columns:
         if name not in table.columns:
-            raise InputError("column", name, ", ".join(table.columns))
+            raise InputError("column", quoted(name), ", ".join(table.columns))
     rows = [row for row in table.rows if all(row[name] is not None for name in columns)]
     if not rows:
         raise InputError("table", f"no point with {' and '.join(columns)}", "a sweep with results")

@@ -27,6 +27,7 @@ from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.layers import TABLE_2, Moduli
+from evfem.finger.scan import RidgeScan
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
@@ -231,6 +232,9 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     with mistakes.of_a_part():
         given["materials"] = _materials(laws, TABLE_2)
     with mistakes.of_a_part(), at("finger"):
+        if isinstance(scan := given.get("ridge_scan"), str):
+            check_size("finger.ridge_scan", folder / scan, LARGEST_TABLE)
+            given["ridge_scan"] = folder / scan
         if "participant" in parts:
             given = participant_sizes(parts["participant"]) | given
         pad = FingerPad(**given, **({"electrical": skin} if electrical else {}))
@@ -313,6 +317,8 @@ def _finger_table(finger: Any) -> dict[str, Any]:
         usual = FingerPad().materials
         table = _changed(finger)
         table["materials"] = {name: law for name, law in finger.materials.items() if law != usual[name]}
+        if isinstance(finger.ridge_scan, RidgeScan):
+            table["ridge_scan"] = finger.ridge_scan.columns
     else:
         raise InputError("finger", type(finger).__name__, "FingerPad or MeshedFinger, for a file")
     if "materials" in table:

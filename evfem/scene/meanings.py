@@ -52,6 +52,9 @@ FINGER = {
     "ridge_phase": Text("pitches", "0: a crest in the middle, 0.5: a groove"),
     "ridge_crest": Text("pitches", "flat part of a crest; 0: rounded ridges"),
     "ridge_groove": Text("pitches", "flat part of a groove, with flat crests"),
+    "ridge_scan": Text(
+        "", "ridges as they were scanned", "the path of a csv file with the header x,height or x,y"
+    ),
     "stratum_corneum_thickness": Text("mm", "at a crest"),
     "epidermis_thickness": Text("mm", "of the living epidermis"),
     "dermis_thickness": Text("mm", "of the dermis"),

@@ -59,8 +59,9 @@ class Press:
 class Slide:
     """Slide by `distance` (mm, negative towards -x) in `steps` equal parts.
 
-    `hold` keeps the indentation or the applied force of the moment before. `speed` (mm/s) sets how
-    much time passes; it is needed with `dynamics` other than quasistatic.
+    `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
+    which the load drifts (`evfem.scene.drift`). `speed` (mm/s) sets how much time passes; it is
+    needed with `dynamics` other than quasistatic.
 
     >>> Slide(distance=5.0).steps
     100

@@ -18,6 +18,7 @@ import numpy as np
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
+from evfem.scene.drift import drifting
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
@@ -27,6 +28,7 @@ from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
+from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
 #: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
@@ -132,7 +134,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    rough, fast = unresolved(scene, mesh), too_fast(scene)
+    others = unresolved(scene, mesh), too_fast(scene), *drifting(scene, mesh, moduli)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
@@ -151,7 +153,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, terms),
-        warnings=(*doubts(scene, mesh, moduli), *(text for text in (rough, fast) if text is not None)),
+        warnings=(*doubts(scene, mesh, moduli), *(text for text in others if text is not None)),
     )
 
 
@@ -227,11 +229,11 @@ def _electricity(scene: Scene) -> Term:
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
     clock = ", the clock sets the voltage alone" if isinstance(scene.voltage, TimeSignal) else ""
-    return Term(
-        "time",
-        dynamics != "quasistatic",
-        f"quasi-static{clock}" if dynamics == "quasistatic" else f"{dynamics}, backward Euler",
-    )
+    lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
+    if dynamics == "quasistatic":
+        return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
+    lost = lost and f"; without speed quasi-static, {lost}"
+    return Term("time", True, f"{dynamics}, backward Euler{lost}")
 
 
 def _forms(scene: Scene, mesh: Mesh) -> Term:
@@ -268,6 +270,9 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
         f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
         f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
+    stiff = [name for name, law in scene.finger.materials.items() if nearly_incompressible(split(law))]
+    if stiff:
+        lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]
     if unsymmetric:
         lines.append(

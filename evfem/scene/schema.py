@@ -165,8 +165,9 @@ def _finger() -> Section:
     }
     texts = meanings.FINGER | ranges
     texts["resolution"] = texts["resolution"]._replace(allowed=" | ".join(RESOLUTIONS))
+    scan = (str | dict[str, list[float]] | None, Default(default=None))
     own = {"participant": (str | None, Default(default=None)), "materials": table, "electrical": table}
-    own["depth"] = DEPTH
+    own |= {"ridge_scan": scan, "depth": DEPTH}
     found = section("finger", _from_fields(FingerPad, **own), texts, "parametric")
     for key in found.keys:
         if key.name == "resolution":

@@ -6,7 +6,8 @@ Over a whole depth they are N and mJ, and widths are areas in mm2, under the sam
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import csv
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -19,13 +20,16 @@ from evfem.common.tables import csv_text, frame
 from evfem.errors import readable, unknown
 
 Row = Mapping[str, Any]
+#: a drift of the load that is worth a word
+DRIFT = 0.05
 #: unit per mm of depth -> unit over a depth
 WHOLE = {"N/mm": "N", "N": "mJ"}
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations")
-#: columns without which a saved result is none; any other is NaN where an older version did not write it yet
-NEEDED = ("motion", *INTEGERS, *RESUMED)
+INTEGERS = ("step", "motion_index", "substeps", "newton_iterations", "relaxations")
+#: columns without which a saved result is none; where an older version did not write another one yet, it is
+#: NaN, or 0 if it counts something
+NEEDED = ("motion", "step", "motion_index", "substeps", "newton_iterations", *RESUMED)
 
 
 def column(unit: str, meaning: str, whole: str | None = None) -> dict[str, str]:
@@ -48,7 +52,7 @@ class History:
     time: Floats = field(metadata=column("s", "at the end of the step"))
     position: Floats = field(metadata=column("mm", "x of the bone"))
     indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
-    voltage: Floats = field(metadata=column("V", "effective"))
+    voltage: Floats = field(metadata=column("V", "effective; of the moment where it is resolved in time"))
     applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
     applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
     normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
@@ -74,6 +78,7 @@ class History:
     snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
     substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
     newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
+    relaxations: Ints = field(metadata=column("", "releases where no equilibrium is near"))
     seconds: Floats = field(metadata=column("s", "wall time"))
 
     @property
@@ -117,6 +122,23 @@ def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
     }
 
 
+def load_drift(rows: Sequence[Row]) -> float:
+    """Largest relative change of the load, `applied_force`, since the last press to a positive one,
+    in rows that still have its indentation; 0 without such rows.
+
+    >>> held = {"motion": "slide", "indentation": 0.5, "applied_force": 0.06}
+    >>> round(load_drift([held | {"motion": "press", "applied_force": 0.05}, held]), 3)
+    0.2
+    """
+    largest, pressed = 0.0, None
+    for row in rows:
+        if row["motion"] in ("press", "hover"):
+            pressed = row if row["motion"] == "press" and row["applied_force"] > 0.0 else None
+        elif pressed is not None and row["indentation"] == pressed["indentation"]:
+            largest = max(largest, abs(row["applied_force"] / pressed["applied_force"] - 1.0))
+    return largest
+
+
 def csv_line(row: Row) -> str:
     """One row of history.csv with its line end; floats with every digit that counts.
 
@@ -129,6 +151,30 @@ def csv_line(row: Row) -> str:
 def csv_header() -> str:
     """The first line of history.csv."""
     return csv_text([COLUMNS])
+
+
+def read_rows(text: str) -> list[dict[str, Any]]:
+    """The rows of a `history.csv`; a column that an older version did not write yet is nan, or 0 if
+    it counts something.
+
+    Raises ValueError for any other text.
+
+    >>> row = dict.fromkeys(COLUMNS, 0.5) | dict.fromkeys(INTEGERS, 1) | {"motion": "press"}
+    >>> read_rows(csv_header() + csv_line(row)) == [row]
+    True
+    """
+    found = csv.DictReader(text.splitlines(), strict=True)
+    names = found.fieldnames or ()
+    if not set(NEEDED) <= set(names) <= set(COLUMNS):
+        raise ValueError("no history")
+    unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in COLUMNS}
+    return [
+        {name: _value_of(name, row[name]) for name in COLUMNS} for row in (unknown_yet | row for row in found)
+    ]
+
+
+def _value_of(name: str, text: str) -> str | int | float:
+    return text if name == "motion" else int(text) if name in INTEGERS else float(text)
 
 
 def _plain_value(name: str, value: Any) -> str | int | float:

@@ -4,12 +4,12 @@ equilibrium solver.
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import Pad, make_pad
@@ -52,7 +52,7 @@ class Model:
 
     def indentation(self, bone: Floats) -> float:
         """Bone travel beyond first touch in mm, negative when hovering."""
-        return float(-bone[1] - self.first_gap)
+        return float(0.0 - bone[1] - self.first_gap)
 
 
 def make_model(scene: Scene) -> Model:
@@ -61,7 +61,7 @@ def make_model(scene: Scene) -> Model:
     check_laws(mesh, scene.finger.materials)
     needed = plan_on(scene, mesh, element)
     for warning in needed.warnings:
-        warnings.warn(warning, stacklevel=2)
+        notices.warn(warning)
     space = make_space(mesh, element)
     pad = make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])

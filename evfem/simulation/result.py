@@ -27,13 +27,13 @@ from evfem.mesh.mesh import Mesh
 
 # public in `ev.result`, where they were before
 from evfem.simulation.history import COLUMNS as COLUMNS
+from evfem.simulation.history import DRIFT, History, column_of, load_drift, over_depth
 from evfem.simulation.history import INTEGERS as INTEGERS
 from evfem.simulation.history import MEANINGS as MEANINGS
 from evfem.simulation.history import NEEDED as NEEDED
 from evfem.simulation.history import RESUMED as RESUMED
 from evfem.simulation.history import UNITS as UNITS
 from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
-from evfem.simulation.history import History, column_of, over_depth
 from evfem.simulation.history import Row as Row
 from evfem.simulation.history import csv_header as csv_header
 from evfem.simulation.history import csv_line as csv_line
@@ -134,7 +134,7 @@ class Result(History):
         """This result over the whole `depth`: under the same names forces in N, widths as areas in
         mm2, works and energies in mJ; lengths, pressures and fields are as they were.
 
-        `result.total.rows`, `.table()`, `.to_csv(path)` and the plots then have these units too.
+        ``result.total.rows``, ``.table()``, ``.to_csv(path)`` and the plots then have these units too.
         Raises InputError where the scene says no depth.
         """
         depth = self._known_depth
@@ -142,6 +142,13 @@ class Result(History):
             return self
         columns = over_depth({name: self[name] for name in COLUMNS}, depth)
         return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
+
+    @property
+    def load_drift(self) -> float:
+        """Largest relative change of the load where the indentation was held after a press; 0 where
+        the load was.
+        """
+        return load_drift(self.rows)
 
     @property
     def contact_area(self) -> Floats:
@@ -182,8 +189,10 @@ class Result(History):
             "kind": self.mesh.kind,
             "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
             "largest": extremes,
+            "load_drift": self.load_drift,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
+            "relaxations": int(self.relaxations.sum()),
             "seconds": float(self.seconds.sum()),
             "units": {
                 "length": "mm",
@@ -205,6 +214,8 @@ class Result(History):
         parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
+        if (drift := self.load_drift) > DRIFT:
+            lines.append(f"the load drifted by {drift:.1%} at a held indentation")
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
@@ -258,9 +269,9 @@ class Result(History):
 def load(path: str | Path) -> Result:
     """Read what `Result.save` wrote. Raises InputError for any other, cut off or damaged file.
 
-    A column that an older version did not write yet is NaN, unless it is one of `NEEDED`: a file
-    without one of those is refused as of another version. No object is unpickled, and no more
-    memory is taken than the file is long (at most 4 GB).
+    A column that an older version did not write yet is NaN, or 0 if it counts something, unless it
+    is one of `NEEDED`: a file without one of those is refused as of another version. No object is
+    unpickled, and no more memory is taken than the file is long (at most 4 GB).
     """
     arrays = load_arrays(path, "result", RESULT_FORMAT)
     lacking = [f"history/{name}" for name in NEEDED if f"history/{name}" not in arrays]
@@ -283,7 +294,10 @@ def load(path: str | Path) -> Result:
 
 def _column_of(arrays: Mapping[str, np.ndarray], name: str) -> Any:
     column = arrays.get(f"history/{name}")
-    return np.full(len(arrays["history/step"]), np.nan) if column is None else _checked_column(name, column)
+    if column is not None:
+        return _checked_column(name, column)
+    steps = len(arrays["history/step"])
+    return np.zeros(steps, dtype=np.int64) if name in INTEGERS else np.full(steps, np.nan)
 
 
 def _checked_column(name: str, column: np.ndarray) -> Any:

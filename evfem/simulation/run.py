@@ -29,6 +29,7 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
+from evfem.simulation.failure import advice
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
@@ -44,8 +45,6 @@ from evfem.solver.control import (
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
-
-ADVICE = "try smaller steps, a larger viscosity with dynamics = viscous, less friction or a finer mesh"
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Run:
         self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(self.model.equilibrium, scene.coupling)
+        self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -244,15 +243,17 @@ class Run:
         wanted.
         """
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
+        released = self.stepper.relaxations
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
         except StepFailed as error:
-            advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
-            raise NotConverged(request.step, error.residuals, advice, self.result()) from error
+            said = advice(self.scene, self.model, error)
+            raise NotConverged(request.step, error.residuals, said, self.result()) from error
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
+        row["relaxations"] = self.stepper.relaxations - released
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:
@@ -275,6 +276,7 @@ class Run:
             "factorisations": record.factorisations,
             "contact_solves": record.contact_solves,
             "cuts": self.stepper.cuts,
+            "relaxations": self.stepper.relaxations,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",

@@ -1,7 +1,7 @@
 r"""Spectrum of a column of the history: which frequencies a force has, and with what amplitude.
 
 The rows of N steps of dt stand for the time T = N dt, each at the end of its step. With
-x_k = x(t_0 + k dt), k = 1 ... N, the one-sided amplitudes at the frequencies j / T are
+x_k = x(t_0 + k dt), k = 1 ... N, the one-sided amplitudes at the frequencies j / T are::
 
     a_j = (c_j / N) |sum_k w_k x_k exp(-2 pi i j k / N)|,    c_0 = c_{N/2} = 1, else 2
 
@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
-from evfem.errors import InputError
+from evfem.errors import InputError, quoted
 from evfem.simulation.result import COLUMNS, Result
 
 WINDOWS = ("none", "hann")
@@ -53,7 +53,7 @@ def spectrum(
     with steps of different lengths, or none.
     """
     if column not in COLUMNS or column == "motion":
-        raise InputError("column", column, ", ".join(name for name in COLUMNS if name != "motion"))
+        raise InputError("column", quoted(column), ", ".join(name for name in COLUMNS if name != "motion"))
     choice("window", window, WINDOWS)
     used, before = _rows(result, start, stop)
     step = _step(result.time[used], before)

@@ -43,6 +43,11 @@ tissue's,
 or L exceeds the share `SNAP` of :math:`|\Delta f\cdot w|/2`. Both are right in the limit of small
 parts, and only say which of two columns has L.
 
+Where no equilibrium is near, the body is released and comes to rest at another one
+(`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
+:math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
+:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``.
+
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
 
@@ -145,19 +150,21 @@ class Part:
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
         """What the part adds to each of `SUMS`, N mm per mm of depth."""
-        old, new, dynamics = self.old, self.new, self.model.body.dynamics
+        old, new, body = self.old, self.new, self.model.body
         moved = new.u - old.u
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
         given -= _mean_work(begin.given, end.given, moved)
         pulled, friction = self.electrostatic(), self.friction()
-        viscous = 0.0 if dynamics is None else dynamics.dissipation(new.u)
+        viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
         if np.isfinite(lost):  # the fast model has no tissue to ask
             lost -= self._contact() + friction
             lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
-        snap = self._snaps(begin.forces, end.forces, lost)
-        added = (given, pulled, friction, viscous, 0.0 if snap else lost, lost if snap else 0.0)
+        drag = body.drag_dissipation(new.u)
+        lost -= drag
+        snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
+        added = (given, pulled, friction, viscous, 0.0 if snap else lost, drag + lost if snap else 0.0)
         return dict(zip(SUMS, added, strict=True))
 
     def electrostatic(self) -> float:

@@ -126,6 +126,10 @@ class VoltageControl(Protocol):
     """What the voltage is: prescribed, or settled by an equation between bounds."""
 
     @property
+    def follows(self) -> bool:
+        """Whether an equation may settle the voltage."""
+
+    @property
     def voltage(self) -> float:
         """The prescribed voltage (V), or the largest allowed one."""
 
@@ -159,7 +163,7 @@ class GivenVoltage:
     """The voltage is `voltage` (V)."""
 
     voltage: float
-    free = False
+    free = follows = False
 
     def begin(self, old: State) -> None:
         pass
@@ -191,6 +195,7 @@ class FollowFriction:
     force: float
     voltage: float
     _mode: str = field(default=UNKNOWN, repr=False, compare=False)
+    follows = True
 
     @property
     def free(self) -> bool:

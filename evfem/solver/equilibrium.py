@@ -10,7 +10,9 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         R, residual <- balance of the body, with the shares of the controls (`evfem.solver.control`)
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
-        give up if the residual grows or is not finite
+        give up if what would be accepted has an outline that crosses itself
+        give up if the residual grows or is not finite, or after the strategy's iterations, unless
+            their fall promises the end soon
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
@@ -28,14 +30,18 @@ from typing import Protocol
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, SMALLEST_FORCE
+from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, MORE, SMALLEST_FORCE
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
-from evfem.contact.signorini import ContactNotSolved
+from evfem.contact.signorini import ContactNotSolved, Unstable
+from evfem.contact.stability import Verge
 from evfem.solver.control import Target, sticks
 from evfem.solver.interface import Interface
-from evfem.solver.state import Balance, Limits, Record, Reusable, State, StepFailed
+from evfem.solver.state import Balance, Folded, Limits, Record, Reusable, State, StepFailed
 from evfem.solver.strategy import Strategy
+
+#: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
+FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
 
 class LinearisedBody(Protocol):
@@ -67,6 +73,11 @@ class LinearisedBody(Protocol):
 
     def findings(self, state: State, balance: Balance) -> str:
         """How an iterate looks that is no equilibrium, in one line."""
+
+    def verge(self, state: State, target: Target) -> Verge | None:
+        """Which force takes the equilibrium `state` its stability on the way to `target`; None
+        where that is not known.
+        """
 
     def reusable(self) -> Reusable:
         """What the body takes with it to the next step."""
@@ -100,6 +111,11 @@ class StepSolver(Protocol):
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
     ) -> State:
         """The equilibrium at `target`; raises `StepFailed`."""
+
+    def verge(self, state: State, target: Target) -> Verge | None:
+        """Which force takes the equilibrium `state` its stability on the way to `target`; None
+        where that is not known.
+        """
 
     def reusable(self) -> Reusable:
         """What the solver takes with it to the next step."""
@@ -188,6 +204,10 @@ class Equilibrium(Statics):
             raise StepFailed("the wished friction force was not found", self.record.residuals)
         return held
 
+    def verge(self, state: State, target: Target) -> Verge | None:
+        """Which force takes the equilibrium `state` its stability."""
+        return self.body.verge(state, target)
+
     def reusable(self) -> Reusable:
         """What the solver takes with it to the next step."""
         return self.body.reusable()
@@ -206,7 +226,9 @@ class Equilibrium(Statics):
         except (ContactNotSolved, StepFailed) as error:
             self.body.forget()
             reason = error.reason if isinstance(error, StepFailed) else f"contact: {error}"
-            failed = StepFailed(reason, self.record.residuals)
+            kind = Folded if isinstance(error, Folded) else StepFailed
+            failed = kind(reason, self.record.residuals)
+            failed.unstable = isinstance(error, Unstable)
             failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
             raise failed from error
 
@@ -216,7 +238,7 @@ class Equilibrium(Statics):
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
         self.record.residuals = history
-        for _ in range(self.strategy.iterations):
+        while len(history) < self.strategy.iterations or self._nearly(history):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
@@ -225,13 +247,29 @@ class Equilibrium(Statics):
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
             if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):
+                self._refuse_fold(state)
                 return self.body.accepted(old, state)
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
-        raise StepFailed(f"no equilibrium in {self.strategy.iterations} iterations", history)
+        raise StepFailed(f"no equilibrium in {len(history)} iterations", history)
+
+    def _nearly(self, history: list[float]) -> bool:
+        """Whether up to `MORE` times the iterations will do, as fast as the residuals (i,) fell in
+        the last quarter: a part that is cut would lose all of them.
+        """
+        most, window = int(MORE * self.strategy.iterations), len(history) // 4
+        if not 0 < window < len(history) < most or history[-1] <= self.tolerance:
+            return False
+        rate = (history[-1] / history[-1 - window]) ** (1.0 / window)
+        return history[-1] * rate ** (most - len(history)) < self.tolerance
+
+    def _refuse_fold(self, state: State) -> None:
+        place = self.interface.fold(state)
+        if place is not None:
+            raise Folded(FOLDED.format(place), self.record.residuals)
 
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):
@@ -271,6 +309,9 @@ class RigidOutline(Statics):
         if gap.min() <= 0.0 or target.height.free:
             raise StepFailed("a rigid outline cannot touch", [1.0])
         return replace(state, velocity=old.velocity)
+
+    def verge(self, state: State, target: Target) -> None:
+        """It does not deform."""
 
     def reusable(self) -> Reusable:
         """Nothing."""

@@ -28,6 +28,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
+    ALIKE,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     LOST,
@@ -44,6 +45,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
+from evfem.contact.stability import Verge, verge
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Drive, DrivenStep, Target
 from evfem.solver.findings import findings
@@ -80,6 +82,7 @@ class FactorisedBody:
         self.record = self.linearisation.record
         self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
         self._anderson = Anderson()
+        self._renewed = False
         self._scaled_down = 0
 
     # -- a step begins
@@ -96,6 +99,7 @@ class FactorisedBody:
         self.linearisation.choose_candidates(state, REACH * travel)
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
+        self._renewed = False
         self._scaled_down = 0
         return state
 
@@ -168,7 +172,10 @@ class FactorisedBody:
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate, with the factorisation at hand if that does and a new one if not."""
-        if self.linearisation.refactorise_if_needed(state, self.record.residuals):
+        again, residuals = self._renewed, self.record.residuals
+        self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
+        # where new tangents one after the other gain little, their maps are nearly one
+        if self._renewed and not (again and residuals[-1] < ALIKE):
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)
@@ -336,6 +343,16 @@ class FactorisedBody:
             if fraction < SHORTEST_FRACTION:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
+
+    def verge(self, state: State, target: Target) -> Verge:
+        """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
+        where the way leads to, for the curvature of a profile may jump.
+        """
+        ahead = self.begin(state, target, frozen=False, start=state)
+        self.linearisation.factorise(state)
+        still = np.zeros(len(self.linearisation.tangent.schur))
+        found = [verge(self._contact_step(state, place, target, still)) for place in (state, ahead)]
+        return max(found, key=lambda one: one.share)
 
     # -- a step ends
 

@@ -36,4 +36,5 @@ def _free(body: Body, reduced: Floats) -> Floats:
     """Nodal forces (N, 2), without those of the bone, which its motion balances."""
     kept = reduced.copy()
     kept[body.bone] = 0.0
-    return np.nan_to_num(body.expand(kept), nan=np.inf)
+    forces = body.expand(kept)
+    return np.where(np.isnan(forces), np.inf, forces)

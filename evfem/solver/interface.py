@@ -16,7 +16,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CHANGES, HAIR, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates
-from evfem.contact.pad import Pad, surface_state
+from evfem.contact.pad import Pad, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.solver.state import State
 
@@ -96,6 +96,8 @@ class Interface:
         self.points = points[pad.nodes]
         ends = self.points[pad.edges[:, :2]]
         self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
+        self._segments = pad.segments
+        self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
 
     def positions(self, u: Floats) -> Floats:
@@ -160,6 +162,10 @@ class Interface:
         for it here; `Pins` alone takes the coefficients on both sides of a jump from the surface.
         """
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
+
+    def fold(self, state: State) -> float | None:
+        """x (mm) where the outline crosses itself, or None."""
+        return fold(self.positions(state.u), self._segments, state.touching, self._down)
 
     def shallowest_penetration(self, state: State) -> float | None:
         """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""

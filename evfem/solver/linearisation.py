@@ -57,6 +57,7 @@ class Linearisation:
         self.frozen = False
         self._made_at: TangentPoint | None = None
         self._outdated = False
+        self._drag_rate = 0.0
 
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
@@ -67,10 +68,11 @@ class Linearisation:
         no use.
         """
         dynamics = self.body.dynamics
+        self._outdated = self.body.drag_rate != self._drag_rate
         if dynamics is None:
             return
         if self._made_at is not None:
-            self._outdated = (
+            self._outdated |= (
                 not SHORTER * self._made_at.duration <= duration <= LONGER * self._made_at.duration
             )
         dynamics.begin(old.u, old.velocity, duration)
@@ -109,7 +111,7 @@ class Linearisation:
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
-        self._outdated = False
+        self._outdated, self._drag_rate = False, self.body.drag_rate
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             kept = np.concatenate([unknowns, self.body.bone])

@@ -17,12 +17,20 @@ NO_PRESSURE: Floats = np.zeros((0, 0))
 
 class StepFailed(ArithmeticError):
     """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
-    `findings` how the last iterate looked.
+    `findings` how the last iterate looked; `unstable`: the linearised body gives way the more, the
+    more it is loaded. Of a step that was given up, `last` is the state it was tried from and its
+    target, and `released` whether the body was released there.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
         super().__init__(reason)
         self.reason, self.residuals, self.findings = reason, residuals, ""
+        self.unstable = self.released = False
+        self.last: tuple[State, Any] | None = None
+
+
+class Folded(StepFailed):
+    """The outline of what was found crosses itself; no smaller part and no release helps that."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,13 @@ Algorithm (`Stepper.follow`)::
     substep <- the one that worked last
     repeat until the end of the path
         solve one equilibrium at `done + substep`
-        if it failed: halve the substep, or give up at the strategy's smallest
+        if it failed: halve the substep; at the strategy's smallest release the body, which comes to rest
+            at another equilibrium (`evfem.solver.relaxation`), or give up where it does not
         else: accept; if it took few iterations, let the next substep grow
 
-Nothing that has not converged is kept.
+Nothing that has not converged is kept. After a release the way goes on with the substep that worked
+before; within the same step the next release comes at a part `COARSER` times as long, so that a
+step in which the finger snaps again and again comes to its end.
 """
 
 from __future__ import annotations
@@ -18,10 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from evfem.common.constants import SMALLEST_FORCE, STAGGERED_LIMIT
+from evfem.common.constants import COARSER, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.solver.control import Target
 from evfem.solver.equilibrium import StepSolver
-from evfem.solver.state import State, StepFailed
+from evfem.solver.relaxation import Relaxation
+from evfem.solver.state import Folded, State, StepFailed
+from evfem.tissue.body import Body
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
@@ -30,13 +35,16 @@ Path = Callable[[float, float], Target]
 @dataclass
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
-    that worked last.
+    that worked last. `body` is what is released where no equilibrium is near; without it such a
+    step fails.
     """
 
     equilibrium: StepSolver
     coupling: str = "monolithic"
     substep: float = 1.0
     cuts: int = 0
+    body: Body | None = None
+    relaxations: int = 0
 
     def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
         """From `state` to the end of `path`; `accept(old, new)` sees every converged substep.
@@ -46,23 +54,49 @@ class Stepper:
         accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
+        least, trusted = strategy.smallest_part, self.substep
         while done < 1.0:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
                 new = self.solve(state, path(done, fraction))
-            except StepFailed:
+            except StepFailed as failed:
                 self.cuts += 1
                 self.substep = 0.5 * (fraction - done)
-                if self.substep < strategy.smallest_part:
-                    self.substep = 1.0
-                    raise
+                if self.substep >= least:
+                    continue
+                state = self._released(state, path(done, fraction), accept, failed)
+                done, substeps = fraction, substeps + 1
+                self.substep, least = min(1.0, max(trusted, least)), COARSER * least
                 continue
+            trusted = self.substep
             accept(state, new)
             state, done, substeps = new, fraction, substeps + 1
             if self.equilibrium.record.iterations - before <= strategy.easy:
                 self.substep = min(1.0, strategy.growth * self.substep)
         return state, substeps
+
+    def _released(
+        self, state: State, target: Target, accept: Callable[[State, State], None], failed: StepFailed
+    ) -> State:
+        """The equilibrium to which the body snaps from `state`; raises `failed` where there is
+        none.
+        """
+        self.substep, failed.last = 1.0, (state, target)
+        if self.body is None or not self.equilibrium.strategy.relaxation:
+            raise failed
+        relaxation = Relaxation(self.body, self.solve)
+        if isinstance(failed, Folded) or not relaxation.applies(target):
+            raise failed
+        failed.released = True
+        try:
+            rest = relaxation.follow(state, target, accept)
+        except Folded:
+            raise
+        except StepFailed:
+            raise failed from None
+        self.relaxations += 1
+        return rest
 
     def solve(self, state: State, target: Target) -> State:
         """One equilibrium with the coupling asked for: all at once, or mechanics under attraction

@@ -4,15 +4,17 @@ A step is one equilibrium from one accepted state to the next. It is tried whole
 fails, it is cut into parts: half as long after each failure, longer again after easy ones. What
 makes the iterations of one part hold is not a choice: contact is solved exactly in each of them,
 cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
-and under a force the bone moves by limited strides. Ill-posed scenes (sliding over texture,
-brittle snap-through) need physics instead: `dynamics` "viscous" or "inertial" with a speed.
+and under a force the bone moves by limited strides. Where the smallest part fails too, stability
+is lost: the finger is released and comes to rest at another equilibrium, if there is one
+(`evfem.solver.relaxation`). What happens on the way needs physics instead: `dynamics` "viscous" or
+"inertial" with a speed.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from evfem.common.checks import Within, check_fields, number, whole
+from evfem.common.checks import Within, check_fields, number, switch, whole
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -24,11 +26,13 @@ _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part; `patience`: renew the factorisation when more iterations than
-    this would be left with the old one; `smallest_part`: of a requested step, before it counts as
-    not converged; `easy`: a part with so few iterations lets the next one grow by the factor
-    `growth`; `reach`: a part begins at most so many times the last one's displacements ahead (0:
-    at the last state).
+    `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
+    the factorisation when more iterations than this would be left with the old one;
+    `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
+    so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
+    most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
+    where even the smallest part fails, and takes no time, the finger is released and comes to rest
+    at another equilibrium.
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)
@@ -43,6 +47,7 @@ class Strategy:
     easy: int = field(default=8, metadata=whole(10_000))
     growth: float = field(default=1.25, metadata=_GROWTH)
     reach: float = field(default=1.5, metadata=_REACH)
+    relaxation: bool = field(default=True, metadata=switch())
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -9,11 +9,13 @@ internal forces.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.tissue.drag import Drag
 from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
@@ -35,6 +37,7 @@ class Body:
         self.dynamics = dynamics
         self.given = tuple(terms)
         self.terms = self.given if dynamics is None else (*terms, dynamics)
+        self.drag_rate = 0.0
         bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
         free = np.setdiff1d(np.arange(space.size), bone)
         self.size = dim * free.size + dim
@@ -43,6 +46,21 @@ class Body:
         self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
         self.unknowns[bone] = self.bone
         self.pattern = Pattern(self.unknowns[space.nodes, 0] // dim, dim)
+
+    @cached_property
+    def drag(self) -> Drag:
+        """What holds the body back while it is released."""
+        return Drag(self.space, self.tissue.groups)
+
+    def release(self, u: Floats, rate: float) -> None:
+        """From now on drag of this rate holds the body back at u (N, dim); none if it is 0."""
+        self.drag_rate = rate
+        if rate > 0.0:
+            self.drag.begin(u, rate)
+
+    def drag_dissipation(self, u: Floats) -> float:
+        """What drag dissipates in the step that ends at u, N mm per mm of depth."""
+        return self.drag.dissipation(u) if self.drag_rate > 0.0 else 0.0
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
@@ -56,9 +74,13 @@ class Body:
         """Internal nodal forces (N, dim)."""
         # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
         total = self.tissue.forces(u - u[self.space.mesh.node_sets["bone"][0]])
-        for term in self.terms:
+        for term in self._acting:
             total = total + term.forces(u)
         return total
+
+    @property
+    def _acting(self) -> tuple[Any, ...]:
+        return self.terms if self.drag_rate == 0.0 else (*self.terms, self.drag)
 
     def given_forces(self, u: Floats) -> Floats:
         """The share (N, dim) of the user's forms in `forces`."""
@@ -74,7 +96,7 @@ class Body:
         """
         data = self.pattern.zeros()
         self.tissue.add_tangent(u, self.pattern, data, pressure)
-        for term in self.terms:
+        for term in self._acting:
             term.add_tangent(u, self.pattern, data)
         return self.pattern.finish(data)
 

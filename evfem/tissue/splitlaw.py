@@ -18,6 +18,7 @@ from typing import Any, Literal, Protocol, cast, runtime_checkable
 
 import numpy as np
 
+from evfem.common.constants import INCOMPRESSIBLE
 from evfem.errors import InputError, quoted
 from evfem.tensor import (
     Array,
@@ -176,6 +177,23 @@ def split(law: Any) -> SplitLaw:
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
         raise InputError("material", quoted(law), allowed)
     return cast(SplitLaw, UserLaw(law))
+
+
+def nearly_incompressible(law: SplitLaw) -> bool:
+    """Whether a law is at rest so much stiffer against a change of volume than in shear,
+    d2W/dtheta2 / mu, that its pressure is worth an unknown of its own (`evfem.solver.pressure`).
+
+    For a neo-Hookean law the ratio is 2 nu / (1 - 2 nu). Laws of small strain never need it: their
+    theta is linear in the displacements.
+
+    >>> from evfem.tissue.laws import NeoHookean
+    >>> [nearly_incompressible(NeoHookean(E=0.1, nu=nu)) for nu in (0.3, 0.49, 0.499)]
+    [False, False, True]
+    """
+    if law.volume_measure == "trace":
+        return False
+    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
+    return float(np.mean(k)) > INCOMPRESSIBLE * law.shear_modulus
 
 
 def stepped_tangent(

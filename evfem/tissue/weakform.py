@@ -20,7 +20,6 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import INCOMPRESSIBLE
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
@@ -30,6 +29,7 @@ from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
 from evfem.tissue.kernels.blocks import LANES, loops, padded, unblocked
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
+from evfem.tissue.splitlaw import nearly_incompressible
 
 #: what the tissue's forms use: F, S by the gradient, and the volume measure
 PARTS = Parts(2, grad=True, theta=True)
@@ -59,10 +59,8 @@ class Tissue:
 
     @cached_property
     def nearly_incompressible(self) -> bool:
-        """Whether a region resists a change of volume so much more than shear that its pressure is
-        worth an unknown of its own.
-        """
-        return any(volume_stiffness(law) > INCOMPRESSIBLE for law, _ in self.groups)
+        """Whether the pressure of a region is worth an unknown of its own."""
+        return any(nearly_incompressible(law) for law, _ in self.groups)
 
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
@@ -197,16 +195,6 @@ def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
         return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
     w = SimpleNamespace(law=law)
     return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
-
-
-def volume_stiffness(law: Any) -> float:
-    """How much stiffer a law is at rest against theta than in shear, d2W/dtheta2 / mu: 2 nu / (1 -
-    2 nu) for a neo-Hookean law. Zero for laws of small strain, whose theta is linear in u.
-    """
-    if law.volume_measure == "trace":
-        return 0.0
-    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
-    return float(np.mean(k)) / law.shear_modulus
 
 
 def law_moduli(u: Field, w: Any) -> Floats:

@@ -16,15 +16,15 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BAD = "#D55E00"
-#: outcome -> marker and colour
+#: outcome -> marker, colour and name; told apart by shape as well
 MARKS = {
-    "equilibrium": (".", COLOURS["kaczmarek"]),
-    "explained": ("D", COLOURS["fe"]),
-    "not_converged": ("X", BAD),
-    "invariants_broken": ("P", COLOURS["measured"]),
-    "timeout": ("s", COLOURS["strong_troxel"]),
-    "refused": ("v", COLOURS["neutral"]),
-    "error": ("^", "black"),
+    "equilibrium": ("o", COLOURS["kaczmarek"], "equilibrium"),
+    "explained": ("D", COLOURS["fe"], "no equilibrium, explained"),
+    "not_converged": ("X", BAD, "not converged"),
+    "invariants_broken": ("P", COLOURS["measured"], "an invariant broken"),
+    "timeout": ("s", COLOURS["strong_troxel"], "over the time limit"),
+    "refused": ("v", COLOURS["neutral"], "refused"),
+    "error": ("^", "black", "an error"),
 }
 #: times so many times the median are drawn as a line
 SLOW = 30.0
@@ -32,11 +32,11 @@ SLOW = 30.0
 
 def draw(ends: list[Ending], slowness: Floats) -> Figure:
     """Counts of the classes above, iterations and CPU time of each scene below."""
-    figure = new_figure(6.0, 9.0)
-    grid = figure.add_gridspec(2, 2, height_ratios=[1.0, 2.2])
+    figure = new_figure(6.4, 9.0)
+    grid = figure.add_gridspec(2, 2, height_ratios=[1.0, 2.6])
     _counts(figure.add_subplot(grid[0, :]), ends)
-    iterations = [max(one.iterations, 1) for one in ends]
-    _scatter(figure.add_subplot(grid[1, 0]), ends, iterations, "iterations")
+    iterations = figure.add_subplot(grid[1, 0])
+    _scatter(iterations, ends, [one.iterations for one in ends], "iterations")
     times = figure.add_subplot(grid[1, 1])
     _scatter(times, ends, [max(one.cpu_s, 1e-2) for one in ends], "CPU time in s")
     _median(times, ends, slowness)
@@ -44,24 +44,36 @@ def draw(ends: list[Ending], slowness: Floats) -> Figure:
 
 
 def _counts(ax: Axes, ends: list[Ending]) -> None:
-    counts = [sum(one.outcome == name for one in ends) for name in OUTCOMES]
-    seen = [i for i, count in enumerate(counts) if count]
-    names = [OUTCOMES[i] for i in seen]
-    bars = ax.barh(names, [counts[i] for i in seen], color=[MARKS[name][1] for name in names])
-    ax.bar_label(bars, padding=3, fontsize=8)
-    ax.set(xscale="log", xlim=(0.7, 2.0 * max(len(ends), 1)))
-    ax.set_xlabel(f"scenes of {len(ends)}")
+    """How many scenes end how, with their shares."""
+    counts = {name: sum(one.outcome == name for one in ends) for name in OUTCOMES}
+    seen = [name for name in OUTCOMES if counts[name]]
+    names, colours = [MARKS[name][2] for name in seen], [MARKS[name][1] for name in seen]
+    bars = ax.barh(names, [counts[name] for name in seen], color=colours, height=0.7)
+    labels = [f"{counts[name]}  ({counts[name] / len(ends):.1%})" for name in seen]
+    ax.bar_label(bars, labels, padding=3, fontsize=8)
+    for place, name in enumerate(seen):  # the marker of the panels below
+        ax.plot(0.78, place, MARKS[name][0], color="white", markersize=5, markeredgewidth=0.0)
+    ax.set(xscale="log", xlim=(0.7, 4.0 * max(len(ends), 1)), xlabel=f"of {len(ends)} scenes")
+    ax.xaxis.set_major_formatter("{x:g}")
+    ax.xaxis.set_minor_formatter("")
+    ax.tick_params(axis="y", length=0)
     ax.invert_yaxis()
     ax.spines[["top", "right"]].set_visible(False)
 
 
 def _scatter(ax: Axes, ends: list[Ending], values: list[float] | list[int], label: str) -> None:
-    for name, (marker, colour) in MARKS.items():
-        chosen = [i for i, one in enumerate(ends) if one.outcome == name]
+    """What scenes cost over their size; those without a value are left out."""
+    for name, (marker, colour, _) in MARKS.items():
+        chosen = [i for i, one in enumerate(ends) if one.outcome == name and values[i] > 0]
         if chosen:
             steps = [max(ends[i].requested, 1) for i in chosen]
-            ax.plot(steps, [values[i] for i in chosen], marker, color=colour, alpha=0.7, label=name)
+            size = 3 if name == "equilibrium" else 7
+            points = [values[i] for i in chosen]
+            ax.plot(steps, points, marker, color=colour, alpha=0.75, markersize=size, markeredgewidth=0.0)
     ax.set(xscale="log", yscale="log", xlabel="requested steps", ylabel=label)
+    for axis in (ax.xaxis, ax.yaxis):
+        axis.set_major_formatter("{x:g}")
+        axis.set_minor_formatter("")
     ax.grid(color="#DDDDDD", linewidth=0.5)
     ax.set_axisbelow(True)
     ax.spines[["top", "right"]].set_visible(False)
@@ -74,8 +86,9 @@ def _median(ax: Axes, ends: list[Ending], slowness: Floats) -> None:
         for one, slow in zip(ends, slowness, strict=True)
         if slow > 0.0
     )
-    if points:
-        steps, medians = np.array(points).T
-        ax.plot(steps, medians, color="black", linewidth=1.0, label="median")
-        ax.plot(steps, SLOW * medians, "--", color="black", linewidth=1.0, label=f"{SLOW:g} medians")
-    ax.legend(fontsize=7, frameon=False)
+    if not points:
+        return
+    steps, medians = np.array(points).T
+    for factor, style, text in ((1.0, "-", "median"), (SLOW, "--", f"{SLOW:g} times the median")):
+        ax.plot(steps, factor * medians, style, color="black", linewidth=1.0)
+        ax.annotate(text, (steps[0], factor * medians[0]), (0, 4), textcoords="offset points", fontsize=8)

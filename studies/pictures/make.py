@@ -51,11 +51,12 @@ def draw_readme(path: Path = README) -> None:
         finger, display, law=ev.Kaczmarek(), voltage=1000.0, motion=motion, output=ev.Output(every=50)
     )
     result = ev.simulate(scene)
-    figure = Figure(figsize=(13.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(13.0, 4.0), layout="constrained")
+    figure.get_layout_engine().set(wspace=0.04)
     left, middle, right = figure.subplots(1, 3, width_ratios=[1.0, 1.45, 1.1])
     plotting.forces(result, ax=left)
     plotting.deformed(result, ax=middle)
-    plotting.contact_pressure(result, ax=right)
+    plotting.contact_pressure(result, ax=right).set_title("tractions along the pad", fontsize="medium")
     figure.savefig(path, dpi=90)
 
 

@@ -182,6 +182,8 @@ def judge(case: Case) -> Found:
             warnings.simplefilter("error")
             # walls and noise finer than the nodes are what some cases are about
             warnings.filterwarnings("ignore", "the surface is (sharper|rougher) than the node spacing")
+            # as are slides whose load may drift
+            warnings.filterwarnings("ignore", "motion . slides with the indentation held")
             passed, said = case.function(log)
         outcome = "passed" if passed else "wrong"
         if passed and log.refused:

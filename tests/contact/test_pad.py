@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.meshes import block
 
-from evfem.contact.pad import Pad, make_pad, surface_state
+from evfem.contact.pad import Pad, fold, make_pad, surface_state
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
@@ -142,3 +142,46 @@ def test_the_normal_gap_is_the_distance_along_the_normal_to_first_order():
         # a tenth of the gap leaves a hundredth of the error
         rest.append(np.abs(foot[:, 1] - surface.height(foot[:, 0])).max())
     assert rest[1] < 0.0105 * rest[0]
+
+
+LINE = np.column_stack([np.arange(6.0), np.zeros(6)])
+
+
+def folded(position, touching=(), edges=None):
+    """Where a chain of nodes crosses itself that lay along x before; which of them touch."""
+    segments = pad_of([[k, k + 1] for k in range(len(position) - 1)] if edges is None else edges).segments
+    on = np.isin(np.arange(len(position)), touching)
+    return fold(np.asarray(position, dtype=float), segments, on, np.ones(len(segments), dtype=bool))
+
+
+def test_an_outline_may_bend_and_overhang_but_not_cross_itself():
+    overhang = LINE.copy()
+    overhang[2:, 1] += 1.0
+    overhang[2:, 0] -= 1.5  # from (1, 0) back to (0.5, 1) and on above itself
+    assert folded(LINE) is None
+    assert folded(overhang) is None
+    # a Z whose last stroke comes down through the first
+    crossed = overhang.copy()
+    crossed[3] = [0.4, -1.0]
+    assert folded(crossed) == pytest.approx(0.45, rel=1e-12)
+
+
+def test_neighbours_that_touch_must_not_change_places():
+    """On the surface itself a fold crosses nothing: there the order tells."""
+    swapped = LINE.copy()
+    swapped[[2, 3], 0] = swapped[[3, 2], 0]
+    assert folded(swapped) is None
+    assert folded(swapped, touching=[2]) is None
+    assert folded(swapped, touching=[2, 3]) == 3.0
+
+
+def test_what_did_not_face_down_before_is_not_asked():
+    crossed = np.array([[0.0, 0.0], [2.0, 0.0], [1.0, 0.5], [1.5, -0.5], [3.0, 0.0]])
+    segments = pad_of([[k, k + 1] for k in range(4)]).segments
+    apart = np.zeros(5, dtype=bool)
+    assert fold(crossed, segments, apart, np.array([True, True, True, True])) == 1.25
+    assert fold(crossed, segments, apart, np.array([True, False, True, True])) is None
+
+
+def test_the_middle_of_a_quadratic_edge_lies_between_its_ends():
+    assert pad_of([[0, 2, 1], [2, 4, 3]]).segments.tolist() == [[0, 1], [1, 2], [2, 3], [3, 4]]

@@ -5,6 +5,7 @@ refuses what it cannot do.
 import re
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -252,8 +253,9 @@ def test_the_stated_error_is_what_the_full_model_finds_and_grows_beyond_the_trai
 
 def test_too_large_an_error_makes_it_fall_back_to_the_full_model_and_say_so(trained):
     scene = pad_scene(0.4, 500.0)
-    with pytest.warns(UserWarning, match="running the full model: the fast model differs"):
+    with pytest.warns(UserWarning, match="running the full model: the fast model differs") as caught:
         result = trained[2].simulate(scene, tolerance=1e-12)
+    assert [Path(one.filename).name for one in caught] == ["test_model.py"]  # the user's line
     assert result.provenance["fast"]["fallback"] is True
     assert max(result.provenance["fast"]["error"].values()) > 0.0
     assert np.array_equal(result.tangential_force, ev.simulate(scene).tangential_force)

@@ -378,6 +378,7 @@ def test_every_number_of_the_finger_has_a_range():
         "str",
         "Mapping[str, Material]",
         "Electrical",
+        "RidgeScan | str | os.PathLike[str] | None",
     }
 
 

@@ -11,6 +11,7 @@ from evfem.errors import InputError
 from evfem.plotting import (
     compare,
     contact_area,
+    deformed,
     energies,
     force_indentation,
     forces,
@@ -194,6 +195,38 @@ def test_a_spectrum_is_that_of_the_waiting_finger_without_its_mean():
     assert (ax.get_xlabel(), ax.get_ylabel()) == labels
     both = spectrum({"a": result, "b": result}, "normal_force", stop=0.1)
     assert both.get_lines()[1].get_xdata()[0] == pytest.approx(10.0)
+
+
+def whole(steps=4):
+    """A result of a finger 10 mm deep."""
+    return fake_result(steps=steps, provenance={"scene": {"name": "fake", "depth": 10.0}})
+
+
+def test_a_total_is_drawn_in_newtons_and_square_millimetres():
+    result = whole()
+    ax = forces(result.total)
+    assert_line(lines_of(ax)["normal (contact)"], result.step, 10.0 * result.normal_force)
+    assert ax.get_ylabel() == "force (N)"
+    assert forces(result).get_ylabel() == "force per depth (N/mm)"
+    ax = contact_area(result.total)
+    rows = slice(2)
+    assert_line(lines_of(ax)["touching"], 10.0 * result.applied_force[rows], result.real_contact_area[rows])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("applied force (N)", "area (mm²)")
+    panels = history(result.total, ["contact_width", "stored_energy", "min_gap"])
+    labels = ["contact area (mm²)", "stored energy (mJ)", "smallest gap (mm)"]
+    assert [ax.get_ylabel() for ax in panels] == labels
+    assert energies(result.total).get_ylabel() == "energy (mJ)"
+    assert signal(result.total)[1].get_ylabel() == "friction force (N)"
+    load = f"load {10.0 * result.applied_force[-1]:.3g} N,"
+    assert load in deformed(result.total).get_title()
+
+
+def test_totals_and_others_are_not_compared():
+    result = whole()
+    with pytest.raises(InputError, match="some per mm of depth, some in total; allowed: all of them"):
+        compare({"a": result, "b": result.total}, "normal_force")
+    both = compare({"a": result.total, "b": result.total}, "normal_force")
+    assert both.get_ylabel() == "normal force (N)"
 
 
 def test_what_can_be_drawn_over_is_in_the_history():

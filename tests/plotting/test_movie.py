@@ -1,5 +1,6 @@
 """Moving pictures: a frame for each of the result's, on one scale, written whole or not at all."""
 
+import base64
 import os
 import sys
 
@@ -11,7 +12,7 @@ from tools.fakes import fake_result
 from evfem.errors import InputError, StorageError
 from evfem.plotting import animate, deformed
 from evfem.plotting import movie as movies
-from evfem.plotting.movie import make_movie
+from evfem.plotting.movie import make_reel
 
 #: stands for ffmpeg: says what it was given, and writes how many bytes came
 FFMPEG = """#!{python}
@@ -52,12 +53,22 @@ def test_a_gif_has_every_frame_of_the_result(tmp_path):
     assert np.all(frames[0][0, 0] == 255)
 
 
+def test_a_notebook_shows_the_moving_picture(tmp_path, ffmpeg):
+    ffmpeg()
+    gif, mp4 = (animate(fake_result(), tmp_path / f"slide.{ending}") for ending in ("gif", "mp4"))
+    for path, begin in ((gif, '<img src="data:image/gif;base64,'), (mp4, "<video controls loop src=")):
+        shown = path._repr_html_()
+        assert shown.startswith(begin)
+        data = shown.split("base64,")[1].split('"')[0]
+        assert base64.b64decode(data) == path.read_bytes()
+
+
 def test_frames_show_the_result_on_one_scale_with_a_mark():
     result = fake_result("quad9", steps=6)
-    movie = make_movie(result, "von_mises", None, (None, None))
+    reel = make_reel(result, "von_mises", None, (None, None))
     highest = max(frame.von_mises.max() for frame in result.frames)
     marks, windows = [], set()
-    for frame, figure in zip(result.frames, movie.frames(), strict=True):
+    for frame, figure in zip(result.frames, reel.frames(), strict=True):
         above, below = figure.axes[:2]
         mapped, alone = above.collections[0], deformed(result, frame=result.frames.index(frame))
         np.testing.assert_array_equal(mapped.get_array(), alone.collections[0].get_array())
@@ -71,11 +82,11 @@ def test_frames_show_the_result_on_one_scale_with_a_mark():
 
 def test_a_close_up_goes_along_with_the_finger():
     result = fake_result("quad9", steps=6)
-    movie = make_movie(result, "gap", "contact", (None, None))
-    left, right = np.array(movie.windows)[:, :2].T
+    reel = make_reel(result, "gap", "contact", (None, None))
+    left, right = np.array(reel.windows)[:, :2].T
     np.testing.assert_allclose(left - left[0], [frame.position for frame in result.frames])
     np.testing.assert_allclose(right - left, right[0] - left[0])
-    for window, frame in zip(movie.windows, result.frames, strict=True):
+    for window, frame in zip(reel.windows, result.frames, strict=True):
         touching = (result.mesh.points + frame.displacement)[frame.contact_status > 0]
         assert window[0] < touching[:, 0].min() < touching[:, 0].max() < window[1]
 
@@ -113,7 +124,7 @@ def test_a_failure_leaves_what_was_there(tmp_path, ffmpeg, monkeypatch):
 
 def test_bad_input_is_refused_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
-    monkeypatch.setattr(movies, "make_movie", None)
+    monkeypatch.setattr(movies, "make_reel", None)
     result = fake_result()
     result_without = fake_result(steps=1)
     for arguments, sentence in (

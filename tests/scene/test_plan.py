@@ -82,3 +82,11 @@ def test_numbers_are_those_of_the_mesh():
     assert (found.element, found.nodes, found.cells) == ("q2p1", 81 * 5, 80)
     assert found.unknowns == 2 * 81 * 4 + 2 == make_model(hovering()).body.size
     assert (found.pad_nodes, found.steps) == (81, 1)
+
+
+@pytest.mark.parametrize(("nu", "said"), [(0.49, False), (0.4999, True)])
+def test_the_plan_names_what_hardly_changes_its_volume(nu, said):
+    scene = ev.Scene(finger(BLOCK, nu=nu), ev.Flat(friction=0.0), motion=[ev.Press(indentation=0.1)])
+    line = "pressure an unknown of the iterations, as tissue hardly changes volume"
+    assert (line in plan(scene).solver) == said
+    assert make_model(scene).body.tissue.nearly_incompressible == said

@@ -1,6 +1,7 @@
 """Warnings of a surface that the pad's nodes cannot feel."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,8 +30,9 @@ def test_grooves_between_the_nodes_are_warned_of():
     assert "sharper than the node spacing of the pad (0.25 mm)" in found.warning
     assert "up to 0.05 of its 0.05 mm" in found.warning
     assert " ".join(str(found).split()).endswith(f"Warning: {found.warning}")
-    with pytest.warns(UserWarning, match="sharper than the node spacing"):
+    with pytest.warns(UserWarning, match="sharper than the node spacing") as caught:
         simulate(scene(GROOVES))
+    assert [Path(one.filename).name for one in caught] == ["test_resolution.py"]
 
 
 @pytest.mark.parametrize("surface", [Flat(friction=0.0), Sinusoid(terms=[[0.05, 1.0, 0.0]], friction=0.0)])

@@ -15,6 +15,7 @@ from tools.meshes import KINDS
 from evfem.errors import InputError, StorageError
 from evfem.simulation.result import (
     COLUMNS,
+    INTEGERS,
     MEANINGS,
     NEEDED,
     UNITS,
@@ -34,7 +35,7 @@ CONTRACT = (
     "contact_width, real_contact_width, min_gap, peak_contact_pressure, mean_contact_pressure, "
     "external_work, electrostatic_work, stored_energy, "
     "friction_dissipation, viscous_dissipation, kinetic_energy, integrator_dissipation, snap_dissipation, "
-    "substeps, newton_iterations, seconds"
+    "substeps, newton_iterations, relaxations, seconds"
 )
 
 
@@ -135,10 +136,13 @@ def test_missing_files_and_missing_arrays_get_a_sentence(tmp_path):
     np.savez(tmp_path / "less.npz", **{k: v for k, v in arrays.items() if k != "mesh/points"})
     with pytest.raises(InputError, match=r"damaged.*mesh/points"):
         load(tmp_path / "less.npz")
-    added = ("history/integrator_dissipation", "history/snap_dissipation")
+    added = tuple(f"history/{name}" for name in ("integrator_dissipation", "snap_dissipation", "relaxations"))
     np.savez(tmp_path / "older.npz", **{k: v for k, v in arrays.items() if k not in added})
     older = load(tmp_path / "older.npz")
     assert np.isnan([older.integrator_dissipation, older.snap_dissipation]).all()
+    assert not older.relaxations.any()
+    older.save(tmp_path / "older again.npz")
+    assert load(tmp_path / "older again.npz").relaxations.dtype.kind == "i"
     assert older.time.tolist() == load(tmp_path / "run.npz").time.tolist()
     arrays["frames/gap"] = arrays["frames/gap"][:, :-1]
     np.savez(tmp_path / "short.npz", **arrays)
@@ -159,7 +163,7 @@ def test_a_result_of_a_version_with_fewer_columns_is_read_or_refused_as_such(lac
             load(tmp_path / "old.npz")
         return
     old = load(tmp_path / "old.npz")
-    np.testing.assert_array_equal(getattr(old, lacking), np.full(4, np.nan))
+    np.testing.assert_array_equal(getattr(old, lacking), np.full(4, 0 if lacking in INTEGERS else np.nan))
     for name in {*COLUMNS} - {lacking}:
         np.testing.assert_array_equal(getattr(old, name), getattr(result, name))
 

@@ -3,6 +3,7 @@ refused.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from evfem.mesh.mesh import raised
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Balance, Limits, Record, StepFailed
+from evfem.solver.state import Balance, Folded, Limits, Record, StepFailed
 from evfem.solver.strategy import Strategy
 
 TOLERANCE, MU = 1e-6, 0.5
@@ -206,6 +207,21 @@ def test_a_residual_that_is_no_number_fails_the_step(residual):
         accepted(interface, old, [good, good], (residual, 0.0))
 
 
+def test_an_outline_that_folds_over_itself_is_refused():
+    """Two neighbours that slip without friction have changed places: everything else holds."""
+    interface, old, good = legal(Flat(friction=0.0, y=0.0))
+    status, force = np.full(good.status.size, FORWARD), np.zeros_like(good.contact_force)
+    order = np.argsort(MESH.points[PAD.nodes, 0])
+    left, right = PAD.nodes[order[[2, 3]]]
+    good = replace(good, u=old.u.copy(), status=status, contact_force=force)
+    assert accepted(interface, old, [good, replace(good)])[0] == 0
+    swapped = good.u.copy()
+    swapped[left, 0] += MESH.points[right, 0] - MESH.points[left, 0]
+    swapped[right, 0] -= MESH.points[right, 0] - MESH.points[left, 0]
+    with pytest.raises(Folded, match=r"there is no equilibrium near here without the outline folding over"):
+        accepted(interface, old, [replace(good, u=swapped), good])
+
+
 def test_iterates_that_are_never_right_fail_the_step():
     interface, old, good = legal(SURFACES[0])
     drifted = BREAKERS["drifted"](good, 2.0 * TOLERANCE)
@@ -290,3 +306,19 @@ def test_a_yielding_interface_is_held_to_its_own_law():
         shifted(good, node(BACKWARD), SLIP + 2.0 * TOLERANCE, 0),
     ):
         assert accepted(interface, old, [broken, good])[0] == 1
+
+
+def test_iterations_go_on_only_where_their_fall_promises_the_end():
+    """At 0.7 per iteration from 1e-6 on the tolerance is reached within half as many again."""
+    limits = SimpleNamespace(strategy=Strategy(iterations=40), tolerance=1e-8)
+
+    def nearly(history):
+        return Equilibrium._nearly(limits, history)
+
+    falls = [1e-6 * 0.7 ** (k - 30) for k in range(70)]
+    assert nearly(falls[:40])
+    assert not nearly(falls[:60])
+    assert not nearly([1e-1 * 0.98**k for k in range(40)])  # too slow
+    assert not nearly([1e-6] * 40)
+    assert not nearly([1e-9] * 40)  # it is contact that does not settle
+    assert not nearly([])

@@ -53,6 +53,8 @@ def test_places_are_current_ones(body):
 def test_a_force_that_is_no_number_is_the_largest(body):
     text = described(body, {0: (1e6, 0.0), 5: (np.nan, 0.0)})
     assert text.startswith("out of balance: inf N/mm at (1, 0.5), 1.0e+06 N/mm at (0, 0)")
+    endless = described(body, {0: (1e6, 0.0), 5: (-np.inf, 0.0)})
+    assert endless.startswith("out of balance: inf N/mm at (1, 0.5), 1.0e+06 N/mm at (0, 0)")
 
 
 def test_statuses_are_counted(body):

@@ -16,9 +16,11 @@ from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
+from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.run import Run, simulate
+from evfem.solver.strategy import Strategy
 
 HARD = (
     "friction.jump_steep",
@@ -53,6 +55,17 @@ def test_a_thin_insulator_by_strong_troxels_law():
     np.testing.assert_allclose(result.applied_force[:5], 0.01 * np.arange(1, 6), rtol=1e-6)
     balance = result.normal_force - result.electrostatic_force - result.applied_force
     assert np.abs(balance).max() < 1e-7 * result.normal_force.max()
+
+
+@pytest.mark.slow
+def test_a_micrometre_of_insulator_takes_few_iterations():
+    """300 V on 1 um by Strong-Troxel's law, medium mesh: before, 197 iterations with 102 tangents."""
+    pad, surface = FingerPad(resolution="medium", ridges=False), Display(Layer(1e-3, 3.35), friction=0.3)
+    motion = [Press(force=0.05, steps=5), Slide(1.0, steps=5)]
+    result = simulate(Scene(pad, surface, StrongTroxel(), 300.0, motion, output=Output(every=100)))
+    balance = result.normal_force - result.electrostatic_force - result.applied_force
+    assert np.abs(balance).max() < 1e-7 * result.normal_force.max()
+    assert result.provenance["solver"]["factorisations"] < 70
 
 
 def test_penalised_friction_obeys_the_return_map():
@@ -145,14 +158,22 @@ def test_a_finger_pushed_aside_by_a_steep_texture_goes_on_to_where_it_is_held():
     assert broken(scene, result) == []
 
 
-def test_a_finger_that_is_nowhere_held_on_a_steep_texture_says_that_it_needs_time(monkeypatch):
-    """Where no weaker follower stiffness helps, the sentence says what pushes the finger aside."""
+def test_a_finger_that_is_not_held_on_a_steep_texture_is_released(monkeypatch):
+    """Where no weaker follower stiffness helps, the finger comes to rest by itself; and if it must
+    not be released, the sentence says what pushes it aside.
+    """
     monkeypatch.setattr(FollowerStiffness, "weaker", lambda *known: ())
-    motion = [Press(force=0.1, steps=2), Slide(1.0, steps=4)]
-    with pytest.raises(NotConverged, match=r"no equilibrium at rest near here.*dynamics = viscous"):
-        simulate(Scene(coarse_pad(), STEEP, motion=motion))
+    motion = [Press(force=0.1, steps=2), Slide(0.42, steps=2)]
+    scene = Scene(coarse_pad(), STEEP, motion=motion)
+    held = Solver(strategy=Strategy(relaxation=False))
+    with pytest.raises(NotConverged, match=r"no equilibrium at rest near here: on the slopes.*relaxation"):
+        simulate(replace(scene, solver=held))
+    result = simulate(scene)
+    assert result.relaxations.any()
+    assert broken(scene, result) == []
 
 
+@pytest.mark.filterwarnings("ignore:motion 1 slides with the indentation held")
 def test_friction_that_rises_within_a_nodes_motion_is_a_jump_to_it():
     """From 0.04 to 1.34 over 1.5 micrometres, against the way: from the smooth side a node is
     thrown beyond the ramp, from the rough side back before it. It stays at the ramp's rough end.

@@ -23,6 +23,7 @@ WRONG = {
     "easy": (0, 10_001, 1.5),
     "growth": (0.99, 10.1, np.inf),
     "reach": (-0.1, 10.1, np.nan),
+    "relaxation": (None, 1, "yes"),
 }
 ENDS = {
     "iterations": (1, 10_000),
@@ -31,6 +32,7 @@ ENDS = {
     "easy": (1, 10_000),
     "growth": (1.0, 10.0),
     "reach": (0.0, 10.0),
+    "relaxation": (False, True),
 }
 
 
@@ -89,6 +91,48 @@ def test_the_smallest_part_is_the_last_one_tried():
     assert ways(Strategy(smallest_part=0.25, growth=1.0), 0.3) == [0.25] * 4
     with pytest.raises(StepFailed):
         ways(Strategy(smallest_part=0.26), 0.3)
+
+
+class Snapping(Steps):
+    """Nothing is found from these places on; a release takes them as they are."""
+
+    lost = 0.3
+
+    def step(self, old, target):
+        self.record.iterations += self.takes
+        raise StepFailed("no equilibrium near", [1.0])
+
+
+def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
+    """Nothing is ever found without a release: the first comes at the smallest part, each further
+    one at a part four times as long, up to the whole rest.
+    """
+    ends = []
+
+    class Released:
+        def __init__(self, body, solve):
+            pass
+
+        def applies(self, target):
+            return True
+
+        def follow(self, state, target, accept):
+            ends.append(target)
+            return target
+
+    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Released)
+    stepper = Stepper(Snapping(Strategy(smallest_part=1 / 64), 1.0), body=object(), substep=0.5)
+    state, substeps = stepper.follow(0.0, lambda _, share: share, lambda old, new: None)
+    parts = np.diff([0.0, *ends])
+    assert state == ends[-1] == 1.0
+    assert substeps == stepper.relaxations == len(parts)
+    assert parts[0] == 1 / 64
+    assert (parts[:-1] < 2 * 4.0 ** np.arange(len(parts) - 1) / 64).all()
+    assert len(parts) == 5
+    assert stepper.substep == 1.0
+    held = Stepper(Snapping(Strategy(relaxation=False), 1.0), body=object())
+    with pytest.raises(StepFailed):
+        held.follow(0.0, lambda _, share: share, lambda old, new: None)
 
 
 def work(*motion, body=None, friction=0.3, **numbers):

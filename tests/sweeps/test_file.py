@@ -226,3 +226,16 @@ def test_a_key_that_leads_nowhere(key, sentence):
 def test_a_file_that_is_no_sweep(text):
     with pytest.raises(InputError):
         sweepfile.loads(text)
+
+
+def test_a_signal_over_time_is_swept_by_its_keys():
+    motion = [ev.Hover(0.5), ev.Wait(0.1, steps=100)]
+    scene = ev.Scene(ev.FingerPad(), ev.Display(), ev.Kaczmarek(), ev.Sine(10.0, 100.0), motion, depth=10.0)
+    grid = {
+        "electrostatics.signal.frequency": [10.0, 20.0],
+        "motion.1.duration": [0.1],
+        "finger.depth": [8.0],
+    }
+    scenes = [ev.scenefile.loads(point.text) for point in ev.Sweep(scene, grid=grid).points()]
+    assert [one.voltage for one in scenes] == [ev.Sine(10.0, 100.0), ev.Sine(20.0, 100.0)]
+    assert {one.depth for one in scenes} == {8.0}

@@ -77,7 +77,7 @@ def test_the_table_has_the_numbers_of_single_runs(plan):
     assert result.rows[4]["message"].startswith("surface.friction: given -1.0; allowed: a number")
     assert np.isnan(result["normal_force.last"][4:]).all()
     assert result["status"][-1] == "refused"
-    with pytest.raises(InputError, match="column: given force"):
+    with pytest.raises(InputError, match='column: given "force"'):
         result["force"]
     assert repr(result) == "SweepResult(6 points: 4 done, 2 refused)"
 

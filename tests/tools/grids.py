@@ -88,6 +88,14 @@ def tangent_of(space, u, *terms):
     return pattern.full(pattern.finish(data))
 
 
+def mixed_tangent_of(tissue, u, q):
+    """The same of a tissue under a pressure q (E, Q) of the iterations."""
+    pattern = Pattern(tissue.space.nodes, 2)
+    data = pattern.zeros()
+    tissue.add_tangent(u, pattern, data, q)
+    return pattern.full(pattern.finish(data))
+
+
 def solve(tissue, u, free, load=0.0, iterations=14):
     """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all
     else stays.

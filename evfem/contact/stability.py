@@ -1,0 +1,118 @@
+r"""Which force takes an equilibrium its stability, and how close it is.
+
+At an equilibrium the closed nodes are held along the normal, the sticking ones along the tangent
+too. What is left to move are the slips q of the slipping nodes and the gaps of the open ones. With
+the compliance C of body and bone, local frames, and :math:`m = \pm\mu` of the slipping nodes, forces
+:math:`t` along the slips move them by
+
+.. math:: A = C_{tt} - (C_{tn} + C_{tt} m)\,(C_{nn} + C_{nt} m)^{-1} C_{nt},
+
+the held forces eliminated; gaps of open nodes likewise. Three forces grow with such a motion, by
+a stiffness D of their own:
+
+- contact forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, which
+  is positive on a crest; friction turns with the normal force that it needs,
+- friction whose coefficient falls along the way, :math:`D = -\lambda_n\,d\mu/ds`,
+- the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
+
+Together they grow `share` times as fast as what holds the tissue, the largest real eigenvalue of
+A D; at 1 the equilibrium is lost. The force that works most in that motion wins (`verge`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.condensed import LinearContactStep, y_before_x
+from evfem.contact.follower import local
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ExtraUnknowns
+
+#: the forces, by what they do
+SLOPES = "on the slopes of the profile the contact forces push the finger aside"
+FALLING = "friction falls along the way"
+ATTRACTION = "the attraction grows as the gap closes"
+
+
+@dataclass(frozen=True)
+class Verge:
+    """How close an equilibrium is to its loss, 1: how fast what takes it away grows relative to
+    what holds the tissue; and the force that works most in it, in words.
+    """
+
+    share: float
+    cause: str
+
+
+def verge(step: LinearContactStep) -> Verge:
+    """Of the equilibrium that `step` begins at."""
+    known, surface = step.candidates, step.candidates.surface
+    slipping = np.flatnonzero(known.status >= FORWARD)
+    opened = np.flatnonzero((known.status == OPEN) & (known.negative_stiffness > 0.0))
+    ratio, normal = _shear_ratio(step)[slipping], np.maximum(known.force[slipping, 0], 0.0)
+    turning = -normal * (1.0 + ratio**2) * (surface.curvature / surface.stretch**3)[slipping]
+    slope = known.friction_slope[slipping] / surface.stretch[slipping]
+    falling = np.sign(ratio) * normal * slope
+    none, far = np.zeros(slipping.size), np.zeros(opened.size)
+    grows = {
+        SLOPES: np.concatenate([turning, far]),
+        FALLING: np.concatenate([falling, far]),
+        ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
+    }
+    share, motion = _fastest(
+        _freed(step, slipping, opened), sum(grows.values(), np.zeros(none.size + far.size))
+    )
+    return Verge(share, max(grows, key=lambda cause: float(grows[cause] @ motion**2)))
+
+
+def _shear_ratio(step: LinearContactStep) -> Floats:
+    """Shear force per pressing force of the candidates (c,): against the slip, 0 unless they slip."""
+    known = step.candidates
+    return known.friction * np.select([known.status == FORWARD, known.status == BACKWARD], [-1.0, 1.0], 0.0)
+
+
+def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
+    """Compliance (f, f) of the slips and gaps of these nodes, with everything held that contact
+    holds, and the bone free where a force on it is prescribed.
+    """
+    known, size = step.candidates, step.candidates.status.size
+    C, bone = _compliance(step), _bone(step)
+    closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)
+    held, free = np.concatenate([closed, size + stick]), np.concatenate([size + slipping, opened])
+    pushes, ratio = np.vstack([C, bone.rows])[:, held], _shear_ratio(step)[closed]
+    pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, size + closed] * ratio
+    matrix = np.block([[pushes[held], bone.columns[held]], [pushes[2 * size :], bone.pivot]])
+    moved = np.linalg.solve(matrix, np.vstack([C[np.ix_(held, free)], bone.rows[:, free]]))
+    return C[np.ix_(free, free)] - np.hstack([pushes[free], bone.columns[free]]) @ moved
+
+
+def _compliance(step: LinearContactStep) -> Floats:
+    """Compliance of the candidates (2 c, 2 c) below a bone that stands still, normal then
+    tangential.
+    """
+    rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
+    C = step.body.compliance[np.ix_(rows, rows)]
+    return local(axes, local(axes, C).T).T + np.diag(step.candidates.interface_compliance.T.ravel())
+
+
+def _bone(step: LinearContactStep) -> ExtraUnknowns:
+    """What the bone's travel under a prescribed force does, and the balance that settles it."""
+    rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
+    axis = np.array([unknown.axis for unknown in step.unknowns], dtype=np.int64)
+    none = np.zeros((len(step.body.schur), 0))
+    pushes = np.column_stack([none, *(unknown.push for unknown in step.unknowns)])
+    moved = step.body.compliance @ pushes[:-2]
+    pivot = step.body.schur[axis - 2, :-2] @ moved - pushes[axis - 2]
+    carried = local(axes, step.body.bone_rows[axis][:, rows].T).T
+    return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(axis.size))
+
+
+def _fastest(A: Floats, stiffness: Floats) -> tuple[float, Floats]:
+    """Largest real eigenvalue of A times a diagonal stiffness, at least 0, and its vector."""
+    if not stiffness.any():
+        return 0.0, np.zeros_like(stiffness)
+    values, vectors = np.linalg.eig(A * stiffness)
+    fastest = int(np.argmax(values.real))
+    return max(float(values[fastest].real), 0.0), np.abs(vectors[:, fastest])

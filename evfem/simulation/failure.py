@@ -1,0 +1,63 @@
+"""What is said of a step that failed: which force wins and where, if no equilibrium is near, and
+what may be tried.
+"""
+
+from __future__ import annotations
+
+from evfem.common.constants import VERGE
+from evfem.scene.scene import Scene
+from evfem.simulation.model import Model
+from evfem.solver.state import Folded, State, StepFailed
+
+FINER = "less friction or a finer mesh"
+
+
+def advice(scene: Scene, model: Model, failed: StepFailed) -> str:
+    """Why the step failed, how its last iterate looked, and what to try, joined by semicolons."""
+    lost = _lost(model, failed)
+    parts = [lost or failed.reason, failed.findings, _try(scene, failed, bool(lost))]
+    return "; ".join(part for part in parts if part)
+
+
+def _lost(model: Model, failed: StepFailed) -> str:
+    """The sentence on the equilibrium that was lost; empty where nothing shows that there is none."""
+    if isinstance(failed, Folded) or failed.last is None:
+        return ""
+    state, target = failed.last
+    try:
+        verge = model.equilibrium.verge(state, target)
+    except StepFailed:  # the tangent there is singular
+        return ""
+    if verge is None or not (failed.unstable or verge.share >= VERGE):
+        return ""
+    passing = model.body.dynamics is not None and target.duration > 0.0
+    rest = "within a time step as short as this" if passing else "at rest"
+    released = ", and released there it does not come to rest" if failed.released else ""
+    return (
+        f"there is no equilibrium {rest} near here: {verge.cause}, {verge.share:.3g} times as hard as its "
+        f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
+    )
+
+
+def _place(model: Model, state: State) -> str:
+    """Where the bone stood, its load and the voltage."""
+    position, indentation = state.bone[0] + 0.0, model.indentation(state.bone) + 0.0
+    load, voltage = -state.reaction[1] + 0.0, state.voltage + 0.0
+    return (
+        f"position {position:.4g} mm, indentation {indentation:.4g} mm, {load:.3g} N/mm and {voltage:.4g} V"
+    )
+
+
+def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
+    """What may help a scene of its kind."""
+    dynamics = scene.solver.dynamics
+    if isinstance(failed, Folded):
+        return f"try less voltage, a thicker insulator, smaller steps, {FINER}"
+    if dynamics != "quasistatic":
+        passing = failed.last is None or failed.last[1].duration > 0.0
+        time = "a larger viscosity of the finger" if passing else "a motion with a speed"
+        return f"try smaller steps, {time}, {FINER}"
+    if not lost:
+        return f"try smaller steps, a larger viscosity with dynamics = viscous, {FINER}"
+    off = "" if scene.solver.strategy.relaxation else "relaxation of the strategy switched on, or "
+    return f"try {off}motions that take time: a speed, with dynamics = viscous or inertial"

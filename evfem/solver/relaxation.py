@@ -1,0 +1,114 @@
+r"""From a lost equilibrium to the next one: the body is let go from where it is, and held back only
+by drag.
+
+Where a quasi-static way loses its stability, the equilibrium ends there however small the part:
+an attraction that grows faster than the tissue's force pulls the finger over the gap, friction
+that falls along the way lets a node go, a ridge jumps from one slope of a texture to the next. The
+equilibrium after the snap may be far away, and iterations of a static problem seldom find it.
+Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of the part held::
+
+    rate <- 1
+    repeat
+        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
+        if it failed: a higher rate, slower
+        else: accept; a lower rate, faster, but not while the speed grows
+            while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
+            it is found
+
+Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
+finger that swings may jump over the equilibrium next to it, so the way would depend on a density
+and a time step; with drag the stored energy, less the work of the loads, can only fall. *Both
+kinds of drag*: a viscous stress holds single nodes, but not a finger that moves as a whole; a mass
+that stands still at the beginning of each step does. *No parameter*: only the ratio s of
+relaxation time and pseudo-time step enters, which is chosen as steps succeed; the way is that of a
+tissue with one relaxation time everywhere and low speed. The steps are equilibria of contact,
+friction and attraction like any other, in the scene's own coupling and to its tolerance; friction
+counts from step to step, and what is dissipated is counted by its definitions
+(`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
+
+A wished friction force is not followed on the way, where drag would be part of it: the voltage
+stays as it is until the end.
+
+Source: C. T. Kelley and D. E. Keyes, SIAM J. Numer. Anal. 35 (1998) 508,
+doi:10.1137/S0036142996304796 (pseudo-transient continuation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.constants import DRAG_CALMER, DRAG_CHANGE, DRAG_GROWTH, DRAG_MOST, DRAG_REST, DRAG_STEPS
+from evfem.solver.control import GivenVoltage, Target
+from evfem.solver.state import Folded, State, StepFailed
+from evfem.tissue.body import Body
+
+
+@dataclass
+class Relaxation:
+    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included."""
+
+    body: Body
+    solve: Callable[[State, Target], State]
+
+    def applies(self, target: Target) -> bool:
+        """Whether a way to `target` takes no time, so that nothing but an equilibrium is asked for."""
+        return self.body.dynamics is None or target.duration == 0.0
+
+    def follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
+        """The equilibrium at `target` where the body comes to rest when released at `state`;
+        `accept(old, new)` sees every step on the way.
+
+        Raises `StepFailed` where it does not come to rest.
+        """
+        try:
+            return self._follow(state, target, accept)
+        finally:
+            self.body.release(state.u, 0.0)
+
+    def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
+        held = target if not target.drive.follows else replace(target, drive=GivenVoltage(state.voltage))
+        rate, slower, speed, quiet = 1.0, DRAG_CHANGE, 0.0, DRAG_REST
+        for _ in range(DRAG_STEPS):
+            self.body.release(state.u, rate)
+            try:
+                new = self.solve(state, held)
+            except Folded:
+                raise
+            except StepFailed:
+                rate, slower = slower * rate, DRAG_CHANGE * slower
+                if rate > DRAG_MOST:
+                    raise
+                continue
+            accept(state, new)
+            before, speed = speed, rate * float(np.abs(new.u - state.u).max())
+            state, slower = new, DRAG_CHANGE
+            if speed > before:
+                quiet = DRAG_REST
+            elif rate < quiet:
+                rest = self._rest(state, target)
+                if rest is not None:
+                    accept(state, rest)
+                    return rest
+                quiet = DRAG_CALMER * rate
+            rate *= _next(speed / before if before > 0.0 else 0.0)
+        raise StepFailed("the released finger does not come to rest", [])
+
+    def _rest(self, state: State, target: Target) -> State | None:
+        """The equilibrium without drag, if it is found from here."""
+        self.body.release(state.u, 0.0)
+        try:
+            return self.solve(state, target)
+        except StepFailed:
+            return None
+
+
+def _next(growth: float) -> float:
+    """What the rate of drag is multiplied with after a step whose speed was `growth` times the last
+    one's: while an instability grows, drag stays above its rate.
+    """
+    if growth < DRAG_GROWTH[0]:
+        return 1.0 / DRAG_CHANGE
+    return 1.0 if growth < DRAG_GROWTH[1] else DRAG_CHANGE

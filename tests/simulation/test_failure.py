@@ -1,0 +1,91 @@
+"""What a failed step says: which force wins and where, and only what can help that scene."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import coarse_pad, finger
+from tools.meshes import block
+
+from evfem.contact.stability import SLOPES, Verge
+from evfem.contact.surfaces import Flat
+from evfem.errors import NotConverged
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.failure import advice
+from evfem.simulation.run import Run, simulate
+from evfem.solver.control import Target
+from evfem.solver.state import Folded, StepFailed
+from evfem.solver.strategy import Strategy
+
+
+def said(share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, **solver):
+    """What is said of a step from a pressed finger whose loss is at `share`."""
+    body = finger(block(4, 2), viscosity=1e-3)
+    motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
+    going = Run(Scene(body, Flat(), motion=motion, solver=Solver(**solver)), None)
+    going.advance(next(going.requests()))
+    failed = failure("nodes keep changing", [1.0])
+    failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
+    failed.last = going.state, replace(Target.held(going.state.bone, 0.0), duration=duration)
+    going.model.equilibrium.verge = lambda state, target: Verge(share, SLOPES)
+    return advice(going.scene, going.model, failed).split("; ")
+
+
+def test_the_sentence_names_the_force_its_amount_and_the_place():
+    lost, findings, way_out = said()
+    assert lost.startswith(f"there is no equilibrium at rest near here: {SLOPES}, 1.2 times as hard as its")
+    assert "at position 0 mm, indentation 0.1 mm, 0.0" in lost
+    assert lost.endswith("N/mm and 0 V, and harder beyond")
+    assert findings == "out of balance: 1 N/mm"
+    assert "dynamics = viscous" in way_out
+    assert "relaxation" not in way_out
+    assert said(released=True)[0].endswith("released there it does not come to rest")
+    off = Strategy(relaxation=False)
+    assert "relaxation of the strategy switched on" in said(strategy=off)[-1]
+
+
+def test_nothing_is_claimed_of_an_equilibrium_that_is_held():
+    assert said(share=0.5)[0] == "nodes keep changing"
+    assert said(share=0.5, unstable=True)[0].startswith("there is no equilibrium at rest")
+    assert said(share=0.89)[0] == "nodes keep changing"
+
+
+@pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
+def test_who_has_time_already_is_not_told_to_take_it(dynamics):
+    lost, _, way_out = said(duration=1e-4, dynamics=dynamics)
+    assert lost.startswith("there is no equilibrium within a time step as short as this near here")
+    still = said(dynamics=dynamics)
+    assert still[0].startswith("there is no equilibrium at rest near here")
+    assert "a motion with a speed" in still[-1]
+    assert "a motion with a speed" not in way_out
+    for text in (lost, way_out, *still):
+        assert "dynamics" not in text
+
+
+def test_a_fold_is_told_as_it_is():
+    found = said(failure=Folded)
+    assert found[0] == "nodes keep changing"
+    assert "less voltage" in found[-1]
+
+
+def test_a_plain_failure_keeps_its_reason():
+    hopeless = Solver(strategy=Strategy(iterations=2, smallest_part=1.0))
+    with pytest.raises(
+        NotConverged, match=r"no equilibrium in 2 iterations; out of balance.*try smaller steps"
+    ):
+        simulate(Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1), solver=hopeless))
+
+
+def test_a_singular_tangent_leaves_the_reason():
+    class Broken:
+        @staticmethod
+        def verge(state, target):
+            raise StepFailed("the tangent is singular", [])
+
+    failed = StepFailed("cells would collapse", [1.0])
+    failed.last = object(), object()
+    scene = Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1))
+    model = type("Parts", (), {"equilibrium": Broken})
+    failed.unstable = bool(np.True_)
+    assert advice(scene, model, failed).startswith("cells would collapse; try smaller steps")

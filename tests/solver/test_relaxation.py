@@ -1,0 +1,215 @@
+"""Where no equilibrium is near the body is released: where it comes to rest, what it sets free, and
+that what it does on the way is counted.
+
+A wedge of linear elastic tissue touches a wave with its tip alone, so it is a point on two springs:
+its energy at the bone (X, Y) is :math:`k_x (x - X)^2/2 + k_y (h(x) - Y)^2/2` over the tip's x.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from tools.builders import SKIN
+from tools.meshes import between, held
+
+from evfem.contact.follower import FollowerStiffness
+from evfem.contact.surfaces import Sinusoid
+from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.errors import NotConverged
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.model import make_model
+from evfem.simulation.result import COLUMNS, Saved
+from evfem.simulation.run import simulate
+from evfem.solver.strategy import Strategy
+from evfem.tissue.laws import LinearElastic
+
+HEIGHT, LENGTH, DEPTH = 0.007, 1.0, 0.2
+WAVE = 2.0 * np.pi / LENGTH
+#: way to the place where stability is lost, mm
+AHEAD = 0.01
+# the wave is smooth to the tip, which alone touches it
+pytestmark = pytest.mark.filterwarnings("ignore:the surface is sharper")
+TROUGH = -0.5 * np.pi
+
+
+def wedge():
+    """A column 0.4 mm wide and 2 mm high, tapered to a tip at the lower end."""
+    x, t = np.meshgrid(np.linspace(-0.2, 0.2, 3), np.linspace(0.0, 1.0, 5))
+    low = 1.5 * np.abs(x)
+    return MeshedFinger(held(between(x, low + t * (2.0 - low))), {"tissue": LinearElastic(0.1, 0.0)}, SKIN)
+
+
+def scene(*others, friction=0.0, **options):
+    """The wedge pressed into a trough of the wave, and what follows."""
+    surface = Sinusoid(friction=friction, terms=[[HEIGHT, WAVE, TROUGH]], insulator=Layer(0.09, 3.35))
+    motion = [Press(indentation=DEPTH, steps=4), *others]
+    return Scene(wedge(), surface, motion=motion, output=Output(every=1000), **options)
+
+
+def springs():
+    """kx and ky of the tip (N/mm per mm): the stiffness of the body at rest, condensed by numpy."""
+    body = make_model(scene()).body
+    whole = body.pattern.full(body.tangent(np.zeros((body.space.size, 2)))).toarray()
+    mesh = body.space.mesh
+    tip = body.unknowns[np.argmin(mesh.points[:, 1])]
+    rest = np.setdiff1d(np.arange(body.size - 2), tip)
+    among = whole[np.ix_(tip, tip)] - whole[np.ix_(tip, rest)] @ np.linalg.solve(
+        whole[np.ix_(rest, rest)], whole[np.ix_(rest, tip)]
+    )
+    return among[0, 0], among[1, 1]
+
+
+class Point:
+    """The tip on its springs."""
+
+    def __init__(self):
+        self.kx, self.ky = springs()
+
+    def lift(self, x):
+        """How far the surface at x lifts the tip (mm)."""
+        return HEIGHT * (1.0 - np.cos(WAVE * x)) + DEPTH
+
+    def energy(self, x, bone):
+        return 0.5 * self.kx * (x - bone) ** 2 + 0.5 * self.ky * self.lift(x) ** 2
+
+    def bone(self, x):
+        """Where the bone is in equilibrium with the tip at x."""
+        return x + self.ky * self.lift(x) * HEIGHT * WAVE * np.sin(WAVE * x) / self.kx
+
+    def snap(self):
+        """x of the tip where the bone has gone furthest, before the first crest."""
+        return brentq(lambda x: self.bone(x + 1e-6) - self.bone(x - 1e-6), 0.05 * LENGTH, 0.45 * LENGTH)
+
+    def before(self, bone):
+        """x of the tip short of the snap."""
+        return brentq(lambda x: self.bone(x) - bone, 0.0, self.snap())
+
+    def beyond(self, bone):
+        """x of the tip in the next trough with the bone at the same place."""
+        return brentq(lambda x: self.bone(x) - bone, 0.55 * LENGTH, LENGTH + self.snap())
+
+
+@pytest.fixture(autouse=True)
+def no_way_around(monkeypatch):
+    """The iterations would find many of these equilibria by a weaker follower stiffness."""
+    monkeypatch.setattr(FollowerStiffness, "weaker", lambda *known: ())
+
+
+@pytest.fixture(scope="module")
+def point():
+    return Point()
+
+
+def over(point, **options):
+    """A slide up to just before the loss, and one step across."""
+    lost = point.bone(point.snap())
+    return scene(Slide(lost - AHEAD, steps=10), Slide(2.0 * AHEAD, steps=1), **options)
+
+
+def left_over(result):
+    """What no column has in every row, relative to the largest of them."""
+    given = np.array([result.external_work, result.electrostatic_work])
+    kept = [result.stored_energy, result.kinetic_energy, result.friction_dissipation]
+    kept += [result.viscous_dissipation, result.integrator_dissipation, result.snap_dissipation]
+    return np.abs(given.sum(axis=0) - np.sum(kept, axis=0)) / np.abs([*given, *kept]).max(axis=0)
+
+
+def test_a_released_tip_comes_to_rest_in_the_next_trough(point):
+    """Before and after the snap the tip pushes with the force of the point on springs, and what is
+    set free is the difference of its energies where the bone has gone furthest.
+    """
+    result = simulate(over(point))
+    assert result.relaxations.tolist() == [0] * 14 + [1]
+    lost = point.bone(point.snap())
+    bones = np.array([lost - AHEAD, lost + AHEAD])
+    tips = np.array([point.before(bones[0]), point.beyond(bones[1])])
+    np.testing.assert_allclose(result.applied_tangential_force[-2:], point.kx * (bones - tips), rtol=1e-6)
+    np.testing.assert_allclose(result.stored_energy[-2:], point.energy(tips, bones), rtol=1e-6)
+    assert result.snap_dissipation[-2] == 0.0
+    freed = point.energy(point.snap(), lost) - point.energy(point.beyond(lost), lost)
+    # the release begins up to 1/1024 of the last step beyond the loss
+    assert result.snap_dissipation[-1] == pytest.approx(freed, rel=1e-3)
+    assert left_over(result).max() < 1e-6
+    assert result.summary()["relaxations"] == result.provenance["solver"]["relaxations"] == 1
+
+
+def test_without_relaxation_the_step_fails(point):
+    with pytest.raises(NotConverged) as failed:
+        simulate(over(point, solver=Solver(strategy=Strategy(relaxation=False))))
+    assert failed.value.step == 15
+    assert not failed.value.result.relaxations.any()
+
+
+def test_the_staggered_coupling_comes_to_the_same_rest(point):
+    pulled = {"law": Kaczmarek(), "voltage": 600.0}
+    together, apart = (simulate(over(point, coupling=kind, **pulled)) for kind in ("monolithic", "staggered"))
+    assert together.relaxations[-1] == apart.relaxations[-1] == 1
+    for name in ("applied_tangential_force", "normal_force", "stored_energy"):
+        np.testing.assert_allclose(getattr(apart, name)[-1], getattr(together, name)[-1], rtol=1e-6)
+    assert left_over(apart).max() < 1e-6
+
+
+def test_a_prescribed_load_is_kept(point):
+    """The tip under a constant force N leaves the trough where the wave is steepest, N h' = kx (X - x)."""
+    load = point.ky * DEPTH
+    gone = 0.25 * LENGTH + load * HEIGHT * WAVE / point.kx
+    motion = [Press(force=load, steps=4), Slide(gone - AHEAD, steps=10, hold="force")]
+    motion.append(Slide(3.0 * AHEAD, steps=1, hold="force"))
+    result = simulate(replace(scene(), motion=motion))
+    assert result.relaxations.sum() == 1
+    np.testing.assert_allclose(result.applied_force[4:], load, rtol=1e-7)
+    assert left_over(result).max() < 1e-6
+
+
+def test_friction_on_the_way_is_counted(point):
+    """Each column from its definition, and the books closed; what slips dissipates."""
+    result = simulate(scene(Slide(2.5, steps=25), friction=0.05))
+    assert result.relaxations.any()
+    assert left_over(result).max() < 1e-6
+    for name in ("friction_dissipation", "snap_dissipation"):
+        assert (np.diff(getattr(result, name)) >= 0.0).all()
+    crossed = np.flatnonzero(result.relaxations)
+    # the tip slips about one wave there, at a friction of 0.05 times its load
+    load = 0.05 * result.normal_force[crossed]
+    slipped = np.diff(result.friction_dissipation)[crossed - 1] / load
+    assert (slipped > 0.5 * LENGTH).all()
+    assert (slipped < 1.1 * LENGTH).all()
+
+
+def test_a_motion_without_time_in_a_scene_with_time_ends_at_rest(point):
+    """Lifted without speed after a slide that takes time, the tip loses the trough: time stands
+    still, so there is no inertia to carry it on, and nothing but rest is asked for.
+    """
+    slide = Slide(point.bone(point.snap()) - AHEAD, steps=10, speed=0.1)
+    lift = Press(indentation=0.9 * DEPTH, steps=1)
+    still, timed = (
+        simulate(scene(slide, lift, solver=Solver(dynamics=kind))) for kind in ("quasistatic", "inertial")
+    )
+    assert still.relaxations[-1] == timed.relaxations[-1] == 1
+    assert timed.kinetic_energy[-2] > 0.0
+    assert timed.kinetic_energy[-1] == 0.0
+    np.testing.assert_allclose(
+        timed.applied_tangential_force[-1], still.applied_tangential_force[-1], rtol=1e-6
+    )
+    assert left_over(timed).max() < 1e-6
+
+
+def test_a_run_goes_on_after_a_release_as_if_never_stopped(point):
+    """To the last bit, also with the release in the step after the checkpoint."""
+    whole_scene = scene(Slide(2.5, steps=25), friction=0.05)
+    kept = {}
+
+    class Keeper:
+        def step(self, row, frame, checkpoint):
+            kept[row["step"]] = checkpoint()
+
+    whole = simulate(whole_scene, observers=[Keeper()])
+    released = int(whole.step[np.flatnonzero(whole.relaxations)[0]])
+    for stop in (released - 1, released):
+        resumed = simulate(whole_scene, resume=Saved(kept[stop], whole.rows[:stop]))
+        for name in COLUMNS:
+            if name != "seconds":
+                np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name), name)
