@@ -106,6 +106,9 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
+    "finger.ridge_scan": "drawn ridges are those of the formula",
+    "output.precision": "only what is written changes",
+    "output.compression": "only what is written changes",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
