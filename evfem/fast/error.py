@@ -100,6 +100,7 @@ class CorrectedRun(FastRun):
         """Reach a request's target; raises `StepFailed`."""
         self.remembered.correct(self.beside[request.step - 1], self.near[request.step - 1])
         self.state, _ = self.stepper.follow(self.state, request.path, lambda old, new: None)
+        self.time += request.duration
         state, model = self.state, self.model
         contact, pull = model.equilibrium.contact_forces(state).sum(axis=0), state.attraction.sum(axis=0)
         forces = dict(zip(COMPARED, (contact[1], -contact[0], -pull[1]), strict=True))
