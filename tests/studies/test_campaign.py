@@ -106,6 +106,7 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
+    "finger.ridge_scan": "a measured outline, which no generator can draw",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
