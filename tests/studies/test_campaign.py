@@ -107,8 +107,6 @@ NEVER = {
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
     "finger.ridge_scan": "a measured outline, which no generator can draw",
-    "output.precision": "only what is written changes",
-    "output.compression": "only what is written changes",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
