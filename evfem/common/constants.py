@@ -23,7 +23,7 @@ PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage
 PAD_SPARE, PAD_FEWEST   so many times more of its nodes are in play than touch, and so many more  fast model
 PAD_SPRING              stiffness of the spring that holds it without contact, relative to that   fast model
                         of a node
-SEARCH_START            where no travel of the bone settles a prescribed force, a search starts    attraction
+SEARCH_START            where no travel of the bone settles a prescribed force, a search starts   attraction
                         with this fraction of the largest increment
 SEARCH_END              and ends at this fraction of the force that was lacking                   attraction
 SEARCH_LIMIT            or after so many contact problems                                         attraction
@@ -64,17 +64,17 @@ CHANGES                 so many changes of side in one step show that neither si
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
-COARSER                 after a release the next one within the same step comes at a part so many   texture
-                        times as long
+COARSER                 after a release the next one within the same step comes at a part so      texture
+                        many times as long
 DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
 DRAG_GROWTH             where its speed grows less or more than these factors in one step
-DRAG_REST               drag of a rate below this is nearly none: a body that slows down may be at  snaps
-                        rest
+DRAG_REST               drag of a rate below this is nearly none: a body that slows down may      snaps
+                        be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 DRAG_STEPS              steps of a release, failed ones included, before it is given up
-VERGE                   a step that failed where what takes stability away grows so fast, relative  snaps
-                        to what holds it, has no equilibrium near
+VERGE                   a step that failed where what takes stability away grows so fast,         snaps
+                        relative to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
 NAMED                   so many of the largest out-of-balance forces are named in a failure
 ======================  ========================================================================  ==========

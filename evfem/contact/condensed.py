@@ -168,7 +168,9 @@ class LinearContactStep:
     displacement comes back.
 
     `residual` g (m,) of the forward solve; `bone` (2,) the bone's known increment; `unknowns` what
-    else moves the body; `snap`: nodes that the attraction pulls over the gap close at once.
+    else moves the body; `snap`: nodes that the attraction pulls over the gap close at once;
+    `timed`: time passes, and a shorter step is held by viscosity or inertia, where one without time
+    must go the way it is pushed.
     """
 
     body: CondensedTangent
@@ -177,6 +179,7 @@ class LinearContactStep:
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
     snap: bool = False
+    timed: bool = False
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
@@ -250,6 +253,8 @@ class LinearContactStep:
         try:
             return self._solve_following(near, free, status, follower)
         except ContactNotSolved as failed:
+            if self.timed:
+                raise
             held = self.candidates.axes[near], status, self.candidates.friction[near]
             for weaker in follower.weaker(self.body.among(near), *held):
                 with suppress(ContactNotSolved):

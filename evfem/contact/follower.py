@@ -10,8 +10,9 @@ Where the feedback C T of the slipping nodes exceeds 1, the forces push them asi
 tissue holds them: stability is lost and the linear problem has no solution, or one the wrong way.
 T is then scaled to `STABLE` of the critical value (`FollowerStiffness.weaker`), as the attraction's
 negative stiffness is (`evfem.contact.signorini`): the iterations go the way the nodes are pushed,
-in small steps, to where they are held again. The equilibrium found there is that of the whole
-forces, since the residual knows nothing of T.
+in small steps, to where they are held again. Only where no time passes: a shorter time step is held
+by viscosity and inertia. The equilibrium found there is that of the whole forces, since the
+residual knows nothing of T.
 """
 
 from __future__ import annotations

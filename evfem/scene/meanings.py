@@ -159,7 +159,7 @@ STRATEGY = {
     "easy": Text("", "iterations of a part after which the next one may be longer"),
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
-    "relaxation": Text("", "whether a finger without an equilibrium near is released until it rests"),
+    "relaxation": Text("", "whether a finger without an equilibrium near is released"),
 }
 OUTPUT = {
     "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),

@@ -4,6 +4,8 @@ what may be tried.
 
 from __future__ import annotations
 
+import numpy as np
+
 from evfem.common.constants import VERGE
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
@@ -25,7 +27,8 @@ def _lost(model: Model, failed: StepFailed) -> str:
         return ""
     state, target = failed.last
     try:
-        verge = model.equilibrium.verge(state, target)
+        with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
+            verge = model.equilibrium.verge(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
     if verge is None or not (failed.unstable or verge.share >= VERGE):

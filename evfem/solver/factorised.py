@@ -232,6 +232,7 @@ class FactorisedBody:
             bone=target.bone(state.bone) - state.bone,
             unknowns=target.height.unknowns(linearisation.tangent, float(state.bone[1])),
             snap=self._scaled_down >= LOST,
+            timed=self.body.dynamics is not None and self.body.dynamics.step > 0.0,
         )
 
     def _solve(self, step: LinearContactStep) -> StepSolution:

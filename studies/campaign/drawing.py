@@ -27,7 +27,8 @@ def draw(seed: int, number: int) -> Tables:
     tables["motion"] = _motions(random, tables)
     add_voltage(random, tables)
     if random.chance(0.1):
-        tables["output"] = {"every": random.whole(1, 5)}
+        precision = random.one_of("single", "double")
+        tables["output"] = {"every": random.whole(1, 5), "precision": precision, "compression": True}
     return copied(tables)
 
 

@@ -57,7 +57,7 @@ def _counts(ax: Axes, ends: list[Ending]) -> None:
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter("")
     ax.tick_params(axis="y", length=0)
-    ax.invert_yaxis()
+    ax.set_ylim(max(len(seen), 4) - 0.5, -0.5)
     ax.spines[["top", "right"]].set_visible(False)
 
 
@@ -91,4 +91,5 @@ def _median(ax: Axes, ends: list[Ending], slowness: Floats) -> None:
     steps, medians = np.array(points).T
     for factor, style, text in ((1.0, "-", "median"), (SLOW, "--", f"{SLOW:g} times the median")):
         ax.plot(steps, factor * medians, style, color="black", linewidth=1.0)
-        ax.annotate(text, (steps[0], factor * medians[0]), (0, 4), textcoords="offset points", fontsize=8)
+        at = (steps[-1], factor * medians[-1])
+        ax.annotate(text, at, (0, 4), textcoords="offset points", fontsize=8, ha="right")

@@ -36,7 +36,7 @@ indentation = 0.2
 steps = 3
 [[motion]]
 kind = "slide"
-distance = 0.6
+distance = 0.5
 steps = 3
 hold = "force"
 """
@@ -99,7 +99,7 @@ def test_friction_under_a_held_load_is_a_ratio_of_sums(path):
     """In full slip T = mu N with N given: mu = sum T / (n N), its error s / (N sqrt(n))."""
     path.write_text(SCENE.replace("indentation = 0.2", "force = 0.02"))
     force = np.array([0.0082, 0.0079, 0.0076])
-    curve = ev.MeasuredCurve("tangential_force", "position", [0.4, 0.5, 0.6], force, motion=1)
+    curve = ev.MeasuredCurve("tangential_force", "position", [0.3, 0.4, 0.5], force, motion=1)
     found = ev.fit(path, curve, {MU: (0.1, 1.0)}, workers=1)
     assert found[MU] == pytest.approx(force.mean() / 0.02, rel=1e-4)
     spread = np.std(force, ddof=1) / np.sqrt(3) / 0.02

@@ -284,7 +284,7 @@ def test_a_resumed_run_goes_on_with_everything(at):
             kept[row["step"]] = {name: np.copy(array) for name, array in checkpoint().items()}
 
     motion = Press(indentation=0.4, steps=1, speed=20.0), Slide(0.3, steps=3, speed=20.0)
-    solver = Solver(dynamics="viscous", strategy=Strategy(iterations=6))
+    solver = Solver(dynamics="viscous", strategy=Strategy(iterations=4))
     body = finger(block(8, 3, sag=0.4), viscosity=5e-3)
     scene = Scene(body, Display(), Kaczmarek(), 2000.0, motion, solver=solver)
     simulate(scene, observers=[Observer()])

@@ -31,7 +31,13 @@ HARD = (
     "voltage.3000_V_from_the_first_step",
 )
 #: each has a cheaper neighbour above, or among the quick ones
-SLOW = ("friction.jump_up", "friction.stop_and_go", "motion.full_unloading", "voltage.3000_V_in_one_step")
+SLOW = (
+    "friction.jump_up",
+    "friction.stop_and_go",
+    "motion.full_unloading",
+    "voltage.3000_V_in_one_step",
+    "texture.wavelength_of_the_ridges_viscous",
+)
 
 
 @pytest.mark.parametrize("key", [*HARD, *(pytest.param(key, marks=pytest.mark.slow) for key in SLOW)])

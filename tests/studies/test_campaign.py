@@ -106,6 +106,7 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
+    "finger.ridge_scan": "a measured outline, which no generator can draw",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
@@ -494,8 +495,6 @@ def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
 
 # -- the property
 
-#: without an equilibrium that is found: a ridged pad without friction, drawn onto a rough profile
-OPEN = (20,)
 #: the normal suite's scenes, none of which takes more than a few seconds
 FEW = (3, 4, 5, 6, 7, 10, 11, 15, 16, 17)
 
@@ -513,6 +512,6 @@ def test_a_scene_nobody_chose_ends_in_equilibria(number):
 
 @pytest.mark.slow
 @pytest.mark.solver
-@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW, *OPEN}))
+@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW}))
 def test_more_scenes_nobody_chose_end_in_equilibria(number):
     ends_well(number)

@@ -315,7 +315,7 @@ def test_all_leaves_peers_out(monkeypatch, capsys):
     fake = types.SimpleNamespace(
         NAMES=studies.NAMES, APART=studies.APART, run=lambda name, *_: called.append(name)
     )
-    monkeypatch.setattr(cli, "_studies", lambda: fake)
+    monkeypatch.setattr(cli, "studies", lambda: fake)
     assert cli.main(["study", "all"]) == 0
     assert "peers" in studies.NAMES
     assert called == [name for name in studies.NAMES if name not in ("peers", "campaign")]
