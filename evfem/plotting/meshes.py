@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.colours import REGIONS
 from evfem.plotting.fields import rounds
-from evfem.plotting.figures import axes_or_new
+from evfem.plotting.figures import axes_or_new, whole_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,7 +20,9 @@ def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.collections import PolyCollection
 
-    ax = axes_or_new(ax)
+    own, ax = ax is None, axes_or_new(ax)
+    if own:  # a legend beside axes in true proportions is cut off otherwise
+        whole_figure(ax).set_layout_engine("compressed")
     outlines = mesh.points[rounds(mesh)]
     for (name, number), color in zip(mesh.region_names.items(), cycle(REGIONS), strict=False):
         cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")

@@ -33,6 +33,16 @@ def volume_change(H: Array) -> Array:
     return trace(H) + (middle + det(H))
 
 
+def projected(projection: Floats | None, sampled: Floats) -> Floats:
+    """Pi times values (C, S) at the samples: those at the points (C, Q); None is the unit matrix."""
+    return sampled if projection is None else (projection @ sampled[..., None])[..., 0]
+
+
+def gathered(projection: Floats | None, values: Floats) -> Floats:
+    """Transpose of `projected`: what acts at the points (C, Q), where ln J is sampled (C, S)."""
+    return values if projection is None else (values[:, None] @ projection)[:, 0]
+
+
 @dataclass(frozen=True, eq=False)
 class VolumeMeasure:
     """theta = Pi ln J of some cells: `gradient` (C, S, n, dim) of the shape functions where ln J
@@ -48,11 +58,11 @@ class VolumeMeasure:
         """theta (C, Q) from grad u (dim, dim, C, S) at the samples; nan where a cell is inverted."""
         with np.errstate(invalid="ignore", divide="ignore"):
             sampled = trace(H) if self.small_strain else np.log1p(volume_change(H))
-        return sampled if self.projection is None else (self.projection @ sampled[..., None])[..., 0]
+        return projected(self.projection, sampled)
 
     def at_samples(self, values: Floats) -> Floats:
         """Transpose of Pi: what acts on theta (C, Q), gathered where ln J is sampled (C, S)."""
-        return values if self.projection is None else (values[:, None] @ self.projection)[:, 0]
+        return gathered(self.projection, values)
 
     def slope(self, H: Floats) -> Floats:
         """d ln J / dF = F^-T, or the unit matrix of a trace, (dim, dim, C, S)."""
@@ -71,7 +81,7 @@ class VolumeMeasure:
         """d ln J by the nodal displacements, (C, S, n, dim)."""
         return self.gradient @ np.ascontiguousarray(self.slope(H).transpose(2, 3, 1, 0))
 
-    def pull(self, H: Floats, q: Floats) -> Floats:
+    def pressure_forces(self, H: Floats, q: Floats) -> Floats:
         """Nodal forces (C, n, dim) of q dtheta(v), with grad u (dim, dim, C, S) at the samples and
         the weighted q (C, Q).
         """
@@ -232,7 +242,7 @@ class Integral:
         flux = s[: m * self.parts.dim].reshape(m, -1, C, Q).transpose(2, 3, 0, 1)
         fe = np.swapaxes(self._rows.reshape(C, Q * m, n), 1, 2) @ flux.reshape(C, Q * m, -1)
         if self.parts.theta:
-            fe += self._volume.pull(state.sampled, s[-1])
+            fe += self._volume.pressure_forces(state.sampled, s[-1])
         return fe
 
     def cell_tangents(self, u: Floats, pressure: Floats | None = None) -> Floats:
@@ -272,7 +282,7 @@ class Integral:
 
     def cell_pressure_forces(self, u: Floats, q: Floats) -> Floats:
         """What q (C, Q) alone does on the nodes of each cell: q dtheta(v) at u, (C, n, dim)."""
-        return self._volume.pull(self.state(u).sampled, q * self.points.weight)
+        return self._volume.pressure_forces(self.state(u).sampled, q * self.points.weight)
 
     def _gradient_products(self, D: Floats) -> Floats:
         """B^T D B of value and gradient, D (m dim, m dim, C, Q), as (C, n, dim, n, dim)."""

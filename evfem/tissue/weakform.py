@@ -23,7 +23,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
-from evfem.tissue.assembly import Integral, UserIntegral, points_of
+from evfem.tissue.assembly import Integral, UserIntegral, gathered, points_of, projected
 from evfem.tissue.fields import Field, Parts
 from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
 from evfem.tissue.kernels.blocks import LANES, loops, padded, unblocked
@@ -82,9 +82,9 @@ class Tissue:
         weighted by a `pressure` (E, Q) of the iterations if one is given.
         """
         if self.loops is not None:
-            pull = None if pressure is None else self._pull(pressure)
+            sampled = None if pressure is None else self._sampled_pressure(pressure)
             data += self._shear.data(pattern)
-            self.loops.add_tangent(*self._request(u), pull, pattern.blocks, data)
+            self.loops.add_tangent(*self._request(u), sampled, pattern.blocks, data)
             return
         for _, integral in self.regions:
             cells = integral.points.cells
@@ -113,7 +113,9 @@ class Tissue:
         """Nodal forces (N, 2) of q (E, Q) alone: the integral of q dtheta(v) at u."""
         if self.loops is not None:
             out = np.zeros_like(u)
-            self.loops.volume_forces(self.space.cells, np.ascontiguousarray(u), self._pull(q), out)
+            self.loops.volume_forces(
+                self.space.cells, np.ascontiguousarray(u), self._sampled_pressure(q), out
+            )
             return out
         fe = np.empty((*self.space.nodes.shape, self.space.dim))
         for _, integral in self.regions:
@@ -162,16 +164,14 @@ class Tissue:
 
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
         """theta (E, Q) at u by the compiled loops, or its change along du (N, 2)."""
-        cells, projection = self.space.cells, self.space.projection
+        cells = self.space.cells
         sampled = np.empty((len(cells.nodes), self.space.samples, LANES))
         loops.log_volumes(cells, np.ascontiguousarray(u), du, sampled)
-        values = unblocked(sampled, len(self.space.nodes))
-        return values if projection is None else (projection @ values[..., None])[..., 0]
+        return projected(self.space.projection, unblocked(sampled, len(self.space.nodes)))
 
-    def _pull(self, q: Floats) -> Floats:
+    def _sampled_pressure(self, q: Floats) -> Floats:
         """What a pressure q (E, Q) is at the samples of ln J, in blocks (B, S, L)."""
-        weighted, projection = q * self.space.weight, self.space.projection
-        return padded(weighted if projection is None else (weighted[:, None] @ projection)[:, 0])
+        return padded(gathered(self.space.projection, q * self.space.weight))
 
     @cached_property
     def _shear(self) -> Componentwise:

@@ -33,7 +33,8 @@ SLOW = 30.0
 def draw(ends: list[Ending], slowness: Floats) -> Figure:
     """Counts of the classes above, iterations and CPU time of each scene below."""
     figure = new_figure(6.4, 9.0)
-    grid = figure.add_gridspec(2, 2, height_ratios=[1.0, 2.6])
+    kinds = len({one.outcome for one in ends})
+    grid = figure.add_gridspec(2, 2, height_ratios=[0.3 + 0.15 * kinds, 2.6])
     _counts(figure.add_subplot(grid[0, :]), ends)
     iterations = figure.add_subplot(grid[1, 0])
     _scatter(iterations, ends, [one.iterations for one in ends], "iterations")
@@ -57,7 +58,7 @@ def _counts(ax: Axes, ends: list[Ending]) -> None:
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter("")
     ax.tick_params(axis="y", length=0)
-    ax.set_ylim(max(len(seen), 4) - 0.5, -0.5)
+    ax.set_ylim(len(seen) - 0.5, -0.5)
     ax.spines[["top", "right"]].set_visible(False)
 
 

@@ -277,6 +277,18 @@ def test_regions_have_their_cells_and_names(kind):
     assert not np.array_equal(soft.get_facecolor(), hard.get_facecolor())
 
 
+def test_regions_stay_within_their_figure():
+    """Labels and legend beside axes in true proportions are not cut off."""
+    ax = regions(FingerPad(resolution="coarse").mesh())
+    figure = ax.figure
+    figure.savefig(io.BytesIO())
+    box = figure.get_tightbbox()
+    assert box.x0 >= 0.0
+    assert box.y0 >= 0.0
+    assert box.x1 <= figure.get_figwidth()
+    assert box.y1 <= figure.get_figheight()
+
+
 def test_contact_pressure_is_drawn_along_the_current_x_of_the_pad():
     result = fake_result("quad9")
     ax = contact_pressure(result, 0)

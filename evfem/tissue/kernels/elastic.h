@@ -2,19 +2,20 @@
    of a cell has modes that are orthonormal in its area, theta = sum_m c_m phi_m, c_m = sum_s Psi_ms ln
    J_s; with a_m the integral of phi_m
 
-       volume energy  sum_m lmbda/2 c_m^2 - mu a_m c_m,   pull_s = sum_m Psi_ms (lmbda c_m - mu a_m)
-       forces         mu F : grad v at the points, pull F^-T : grad v at the samples
+       volume energy  sum_m lmbda/2 c_m^2 - mu a_m c_m,   pressure_s = sum_m Psi_ms (lmbda c_m - mu a_m)
+       forces         mu F : grad v at the points, pressure F^-T : grad v at the samples
        tangent        mu grad v : grad w (constant, not here) + lmbda sum_m r_m r_m^T
-                      - sum_s pull_s F^-T grad(w)^T F^-T : grad v,  r_m = sum_s Psi_ms F^-T : grad v
+                      - sum_s pressure_s F^-T grad(w)^T F^-T : grad v,  r_m = sum_s Psi_ms F^-T : grad v
 
-   Without modes theta = ln J at every point: Psi = sqrt(w), one mode for each. */
+   pressure_s is what works with ln J_s, with its weight. Without modes theta = ln J at every point: Psi
+   = sqrt(w), one mode for each. */
 
 #include "cells.h"
 
-/* One block's state of the volume: F^-T and ln J at the samples, and the pull on each; returns the
+/* One block's state of the volume: F^-T and ln J at the samples, and the pressure on each; returns the
    volume's energy and keeps the smallest J. */
 INLINE lanes volume(const mesh *m, Py_ssize_t b, int n, const lanes *ue, lanes mu, lanes lmbda,
-                    tensor *inverse, lanes *pull, double *smallest) {
+                    tensor *inverse, lanes *pressure, double *smallest) {
     const points *sample = m->modes ? &m->sample : &m->at;
     lanes log_J[MOST_POINTS], energy = {0};
     for (int s = 0; s < sample->count; s++) {
@@ -27,17 +28,17 @@ INLINE lanes volume(const mesh *m, Py_ssize_t b, int n, const lanes *ue, lanes m
             if (!(1.0 + e[i] >= *smallest)) *smallest = 1.0 + e[i];
         if (!m->modes) {
             lanes w = m->weight[b * sample->count + s];
-            pull[s] = w * (lmbda * log_J[s] - mu);
+            pressure[s] = w * (lmbda * log_J[s] - mu);
             energy += w * log_J[s] * (0.5 * lmbda * log_J[s] - mu);
         } else
-            pull[s] = (lanes){0};
+            pressure[s] = (lanes){0};
     }
     for (int j = 0; j < m->modes; j++) {
         const stored *psi = m->psi + (b * m->modes + j) * sample->count;
         lanes c = {0}, mean = m->mean[b * m->modes + j];
         for (int s = 0; s < sample->count; s++) c += psi[s] * log_J[s];
         energy += c * (0.5 * lmbda * c - mu * mean);
-        for (int s = 0; s < sample->count; s++) pull[s] += psi[s] * (lmbda * c - mu * mean);
+        for (int s = 0; s < sample->count; s++) pressure[s] += psi[s] * (lmbda * c - mu * mean);
     }
     return energy;
 }
@@ -49,10 +50,10 @@ INLINE double elastic_forces(const mesh *m, int n, const double *u, const stored
     lanes total = {0};
     *smallest = INFINITY;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
-        lanes ue[2 * MOST_NODES], fe[2 * MOST_NODES] = {{0}}, pull[MOST_POINTS];
+        lanes ue[2 * MOST_NODES], fe[2 * MOST_NODES] = {{0}}, pressure[MOST_POINTS];
         tensor inverse[MOST_POINTS];
         gather(u, m->nodes + b * n * LANES, n, ue);
-        total += volume(m, b, n, ue, mu[b], lmbda[b], inverse, pull, smallest);
+        total += volume(m, b, n, ue, mu[b], lmbda[b], inverse, pressure, smallest);
         for (int q = 0; q < at->count; q++) {
             const double *g = at->reference + 2 * n * q;
             const stored *A = at->inverse + 4 * (b * at->count + q);
@@ -62,13 +63,13 @@ INLINE double elastic_forces(const mesh *m, int n, const double *u, const stored
             total += w * (H.xx + H.yy) + 0.5 * w * (H.xx * H.xx + H.xy * H.xy + H.yx * H.yx + H.yy * H.yy);
             tensor P = {w * (1.0 + H.xx), w * H.xy, w * H.yx, w * (1.0 + H.yy)};
             if (!m->modes) {
-                tensor T = scaled(pull[q], inverse[q]);
+                tensor T = scaled(pressure[q], inverse[q]);
                 P = (tensor){P.xx + T.xx, P.xy + T.xy, P.yx + T.yx, P.yy + T.yy};
             }
             add_forces(P, g, A, n, fe);
         }
         for (int s = 0; s < (m->modes ? m->sample.count : 0); s++)
-            add_forces(scaled(pull[s], inverse[s]), m->sample.reference + 2 * n * s,
+            add_forces(scaled(pressure[s], inverse[s]), m->sample.reference + 2 * n * s,
                        m->sample.inverse + 4 * (b * m->sample.count + s), n, fe);
         spread(fe, m->nodes + b * n * LANES, n, out);
     }
@@ -87,27 +88,27 @@ INLINE void scatter(tensor K, const int32_t *place, double *data) {
 }
 
 /* What changes of the tangent, added to the matrix: pairs k <= l of nodes, places (B, pairs, 4,
-   LANES). The curvature of ln J is weighted with the law's own pull, or with a given one (B, S). */
+   LANES). The curvature of ln J is weighted with the law's own pressure, or with a given one (B, S). */
 INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored *mu,
                             const stored *lmbda, const stored *given, const int32_t *places,
                             double *data) {
     const points *sample = m->modes ? &m->sample : &m->at;
     int S = sample->count, rank = m->modes ? m->modes : S;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
-        lanes ue[2 * MOST_NODES], pull[MOST_POINTS];
+        lanes ue[2 * MOST_NODES], pressure[MOST_POINTS];
         double smallest = INFINITY;
-        lanes push[MOST_POINTS][2 * MOST_NODES], pulled[MOST_POINTS][2 * MOST_NODES];
+        lanes push[MOST_POINTS][2 * MOST_NODES], weighted[MOST_POINTS][2 * MOST_NODES];
         lanes modes[MOST_POINTS][2 * MOST_NODES], stiff[MOST_POINTS][2 * MOST_NODES];
         lanes(*row)[2 * MOST_NODES] = m->modes ? modes : push;
         tensor inverse[MOST_POINTS];
         gather(u, m->nodes + b * n * LANES, n, ue);
-        volume(m, b, n, ue, mu[b], lmbda[b], inverse, pull, &smallest);
+        volume(m, b, n, ue, mu[b], lmbda[b], inverse, pressure, &smallest);
         for (int s = 0; s < S; s++) {
             memset(push[s], 0, sizeof(lanes) * 2 * n);
             add_forces(inverse[s], sample->reference + 2 * n * s, sample->inverse + 4 * (b * S + s), n,
                        push[s]);
-            if (given) pull[s] = given[b * S + s];
-            for (int k = 0; k < 2 * n; k++) pulled[s][k] = pull[s] * push[s][k];
+            if (given) pressure[s] = given[b * S + s];
+            for (int k = 0; k < 2 * n; k++) weighted[s][k] = pressure[s] * push[s][k];
         }
         for (int j = 0; j < rank; j++) {
             const stored *psi = m->psi + (b * m->modes + j) * S;
@@ -129,10 +130,10 @@ INLINE void elastic_tangent(const mesh *m, int n, const double *u, const stored 
                     K.yy += stiff[j][2 * k + 1] * row[j][2 * l + 1];
                 }
                 for (int s = 0; s < S; s++) {
-                    K.xx -= pulled[s][2 * l] * push[s][2 * k];
-                    K.xy -= pulled[s][2 * l] * push[s][2 * k + 1];
-                    K.yx -= pulled[s][2 * l + 1] * push[s][2 * k];
-                    K.yy -= pulled[s][2 * l + 1] * push[s][2 * k + 1];
+                    K.xx -= weighted[s][2 * l] * push[s][2 * k];
+                    K.xy -= weighted[s][2 * l] * push[s][2 * k + 1];
+                    K.yx -= weighted[s][2 * l + 1] * push[s][2 * k];
+                    K.yy -= weighted[s][2 * l + 1] * push[s][2 * k + 1];
                 }
                 scatter(K, place, data);
             }
@@ -162,8 +163,8 @@ INLINE void log_volumes(const mesh *m, int n, const double *u, const double *du,
     }
 }
 
-/* Nodal forces pull F^-T : grad v of a given pull (B, S), added to out (N, 2). */
-INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *pull, double *out) {
+/* Nodal forces pressure F^-T : grad v of a given pressure (B, S), added to out (N, 2). */
+INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *pressure, double *out) {
     const points *sample = m->modes ? &m->sample : &m->at;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         lanes ue[2 * MOST_NODES], fe[2 * MOST_NODES] = {{0}};
@@ -173,7 +174,7 @@ INLINE void volume_forces(const mesh *m, int n, const double *u, const stored *p
             const double *g = sample->reference + 2 * n * s;
             const stored *A = sample->inverse + 4 * point;
             tensor H = displacement_gradient(ue, g, A, n);
-            add_forces(scaled(pull[point], inverse_transposed(H, volume_change(H))), g, A, n, fe);
+            add_forces(scaled(pressure[point], inverse_transposed(H, volume_change(H))), g, A, n, fe);
         }
         spread(fe, m->nodes + b * n * LANES, n, out);
     }

@@ -28,9 +28,9 @@
     ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) {\
         SIZED(log_volumes, u, du, out)                                                                   \
     }                                                                                                    \
-    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pull,           \
+    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pressure,           \
                                            double *out) {                                                \
-        SIZED(volume_forces, u, pull, out)                                                               \
+        SIZED(volume_forces, u, pressure, out)                                                               \
     }                                                                                                    \
     ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
     ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                      \
@@ -175,11 +175,11 @@ static void *hold_samples(request *r, PyObject *array, int writable) {
 }
 
 static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
-    PyObject *cells, *u, *mu, *lmbda, *pull, *places, *data;
+    PyObject *cells, *u, *mu, *lmbda, *pressure, *places, *data;
     request r;
-    if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pull, &places, &data)) return NULL;
+    if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pressure, &places, &data)) return NULL;
     read_request(&r, cells, u, mu, lmbda, 0);
-    const stored *given = pull == Py_None ? NULL : hold_samples(&r, pull, 0);
+    const stored *given = pressure == Py_None ? NULL : hold_samples(&r, pressure, 0);
     const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * 4 * LANES, 0);
     double *values = hold(&r.all, data, 'd', -1, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
@@ -204,11 +204,11 @@ static PyObject *call_log_volumes(PyObject *self, PyObject *args) {
 }
 
 static PyObject *call_volume_forces(PyObject *self, PyObject *args) {
-    PyObject *cells, *u, *pull, *out;
+    PyObject *cells, *u, *pressure, *out;
     request r;
-    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &pull, &out)) return NULL;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &pressure, &out)) return NULL;
     Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
-    const stored *given = hold_samples(&r, pull, 0);
+    const stored *given = hold_samples(&r, pressure, 0);
     double *force = hold(&r.all, out, 'd', 2 * size, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
@@ -274,12 +274,12 @@ static PyMethodDef methods[] = {
     {"forces", call_forces, METH_VARARGS,
      "forces(cells, u, mu, lmbda, out): add the nodal forces (N, 2); stored energy and smallest J."},
     {"add_tangent", call_add_tangent, METH_VARARGS,
-     "add_tangent(cells, u, mu, lmbda, pull, places, data): add what changes of the tangent; its\n"
-     "curvature of ln J is weighted with pull (B, S, LANES), or with the law's own if that is None."},
+     "add_tangent(cells, u, mu, lmbda, pressure, places, data): add what changes of the tangent; its\n"
+     "curvature of ln J is weighted with pressure (B, S, LANES), or with the law's own if that is None."},
     {"log_volumes", call_log_volumes, METH_VARARGS,
      "log_volumes(cells, u, du, out): ln J (B, S, LANES), or its change along du if that is not None."},
     {"volume_forces", call_volume_forces, METH_VARARGS,
-     "volume_forces(cells, u, pull, out): add the nodal forces (N, 2) of pull (B, S, LANES)."},
+     "volume_forces(cells, u, pressure, out): add the nodal forces (N, 2) of pressure (B, S, LANES)."},
     {"smallest_J", call_smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
     {"strains", call_strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, 3, LANES)."},
     {"viscous", call_viscous, METH_VARARGS,
