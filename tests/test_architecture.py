@@ -79,7 +79,7 @@ NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
 LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
 #: compiled from C, without imports
-BUILT = {"evfem.tissue.kernels.loops"}
+BUILT = {"evfem.tissue.kernels.loops", "evfem.tissue.kernels.solids"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 
 
