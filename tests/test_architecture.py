@@ -31,11 +31,11 @@ ROOMS = {
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics charges alternating forces signals wav timesignals encoding hjif signalfile",
+        "laws dielectrics charges alternating forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "surfaces textures own pad edge charging attraction signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -44,7 +44,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "timescales plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},

@@ -24,9 +24,10 @@ import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
+from evfem.contact.charging import Charged, Charging
 from evfem.contact.pad import Pad, surface_state
-from evfem.electrostatics.laws import traction_derivative
-from evfem.tensor import mul, positive_part
+from evfem.electrostatics.laws import GAP_STEP, traction_derivative
+from evfem.tensor import derivative, mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
 
 #: gaps up to this (mm) count as closed
@@ -57,6 +58,32 @@ class Attraction:
     surface: Any
     direction: str = "vertical"
     air_layer: bool = True
+    charging: Charging | None = None
+
+    def acts(self, voltage: float) -> bool:
+        """Whether anything attracts at this voltage: charges may without it."""
+        return voltage != 0.0 or self.charging is not None
+
+    @property
+    def no_charges(self) -> Floats:
+        """Charges (2, P) of an uncharged pad, (2, 0) where charges do not move."""
+        return np.zeros((2, 0)) if self.charging is None else self.charging.none
+
+    def _seen(self, gap: Any, voltage: float, x: Floats) -> Any:
+        """The voltage that the law sees at gaps (P,) of nodes at x (P,): that of the charges, too."""
+        if self.charging is None:
+            return voltage
+        return self.charging.effective(gap, voltage, self.pad.length(x))
+
+    def charged(self, position: Floats, voltage: float, charges: Floats | None = None) -> Charged:
+        """The electric state at positions (P, 2): with the charges (2, P), or those at the end of
+        the present step.
+        """
+        assert self.charging is not None
+        gap = np.maximum(surface_state(self.surface, position).gap, 0.0)
+        length = self.pad.length(position[:, 0])
+        found = self.charging.after(gap, voltage, length) if charges is None else charges
+        return Charged(found, voltage, gap, length)
 
     def forces(self, position: Floats, voltage: float, touching: Any) -> Floats:
         """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
@@ -66,13 +93,13 @@ class Attraction:
 
     def forces_along(self, positions: Floats, voltages: Floats, touching: Any) -> Floats:
         """`forces` at W places of a way (W, P, 2), from positions (W, P, 2) and voltages (W,)."""
-        if not voltages.any():
+        if not voltages.any() and self.charging is None:
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
         gaps = np.maximum(frame.gap, 0.0).reshape(len(positions), -1)
-        pairs = list(zip(gaps, voltages.tolist(), strict=True))
-        on = 1.0 if self.air_layer else touching.astype(float)
         x = positions[..., 0]
+        pairs = [(gap, self._seen(gap, u, at)) for gap, u, at in zip(gaps, voltages.tolist(), x, strict=True)]
+        on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.length(x)
         if self.direction == "vertical":
@@ -88,12 +115,22 @@ class Attraction:
 
     def negative_stiffness(self, position: Floats, voltage: float, touching: Any) -> Floats:
         """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm
-        per mm; 0 where it touches: there contact holds the gap.
+        per mm; 0 where it touches, where contact holds the gap, and where losses make it grow with
+        the gap: that stabilises, and the iterations do without it.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
-        rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
-        return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
+        rate = self._weakening(np.maximum(gap, 0.0), voltage, position[:, 0])
+        weakening = -on * rate * self.pad.length(position[:, 0])
+        return np.where((gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
+
+    def _weakening(self, gap: Floats, voltage: float, x: Floats) -> Any:
+        """dp/dg (P,) in MPa/mm, the charges of the present step following the gap."""
+        if self.charging is None:
+            return traction_derivative(self.law, gap, voltage, self.layers)
+        return derivative(
+            lambda g: self.law.traction(g, self._seen(g, voltage, x), self.layers), gap, GAP_STEP
+        )
 
     def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
         """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
@@ -103,7 +140,8 @@ class Attraction:
         frame = surface_state(self.surface, position)
         length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
-        p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
+        gap = np.maximum(frame.gap, 0.0)
+        p = on * self.law.traction(gap, self._seen(gap, voltage, position[:, 0]), self.layers)
         dp = -self.negative_stiffness(position, voltage, touching)
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)

@@ -243,6 +243,8 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    if scene.drive is not None and scene.drive.resolved:
+        raise InputError("drive", "resolved in time", "the mean over the cycle with the fast model")
     if isinstance(scene.voltage, FollowForce):
         raise InputError("voltage", "FollowForce", "a number or a VoltageProfile with the fast model")
 

@@ -68,7 +68,16 @@ class Ledger:
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
+            "field_energy": self._field_energy(state),
         }
+
+    def _field_energy(self, state: State) -> float:
+        """Energy of the field under a voltage that is resolved in time, else 0."""
+        attraction = self.model.attraction
+        if attraction is None or attraction.charging is None:
+            return 0.0
+        position = self.model.equilibrium.interface.resting(state)
+        return attraction.charging.field_energy(attraction.charged(position, state.voltage, state.charges))
 
 
 def shares(model: Model, position: Floats) -> Floats:

@@ -162,13 +162,13 @@ class Linearisation:
 
     def negative_stiffness(self, state: State) -> Floats:
         """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         return self.attraction.negative_stiffness(self.interface.resting(state), state.voltage, self.touching)
 
     def gain_on_closing(self, state: State) -> Floats:
         """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
         now, closed = (
@@ -181,9 +181,9 @@ class Linearisation:
         """The attraction's stiffness on the candidates but for the weakening with a node's own
         gap, which belongs to the contact problem: what is left are changes of tributary lengths.
         None without attraction, or where they are faint: a symmetric compliance takes a third of
-        the time.
+        the time. None with charges too, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
             return None
         position, c = self.interface.resting(state), self.candidates
         whole = self.attraction.stiffness(position, state.voltage, self.touching)

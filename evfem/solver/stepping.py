@@ -17,7 +17,7 @@ step in which the finger snaps again and again comes to its end.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -99,9 +99,17 @@ class Stepper:
         return rest
 
     def solve(self, state: State, target: Target) -> State:
-        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction
-        found beforehand.
-        """
+        """One equilibrium with the coupling asked for; where charges move, they follow."""
+        attraction, interface = self.equilibrium.attraction, self.equilibrium.interface
+        if attraction is None or attraction.charging is None:
+            return self._coupled(state, target)
+        old = attraction.charged(interface.resting(state), state.voltage, state.charges)
+        attraction.charging.begin(old, target.duration)
+        new = self._coupled(state, target)
+        return replace(new, charges=attraction.charged(interface.resting(new), new.voltage).charges)
+
+    def _coupled(self, state: State, target: Target) -> State:
+        """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:
             return equilibrium.step(state, target)
