@@ -19,7 +19,8 @@ BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
 has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can.
+only where it can. Between rough faces it also grows with what presses the node, by kappa lam_n
+(`gain_on_pressing`), so that a closed node moves the body with (1 - kappa) lam_n.
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -87,12 +88,14 @@ class ExtraUnknowns:
 class AttractionStiffness:
     """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
     per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0.
+    `gain_on_closing` (k,) at g = 0 without a contact force, and by `gain_on_pressing` (k,), below
+    1, times the contact force more with it (None: not at all).
     """
 
     negative_stiffness: Floats
     reference_gap: Floats
     gain_on_closing: Floats
+    gain_on_pressing: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,7 @@ def solve_with_attraction(
     `STABLE` of the critical value, which goes the right way in small steps; with `snap` the nodes
     that are being lost close instead.
     """
-    if not attraction.negative_stiffness.any():
+    if not attraction.negative_stiffness.any() and attraction.gain_on_pressing is None:
         return solve_contact(problem, status)
     attracted = replace(problem, attraction=attraction)
     root = np.sqrt(attraction.negative_stiffness)
@@ -269,6 +272,10 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
     rows = np.concatenate([active, k + stick, attracted])
     matrix = C[np.ix_(rows, rows)]
+    gain = np.zeros(active.size)
+    if problem.attraction is not None and problem.attraction.gain_on_pressing is not None:
+        gain = problem.attraction.gain_on_pressing[active]
+        matrix[:, : active.size] *= 1.0 - gain
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
@@ -282,6 +289,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         right[own] += problem.attraction.reference_gap[attracted]
     if extra is not None:
         row = extra.rows[:, rows]
+        row[:, : active.size] *= 1.0 - gain
         row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
         matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
         right = np.append(right, extra.right - extra.rows @ drop)
@@ -293,6 +301,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
     drop[attracted] = x[contact : rows.size]
+    drop[active] -= gain * x[: active.size]
     force[k:] += ratio * force[:k]
     return force, drop, x[rows.size :]
 

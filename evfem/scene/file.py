@@ -24,6 +24,7 @@ from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import INSULATORS, Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.layers import TABLE_2, Moduli
@@ -31,6 +32,7 @@ from evfem.finger.scan import RidgeScan
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
+    ROUGHNESS,
     SURFACES,
     ElectricalTable,
     ElectrostaticsTable,
@@ -209,7 +211,19 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
     same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
+    same["roughness_gap"] = _roughness(table.roughness_gap)
     return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
+
+
+def _roughness(given: float | Mapping[str, Any]) -> Any:
+    """The gap between rough faces: a length, or a law by its name."""
+    key = "electrostatics.roughness_gap"
+    if not isinstance(given, Mapping):
+        return given
+    model, cls = ROUGHNESS[kind_of(given, key, ROUGHNESS, "law")]
+    parsed: Any = parse(model, given, key)
+    with at(key):
+        return cls(**parsed.model_dump(exclude={"law"}))
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:
@@ -367,4 +381,15 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     table |= voltage_keys(scene.voltage)
     insulator = scene.ground.insulator
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
+    if (rough := scene.roughness_gap) != 0.0:
+        table["roughness_gap"] = _roughness_key(rough)
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}
+
+
+def _roughness_key(rough: Any) -> Any:
+    if isinstance(rough, float):
+        return rough
+    if type(rough) not in ROUGHNESS_LAWS.values():
+        allowed = f"a length or {', '.join(cls.__name__ for cls in ROUGHNESS_LAWS.values())}, for a file"
+        raise InputError("electrostatics.roughness_gap", type(rough).__name__, allowed)
+    return {"law": rough.law, **_changed(rough)}

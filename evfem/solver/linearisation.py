@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import FAINT, LONGER, NEIGHBOURS, SHORTER, SLOW, SPARE, STALLED, STEEP
+from evfem.common.constants import FAINT, LONGER, NEIGHBOURS, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
@@ -164,18 +164,36 @@ class Linearisation:
         """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
-        return self.attraction.negative_stiffness(self.interface.resting(state), state.voltage, self.touching)
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
-        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        """What the attraction of every pad node gains when its gap closes (P,) in N/mm, at no
+        contact force.
+        """
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
+        pressing = state.contact_force[:, 0]
         now, closed = (
-            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching)[:, 1]
+            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching, pressing)[:, 1]
             for s in (state, everywhere)
         )
-        return np.maximum(now - closed, 0.0)
+        gain, on_pressing = np.maximum(now - closed, 0.0), self.gain_on_pressing(state)
+        return gain if on_pressing is None else gain - on_pressing * pressing
+
+    def gain_on_pressing(self, state: State) -> Floats | None:
+        """What the attraction of every pad node gains per contact force (P,), where rough faces
+        come closer; None without them. What grows faster than the contact force itself would find
+        no equilibrium: it is cut to `STABLE`.
+        """
+        attraction = self.attraction
+        if attraction is None or attraction.roughness is None or state.voltage == 0.0 or self.frozen:
+            return None
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return np.minimum(
+            attraction.gain_on_pressing(place, state.voltage, self.touching, pressing), STABLE
+        )
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own
@@ -186,7 +204,8 @@ class Linearisation:
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return None
         position, c = self.interface.resting(state), self.candidates
-        whole = self.attraction.stiffness(position, state.voltage, self.touching)
+        pressing = state.contact_force[:, 0]
+        whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
         unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())
