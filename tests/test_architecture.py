@@ -29,7 +29,10 @@ ROOMS = {
         "space pattern assembly weakform userforms dynamics drag body",
     ),
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "electrostatics": (
+        {"numpy", "scipy"},
+        "laws roughness forces signals wav timesignals encoding hjif signalfile",
+    ),
     "contact": (
         {"numpy", "scipy"},
         "surfaces textures own pad edge attraction signorini follower condensed stability",

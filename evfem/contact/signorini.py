@@ -19,8 +19,9 @@ BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
 has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can. Between rough faces it also grows with what presses the node, by kappa lam_n
-(`gain_on_pressing`), so that a closed node moves the body with (1 - kappa) lam_n.
+only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
+closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
+gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -85,17 +86,30 @@ class ExtraUnknowns:
 
 
 @dataclass(frozen=True)
+class Roughness:
+    """Attraction of nodes between rough faces: stronger by `gain` (k,), below 1, times the contact
+    force, and weaker by `loss_on_opening` (k,) N/mm where a node opens that touched.
+    """
+
+    gain: Floats
+    loss_on_opening: Floats
+
+    def of(self, nodes: Ints) -> Roughness:
+        """Of these nodes alone."""
+        return Roughness(self.gain[nodes], self.loss_on_opening[nodes])
+
+
+@dataclass(frozen=True)
 class AttractionStiffness:
     """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
     per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0 without a contact force, and by `gain_on_pressing` (k,), below
-    1, times the contact force more with it (None: not at all).
+    `gain_on_closing` (k,) at g = 0, without a contact force. `roughness` says how it depends on that.
     """
 
     negative_stiffness: Floats
     reference_gap: Floats
     gain_on_closing: Floats
-    gain_on_pressing: Floats | None = None
+    roughness: Roughness | None = None
 
 
 @dataclass(frozen=True)
@@ -206,7 +220,7 @@ def solve_with_attraction(
     `STABLE` of the critical value, which goes the right way in small steps; with `snap` the nodes
     that are being lost close instead.
     """
-    if not attraction.negative_stiffness.any() and attraction.gain_on_pressing is None:
+    if not attraction.negative_stiffness.any() and attraction.roughness is None:
         return solve_contact(problem, status)
     attracted = replace(problem, attraction=attraction)
     root = np.sqrt(attraction.negative_stiffness)
@@ -273,8 +287,9 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     rows = np.concatenate([active, k + stick, attracted])
     matrix = C[np.ix_(rows, rows)]
     gain = np.zeros(active.size)
-    if problem.attraction is not None and problem.attraction.gain_on_pressing is not None:
-        gain = problem.attraction.gain_on_pressing[active]
+    rough = None if problem.attraction is None else problem.attraction.roughness
+    if rough is not None:
+        gain = rough.gain[active]
         matrix[:, : active.size] *= 1.0 - gain
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
@@ -283,6 +298,8 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     drop = np.zeros(2 * k)
     if problem.attraction is not None:
         drop[active] = -problem.attraction.gain_on_closing[active]
+        if rough is not None:
+            drop[:k] += np.where(status == OPEN, rough.loss_on_opening, 0.0)
         right -= C[rows] @ drop
         own = np.arange(rows.size - attracted.size, rows.size)
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
@@ -300,7 +317,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     force = np.zeros(2 * k)
     contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
-    drop[attracted] = x[contact : rows.size]
+    drop[attracted] += x[contact : rows.size]
     drop[active] -= gain * x[: active.size]
     force[k:] += ratio * force[:k]
     return force, drop, x[rows.size :]

@@ -159,8 +159,7 @@ StrategyTable = derived(Strategy)
 OutputTable = derived(Output)
 
 ROUGHNESS: Mapping[str, tuple[type[Table], type]] = {
-    name: (derived(cls, law=(Literal[name], required("a law"))), cls)
-    for name, cls in ROUGHNESS_LAWS.items()
+    name: (derived(cls, law=(Literal[name], required("a law"))), cls) for name, cls in ROUGHNESS_LAWS.items()
 }
 SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,

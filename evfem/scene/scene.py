@@ -149,10 +149,10 @@ class Scene:
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
     position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
     `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. `roughness_gap` (mm, or a `RoughnessLaw`) is what rough
-    skin keeps between itself and the insulator where they touch. `depth` (mm) is how deep the plane finger is meant to
-    be; it changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything
-    that does not fit together.
+    touching nodes carry electrostatic force. `roughness_gap` (mm, or a `RoughnessLaw`) is what
+    rough skin keeps between itself and the insulator where they touch. `depth` (mm) is how deep the
+    plane finger is meant to be; it changes no number but adds `Result.total`, in N and mm2. Raises
+    InputError for anything that does not fit together.
     """
 
     finger: Finger

@@ -225,10 +225,10 @@ class FactorisedBody:
         """The linear contact problem at an iterate."""
         linearisation = self.linearisation
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
-        c, on_pressing = linearisation.candidates, linearisation.gain_on_pressing(state)
+        c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
-        if on_pressing is not None:
-            known = replace(known, gain_on_pressing=on_pressing[c])
+        if rough is not None:
+            known = replace(known, roughness=rough.of(c))
         return LinearContactStep(
             body=linearisation.tangent,
             candidates=known,

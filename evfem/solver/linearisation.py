@@ -25,7 +25,7 @@ from evfem.common.constants import FAINT, LONGER, NEIGHBOURS, SHORTER, SLOW, SPA
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
-from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
@@ -179,21 +179,23 @@ class Linearisation:
             self.attraction.forces(self.interface.resting(s), state.voltage, self.touching, pressing)[:, 1]
             for s in (state, everywhere)
         )
-        gain, on_pressing = np.maximum(now - closed, 0.0), self.gain_on_pressing(state)
-        return gain if on_pressing is None else gain - on_pressing * pressing
+        gain, rough = np.maximum(now - closed, 0.0), self.roughness(state)
+        return gain if rough is None else gain - rough.gain * pressing
 
-    def gain_on_pressing(self, state: State) -> Floats | None:
-        """What the attraction of every pad node gains per contact force (P,), where rough faces
-        come closer; None without them. What grows faster than the contact force itself would find
-        no equilibrium: it is cut to `STABLE`.
+    def roughness(self, state: State) -> Roughness | None:
+        """How the attraction of every pad node depends on its contact force, where rough faces come
+        closer under it; None without them. What grows faster than the contact force itself would
+        find no equilibrium: it is cut to `STABLE`.
         """
         attraction = self.attraction
         if attraction is None or attraction.roughness is None or state.voltage == 0.0 or self.frozen:
             return None
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
-        return np.minimum(
-            attraction.gain_on_pressing(place, state.voltage, self.touching, pressing), STABLE
+        unpressed, pressed = (
+            attraction.forces(place, state.voltage, self.touching, each)[:, 1] for each in (None, pressing)
         )
+        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
+        return Roughness(np.minimum(gain, STABLE), unpressed - pressed)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own
