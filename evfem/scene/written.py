@@ -17,9 +17,9 @@ from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
-from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.scan import RidgeScan
