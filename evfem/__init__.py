@@ -32,6 +32,7 @@ _NAMES = {
         "TOUCHSCREEN",
         "eps_0",
     ),
+    "electrostatics.roughness": ("ConstantRoughness", "ExponentialRoughness", "PowerRoughness"),
     "electrostatics.signalfile": ("Playback", "read_signal", "write_signal"),
     "electrostatics.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
     "electrostatics.timesignals": ("Carrier", "Sampled", "Sine"),

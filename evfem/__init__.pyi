@@ -30,6 +30,9 @@ from evfem.electrostatics.laws import Layer as Layer
 from evfem.electrostatics.laws import Layers as Layers
 from evfem.electrostatics.laws import StrongTroxel as StrongTroxel
 from evfem.electrostatics.laws import eps_0 as eps_0
+from evfem.electrostatics.roughness import ConstantRoughness as ConstantRoughness
+from evfem.electrostatics.roughness import ExponentialRoughness as ExponentialRoughness
+from evfem.electrostatics.roughness import PowerRoughness as PowerRoughness
 from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal

@@ -31,7 +31,8 @@ ROOMS = {
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics charges alternating forces signals wav timesignals encoding hjif signalfile",
+        "laws dielectrics charges alternating roughness forces signals wav timesignals encoding hjif "
+        "signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
