@@ -41,7 +41,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution drift sense plan",
+        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},
@@ -248,6 +248,17 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
         "ev.NeoHookean(E=1.0, nu=0.3), ev.Sinusoid(), ev.VoltageProfile([0.0], [1.0])\n"
         "ev.Scene(ev.FingerPad(), ev.Display(), motion=[ev.Press(force=0.1)])\n"
         "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio', 'pydantic'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    assert fresh_process(code) == "[]"
+
+
+def test_a_press_loads_no_package_that_it_has_no_use_for():
+    code = (
+        "import evfem as ev\n"
+        "finger = ev.FingerPad(ridges=False, resolution='coarse')\n"
+        "ev.simulate(ev.Scene(finger, ev.Flat(), motion=[ev.Press(indentation=0.05, steps=1)]))\n"
+        "heavy = {'pydantic', 'scipy.spatial', 'scipy.optimize', 'tqdm', 'matplotlib', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     assert fresh_process(code) == "[]"
