@@ -54,6 +54,8 @@ _NAMES = {
     "sweeps.run": ("SweepResult", "sweep"),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
+    "textures.texture": ("Texture",),
+    "textures.touch": ("Touch",),
     "tissue.forms": ("form", "grad"),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
 }

@@ -91,6 +91,8 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.textures.texture import Texture as Texture
+from evfem.textures.touch import Touch as Touch
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form
 from evfem.tissue.forms import grad as grad
