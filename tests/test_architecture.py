@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -31,7 +31,8 @@ ROOMS = {
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics charges alternating forces signals wav timesignals drive encoding hjif signalfile",
+        "laws dielectrics charges alternating roughness forces signals wav timesignals drive encoding hjif "
+        "signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
@@ -57,6 +58,10 @@ ROOMS = {
         "samples file schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
+    "textures": (
+        {"numpy", "scipy", "PIL", "SurfaceTopography"},
+        "texture generate library cleaning importing scans parametric touch estimators database commands",
+    ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
@@ -75,7 +80,18 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
+LATE = {
+    "skfem",
+    "meshio",
+    "matplotlib",
+    "PIL",
+    "pypardiso",
+    "tqdm",
+    "distributed",
+    "pyarrow",
+    "pandas",
+    "SurfaceTopography",
+}
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

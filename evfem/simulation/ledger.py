@@ -77,7 +77,9 @@ class Ledger:
         if attraction is None or attraction.charging is None:
             return 0.0
         position = self.model.equilibrium.interface.resting(state)
-        return attraction.charging.field_energy(attraction.charged(position, state.voltage, state.charges))
+        pressing = state.contact_force[:, 0]
+        at = attraction.charged(position, state.voltage, pressing, state.charges)
+        return attraction.charging.field_energy(at)
 
 
 def shares(model: Model, position: Floats) -> Floats:

@@ -15,6 +15,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.laws import Layers
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
@@ -122,10 +123,10 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attract
     thickness = np.broadcast_to(thickness, pad.nodes.shape).astype(float)
     skin, insulator = solids(scene, thickness, electrical.stratum_corneum_eps_r)
     law, layers = attracting(scene, skin, insulator)
-    charging = None
+    rough, charging = roughness_of(scene.roughness_gap), None
     if scene.drive is not None and scene.drive.resolved:
         charging = Charging(sandwich(scene, skin, insulator), pad.nodes.size)
-    return Attraction(law, layers, pad, surface, scene.direction, scene.air_layer, charging)
+    return Attraction(law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -56,7 +56,8 @@ and the voltage that it had, which is the way of :math:`W_e`, and then charge fl
 
 with the ``field_energy`` of skin, gap and insulator and the work W_a of the field on the tributary
 lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction does not do and
-which is part of ``integrator_dissipation``.
+which is part of ``integrator_dissipation``. This holds for Strong and Troxel's law, which is the
+pressure of that field, and lacks the work on a roughness gap that changes with the load.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
@@ -224,7 +225,7 @@ class Part:
             return Flow(0.0, 0.0)
         charging = attraction.charging
         position = self.model.equilibrium.interface.resting(new)
-        flow = charging.flow(attraction.charged(position, new.voltage, new.charges))
+        flow = charging.flow(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges))
         if self.old.voltage == charging.old.voltage:
             return flow
         return Flow(flow.source_work + charging.field_energy(charging.old), flow.leakage)
@@ -237,11 +238,12 @@ class Part:
         charging = attraction.charging
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
         grown = attraction.pad.length(end[:, 0]) - attraction.pad.length(begin[:, 0])
+        pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
         work = 0.0
         for way, share in zip(WAY, SHARE, strict=True):
-            position = begin + way * (end - begin)
+            position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
             carried = charging.carried(attraction.pad.length(position[:, 0]))
-            at = attraction.charged(position, charging.old.voltage, carried)
+            at = attraction.charged(position, charging.old.voltage, pressing, carried)
             work += share * float(charging.energy_density(at) @ grown)
         return work
 
@@ -255,7 +257,9 @@ class Part:
         volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
         if voltages[0] == voltages[1]:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
-        forces = attraction.forces_along(begin + ways[:, None, None] * (end - begin), volts, old.touching)
+        places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
+        pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
+        forces = attraction.forces_along(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:
