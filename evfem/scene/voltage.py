@@ -61,6 +61,13 @@ def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
     """The voltage of the table [electrostatics], 0 where none is given nor `needed`; paths start
     at `folder`.
     """
+    if table.amplitude is not None:
+        real(
+            "electrostatics.amplitude",
+            table.amplitude,
+            "a peak voltage in V, from 0 to 1e6",
+            Within(0.0, 1e6),
+        )
     given = [name for name in KEYS if getattr(table, name) is not None]
     if len(given) > 1 or (needed and not given):
         allowed = "exactly one of voltage (V), amplitude (V), voltage_file and signal"
@@ -77,11 +84,7 @@ def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
     if table.signal is not None:
         return _signal(table.signal, "electrostatics.signal", folder)
     if table.amplitude is not None:
-        allowed = "a peak voltage in V, from 0 to 1e6"
-        return (
-            real("electrostatics.amplitude", table.amplitude, allowed, Within(0.0, 1e6))
-            / CREST[table.waveform]
-        )
+        return float(table.amplitude) / CREST[table.waveform]
     return table.voltage or 0.0
 
 
