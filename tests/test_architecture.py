@@ -29,7 +29,9 @@ ROOMS = {
         "space pattern assembly weakform userforms dynamics drag body",
     ),
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "electrostatics": (
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid forces signals wav timesignals encoding hjif signalfile"),
     "contact": (
         {"numpy", "scipy"},
         "surfaces textures own pad edge attraction signorini follower condensed stability",
