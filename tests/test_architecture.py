@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -31,7 +31,9 @@ ROOMS = {
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid forces signals wav timesignals encoding hjif signalfile"),
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating forces signals "
+        "wav timesignals encoding hjif signalfile",
+    ),
     "contact": (
         {"numpy", "scipy"},
         "surfaces textures own pad edge attraction signorini follower condensed stability",
@@ -43,7 +45,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution drift sense plan",
+        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},
@@ -235,6 +237,17 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
         "ev.NeoHookean(E=1.0, nu=0.3), ev.Sinusoid(), ev.VoltageProfile([0.0], [1.0])\n"
         "ev.Scene(ev.FingerPad(), ev.Display(), motion=[ev.Press(force=0.1)])\n"
         "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio', 'pydantic'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    assert fresh_process(code) == "[]"
+
+
+def test_a_press_loads_no_package_that_it_has_no_use_for():
+    code = (
+        "import evfem as ev\n"
+        "finger = ev.FingerPad(ridges=False, resolution='coarse')\n"
+        "ev.simulate(ev.Scene(finger, ev.Flat(), motion=[ev.Press(indentation=0.05, steps=1)]))\n"
+        "heavy = {'pydantic', 'scipy.spatial', 'scipy.optimize', 'tqdm', 'matplotlib', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     assert fresh_process(code) == "[]"

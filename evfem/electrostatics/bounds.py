@@ -56,11 +56,11 @@ def upper_sum(x: Floats, distance: Floats, reduced: float, eps_r: float) -> floa
 
 
 def capacitance_bounds(outline: Outline, thickness: float = 0.0, eps_r: float = 1.0) -> tuple[float, float]:
-    """Lower and upper bound in F per mm of depth, above a slab of `thickness` (mm).
+    """Lower and upper bound in F per m of depth (N/V^2), above a slab of `thickness` (mm).
 
     >>> wave = Outline.of([0.0, 0.25, 0.5], [0.1, 0.15, 0.1])
-    >>> [f"{1e12 * bound:.4f} pF" for bound in capacitance_bounds(wave)]
-    ['0.0359 pF', '0.0364 pF']
+    >>> [f"{1e12 * bound:.2f} pF/m" for bound in capacitance_bounds(wave)]
+    ['35.90 pF/m', '36.38 pF/m']
     """
     reduced = thickness / eps_r
     lower = columns_sum(outline.x, outline.height + reduced)

@@ -167,23 +167,23 @@ class Rows:
 def rows_of(runs: list[Run], corners: list[Floats], near: list[Floats], thickness: float, growth: float,
             ends: _Ends | None) -> Rows:  # fmt: skip
     """Rows that are small where corners are; `ends` are those of a body that ends in the air."""
-    lower = np.inf
+    lower: float = np.inf
     above = [np.inf if ends is None else ends.foot, np.inf]
     for run, size in zip(runs, corners, strict=True):
         if run.rank == 1:
-            lower = min(lower, float((size / run.height).min()))
+            lower = min(lower, float(np.min(size / run.height)))
             continue
         share = np.interp(run.x, run.x[[0, -1]], run.shares)
         block = run.height * (1.0 - share)
         high = block > 0.0
         above[1] = min(above[1], float((size[high] / block[high]).min()))
-    for run, other, size, end in _walls(runs, corners):
-        above[0] = min(above[0], size / (other.height[end] - run.height[-1 - end]))
+    for run, other, foot, end in _walls(runs, corners):
+        above[0] = min(above[0], foot / (other.height[end] - run.height[-1 - end]))
     depth = min(float(np.maximum(run.height, size).min()) for run, size in zip(runs, near, strict=True))
     slab = np.zeros(1) if thickness == 0.0 else fractions(np.inf, depth / thickness, growth) - 1.0
     blocks = [fractions(np.inf, lower, growth)]
     if ends is not None or any(run.rank == 2 for run in runs):
-        blocks.append(fractions(*above, growth))
+        blocks.append(fractions(above[0], above[1], growth))
     if ends is not None:
         blocks.append(fractions(np.inf, ends.edge, growth))
         blocks.append(graded(0.0, 1.0, (min(ends.sizes) / ends.box, np.inf), growth, 1.0, 3))
@@ -209,8 +209,9 @@ def make_mesh(outline: Outline, thickness: float, reduced: float, growth: float 
     runs = outline.runs()
     corners = corner_sizes(outline, runs, reduced)
     x = np.concatenate([run.x for run in runs])
-    near = (spread_around if outline.periodic else spread)(x, np.concatenate(corners), growth)
-    near = np.split(near, np.cumsum([run.x.size for run in runs])[:-1])
+    spreading = spread_around if outline.periodic else spread
+    smallest = spreading(x, np.concatenate(corners), growth)
+    near = np.split(smallest, np.cumsum([run.x.size for run in runs])[:-1])
     lines = [columns(run, size, reduced, growth) for run, size in zip(runs, near, strict=True)]
     ends = None if outline.periodic else _Ends.of(outline, runs, near, (thickness, reduced))
     rows = rows_of(runs, corners, near, thickness, growth, ends)
@@ -292,8 +293,9 @@ class _Grid:
         at_row, at_line = np.divmod(kept, y.shape[1])
         points = np.stack([self.x[at_line], y[at_row, at_line]])
         in_slab = (row < self.tops[0]).astype(float)
-        return FieldMesh(points, at_line, at_row, cells.reshape(4, -1), in_slab,
-                         self._lift(points), (y.shape[0] - 1, y.shape[1] - 1), self.outline.periodic)  # fmt: skip
+        shape = (y.shape[0] - 1, y.shape[1] - 1)
+        return FieldMesh(points, at_line, at_row, cells.reshape(4, -1), in_slab, self._lift(points), shape,
+                         self.outline.periodic)  # fmt: skip
 
     def _lift(self, points: Floats) -> Floats:
         """1 on the body, 0 on the slab, falling over the distance to the nearest low place."""

@@ -33,7 +33,7 @@ def graded(a: float, b: float, sizes: tuple[float, float], growth: float, most: 
     at most `most`; at least `least` cells.
 
     >>> np.round(graded(0.0, 1.0, (0.1, 1.0), 1.0, 1.0, 1), 3).tolist()
-    [0.0, 0.109, 0.329, 1.0]
+    [0.0, 0.123, 0.396, 1.0]
     """
     length = b - a
     small = [min(size, most, length) for size in sizes]

@@ -18,6 +18,8 @@ through the wall). A run that is low at one end and high at the other is split i
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -119,7 +121,7 @@ class Outline:
         """The outline cut at its walls; walls at the two ends belong to no piece."""
         walls = np.flatnonzero(np.diff(self.x) == 0.0) + 1
         cuts = [0, *walls, self.x.size]
-        pieces = [Run(self.x[a:b], self.height[a:b]) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+        pieces = [Run(self.x[a:b], self.height[a:b]) for a, b in pairwise(cuts)]
         return [piece for piece in pieces if piece.x.size > 1]
 
     def runs(self) -> list[Run]:
@@ -224,7 +226,7 @@ def right_angle(distance: float) -> float:
     return float(distance * (9.0 * CORNER) ** 0.75)
 
 
-def _turn(ratio: Floats) -> Floats:
+def _turn(ratio: Any) -> Floats:
     """Angles turned, where a full turn back is the edge of a sheet."""
     turned = np.angle(ratio)
     return np.where(turned < -np.pi + 1e-9, turned + 2.0 * np.pi, turned)

@@ -62,7 +62,7 @@ class Potential:
 
     @property
     def capacitance(self) -> float:
-        """F per mm of depth."""
+        """Capacitance in F per m of depth, numerically N/V^2."""
         return float(eps_0 * self.phi @ (self.space.stiffness @ self.phi))
 
     def force(self, lift: Floats | None = None, direction: int = 1) -> float:

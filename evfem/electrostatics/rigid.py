@@ -23,6 +23,8 @@ from evfem.errors import EvfemError, InputError, quoted
 
 #: touching places keep this share of the slab's thickness / permittivity as a gap in series
 SERIES_GAP = 1e-6
+#: m per mm: eps_0 is in F/m, a capacitance here in F per mm of depth
+PER_MM = 1e-3
 #: share by which a discrete capacitance may miss its bounds where they meet
 MARGIN = 1e-4
 
@@ -33,8 +35,8 @@ class FieldSolution:
 
     `capacitance` in F/mm; `force` in N/mm, the attraction towards the electrode, of one period where
     the outline is periodic; `bounds`, lower and upper bound of the exact capacitance of the outline
-    in F/mm. Fields are in V/mm, the electrode's upper face is at y = -`thickness` mm, the slab's at
-    y = 0.
+    in F/mm; capacitance * voltage^2 / 2 is the energy in J/mm (1000 N). Fields are in V/mm, the
+    electrode's upper face is at y = -`thickness` mm, the slab's at y = 0.
     """
 
     capacitance: float
@@ -97,7 +99,7 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
     not between them. InputError for arrays that are no outline.
 
     >>> deep = rigid_field([0.0, 0.3, 0.3, 0.5], [0.05, 0.05, 2.0, 2.0])
-    >>> round(deep.capacitance / 8.8541878188e-12, 4)      # Carter's grooves: 8.20526894
+    >>> round(deep.capacitance / 8.8541878188e-15, 4)      # Carter's grooves: 8.20526894
     8.2053
     """
     if slab is not None and not isinstance(slab, Layer):
@@ -112,8 +114,9 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
     above = outline.lifted(SERIES_GAP * reduced)
     mesh = make_mesh(above, thickness, reduced)
     solved = Potential.of(Space(mesh, eps_r))
-    bounds = capacitance_bounds(above, thickness, eps_r)
-    capacitance = solved.capacitance
+    low, high = capacitance_bounds(above, thickness, eps_r)
+    capacitance = PER_MM * solved.capacitance
+    bounds = (PER_MM * low, PER_MM * high)
     if not bounds[0] * (1.0 - MARGIN) <= capacitance <= bounds[1] * (1.0 + MARGIN):
         raise EvfemError(
             f"field: a capacitance of {capacitance:.6g} F/mm is not between its bounds {bounds[0]:.6g} and "

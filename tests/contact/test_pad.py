@@ -166,6 +166,12 @@ def test_an_outline_may_bend_and_overhang_but_not_cross_itself():
     assert folded(crossed) == pytest.approx(0.45, rel=1e-12)
 
 
+def test_a_stroke_beyond_the_end_of_another_crosses_nothing():
+    """The last one comes down through the line of the first, but behind its end."""
+    overhang = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.5, 1.0], [3.0, 1.0], [3.0, -2.0]]
+    assert folded(overhang) is None
+
+
 def test_neighbours_that_touch_must_not_change_places():
     """On the surface itself a fold crosses nothing: there the order tells."""
     swapped = LINE.copy()

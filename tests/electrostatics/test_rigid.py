@@ -38,7 +38,9 @@ def love(width, gap):
         angle = np.arcsin(np.sqrt((K - E) / (m * K)))
         return 2.0 / np.pi * (K * ellipeinc(angle, m) - E * ellipkinc(angle, m))
 
-    m = brentq(lambda m: ratio(m) - width / (2.0 * gap), 1e-9, 1.0 - 1e-15, xtol=1e-16)  # for widths below 12 gaps
+    m = brentq(
+        lambda m: ratio(m) - width / (2.0 * gap), 1e-9, 1.0 - 1e-15, xtol=1e-16
+    )  # for widths below 12 gaps
     return 2.0 * ellipk(m) / ellipk(1.0 - m)
 
 
@@ -59,7 +61,7 @@ def ridges(gap, points=401):
 
 
 def numbers(solution):
-    return solution.capacitance / eps_0, solution.force / eps_0
+    return solution.capacitance / (1e-3 * eps_0), solution.force / eps_0
 
 
 @pytest.mark.parametrize("case", [(0.5, 0.2, 0.05), (0.5, 0.25, 0.02), (1.3, 0.9, 0.002)])
@@ -88,7 +90,7 @@ def test_half_a_cylinder_stands_for_a_cylinder():
     angle = np.linspace(-np.pi / 2, np.pi / 2, 401)
     x, height = 8.34 * np.sin(angle), 1.0 + 8.34 * (1.0 - np.cos(angle))
     solved = rigid_field(x, height, voltage=2000.0, periodic=False)
-    assert solved.capacitance / eps_0 == pytest.approx(cylinder(8.34, 1.0)[0], rel=2e-4)
+    assert 1e3 * solved.capacitance / eps_0 == pytest.approx(cylinder(8.34, 1.0)[0], rel=2e-4)
     assert solved.force * 1e3 == pytest.approx(0.112524670, rel=1e-4)  # N per metre
 
 
@@ -96,7 +98,7 @@ def test_a_flat_outline_that_ends_is_loves_strip():
     """Its edges pull too: the force is the derivative of Love's capacitance."""
     width, gap = 1.0, 0.1
     solved = rigid_field([0.0, width], [gap, gap], periodic=False)
-    assert solved.capacitance / eps_0 == pytest.approx(love(width, gap), rel=1e-5)
+    assert 1e3 * solved.capacitance / eps_0 == pytest.approx(love(width, gap), rel=1e-5)
     slope = (love(width, gap + 1e-4) - love(width, gap - 1e-4)) / 2e-4
     assert solved.force / eps_0 == pytest.approx(-slope / 2.0, rel=1e-5)
     assert rigid_field([0.0, width], [gap, gap], periodic=False, voltage=-3.0).force == pytest.approx(
@@ -217,14 +219,14 @@ def test_any_outline_lies_between_its_bounds(heights, steps, slab, periodic):
         return
     try:
         outline = Outline.of(x, heights, periodic)
-    except InputError as refused:
-        assert "walls" in str(refused)
+    except InputError:  # walls up and down at one x, or hanging down at an end
         return
     thickness, eps_r = (slab.thickness, slab.eps_r) if slab else (0.0, 1.0)
     low, high = capacitance_bounds(outline, thickness, eps_r)
     mesh = make_mesh(outline, thickness, thickness / eps_r, 2.0)
     capacitance = Potential.of(Space(mesh, eps_r, 2)).capacitance
-    assert low <= capacitance * (1.0 + 1e-12) and capacitance <= high * 1.02  # a coarse mesh is above
+    assert low <= capacitance * (1.0 + 1e-12)
+    assert capacitance <= high * 1.02  # a coarse mesh is above
 
 
 def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch):

@@ -2,6 +2,8 @@
 that it must follow.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools import paths
@@ -60,6 +62,12 @@ def test_small_modulations_are_followed_to_a_hundredth_of_the_modulation(fast, b
     result, full = fast.simulate(scene, checks=0), ev.simulate(scene)
     for name in paths.FORCES:
         assert paths.modulation(result, full, name, steps=60) < 0.01
+
+
+def test_steps_end_within_the_tolerance_of_the_scene(fast):
+    scene = paths.scene(FINGER, sine(1000.0, 500.0), [ev.Slide(0.6, steps=12)])
+    run = followed(fast, replace(scene, solver=ev.Solver(tolerance=1e-8)))
+    assert run.model.equilibrium.record.residuals[-1] <= 1e-8
 
 
 def test_a_signal_that_creeps_arrives_where_one_that_jumps_does(fast):

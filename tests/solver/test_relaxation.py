@@ -23,6 +23,8 @@ from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
+from evfem.solver.control import Target
+from evfem.solver.relaxation import Relaxation
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
 
@@ -195,6 +197,17 @@ def test_a_motion_without_time_in_a_scene_with_time_ends_at_rest(point):
         timed.applied_tangential_force[-1], still.applied_tangential_force[-1], rtol=1e-6
     )
     assert left_over(timed).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("kind", "seconds", "released"),
+    [("quasistatic", 0.1, True), ("inertial", 0.1, False), ("inertial", 0.0, True)],
+)
+def test_where_time_passes_the_body_moves_as_its_mass_says(kind, seconds, released):
+    """So it is never released, which would put another motion in the place of its own."""
+    body = make_model(scene(solver=Solver(dynamics=kind))).body
+    target = replace(Target.held(np.zeros(2), 0.0), duration=seconds)
+    assert Relaxation(body, None).applies(target) is released
 
 
 def test_a_run_goes_on_after_a_release_as_if_never_stopped(point):
