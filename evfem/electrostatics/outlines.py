@@ -29,6 +29,7 @@ from evfem.errors import InputError
 
 #: ends of an outline steeper than this, |n_y| < 0.3, are flanks of a body that goes on above
 FLANK = 0.3
+ONE_WAY = "walls that go one way"
 #: heights closer than this share of the largest length are one height
 SAME = 1e-12
 #: share of the energy around a corner that its smallest cells may miss
@@ -73,6 +74,8 @@ class Outline:
             raise InputError("x", "places that go back", "places that do not decrease; equal ones are a wall")
         if height.min() < 0.0:
             raise InputError("height", float(height.min()), "heights in mm above the slab, not negative")
+        if periodic:
+            x, height = _without_end_walls(x, height)
         keep = _without_repetitions(x, height)
         outline = cls(x[keep], height[keep], bool(periodic))
         if not periodic and any(top < end for top, end in zip(outline.tops, outline.feet, strict=True)):
@@ -160,13 +163,22 @@ def _stretched(x: Floats, height: Floats) -> tuple[Floats, Floats]:
     return x[corners], height[corners]
 
 
+def _without_end_walls(x: Floats, height: Floats) -> tuple[Floats, Floats]:
+    """A period whose wall, if there is one, is between its last and its first point."""
+    first, last = int(np.searchsorted(x, x[0], "right")) - 1, int(np.searchsorted(x, x[-1]))
+    seam = np.diff(np.concatenate([height[last:], height[: first + 1]]))
+    if np.any(seam > 0.0) and np.any(seam < 0.0):
+        raise InputError("height", "a wall that goes up and down where the period ends", ONE_WAY)
+    return x[first : last + 1], height[first : last + 1]
+
+
 def _without_repetitions(x: Floats, height: Floats) -> Floats:
     """Which points to keep: two of each x at most, and not the same one twice."""
     same = np.diff(x) == 0.0
     rises = np.sign(np.diff(height)) * same
     inner = same[:-1] & same[1:]
     if np.any(inner & (rises[:-1] * rises[1:] < 0)):
-        raise InputError("height", "a wall that goes up and down at one x", "walls that go one way")
+        raise InputError("height", "a wall that goes up and down at one x", ONE_WAY)
     keep = np.ones(x.size, dtype=bool)
     keep[1:-1] = ~inner
     near = SAME * max(float(x[-1] - x[0]), float(height.max()))
@@ -183,6 +195,9 @@ def _ranked(piece: Run, left: float | None, right: float | None) -> list[Run]:
     if left is not None and right is not None:
         return [replace(piece, rank=2, shares=(left, right))]
     middle = 0.5 * (piece.x[0] + piece.x[-1])
+    nearest = float(piece.x[np.argmin(np.abs(piece.x - middle))])
+    if abs(nearest - middle) < 0.1 * (piece.x[-1] - piece.x[0]):
+        middle = nearest
     height = float(np.interp(middle, piece.x, piece.height))
     before, after = piece.x < middle, piece.x > middle
     first = Run(np.append(piece.x[before], middle), np.append(piece.height[before], height))
