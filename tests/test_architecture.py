@@ -34,8 +34,8 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness forces "
-        "signals wav timesignals encoding hjif signalfile",
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
