@@ -33,9 +33,9 @@ ROOMS = {
         "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
-        {"numpy", "scipy"},
-        "laws dielectrics charges alternating roughness forces signals wav timesignals drive encoding hjif "
-        "signalfile",
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
