@@ -23,6 +23,7 @@ from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
 from evfem.electrostatics.dielectrics import Dielectric as Dielectric
 from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
+from evfem.electrostatics.drive import Drive as Drive
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
@@ -30,6 +31,9 @@ from evfem.electrostatics.laws import Layer as Layer
 from evfem.electrostatics.laws import Layers as Layers
 from evfem.electrostatics.laws import StrongTroxel as StrongTroxel
 from evfem.electrostatics.laws import eps_0 as eps_0
+from evfem.electrostatics.roughness import ConstantRoughness as ConstantRoughness
+from evfem.electrostatics.roughness import ExponentialRoughness as ExponentialRoughness
+from evfem.electrostatics.roughness import PowerRoughness as PowerRoughness
 from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal
@@ -39,6 +43,7 @@ from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine
+from evfem.electrostatics.timesignals import Square as Square
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
@@ -90,6 +95,8 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.textures.texture import Texture as Texture
+from evfem.textures.touch import Touch as Touch
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form
 from evfem.tissue.forms import grad as grad
