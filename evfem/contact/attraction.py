@@ -13,6 +13,9 @@ Trial states that penetrate count as touching, g = 0.
   outline; its tangent is symmetric.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
+
+In three dimensions A_j is the node's projected area (`evfem.contact.skin`), forces are in N, and the
+direction is vertical.
 """
 
 from __future__ import annotations
@@ -25,6 +28,7 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
 from evfem.contact.pad import Pad, surface_state
+from evfem.contact.skin import Skin
 from evfem.electrostatics.laws import traction_derivative
 from evfem.tensor import mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
@@ -53,36 +57,39 @@ class Attraction:
 
     law: Any
     layers: Any
-    pad: Pad
+    pad: Pad | Skin
     surface: Any
     direction: str = "vertical"
     air_layer: bool = True
 
     def forces(self, position: Floats, voltage: float, touching: Any) -> Floats:
-        """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
+        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air
         layer.
         """
         return self.forces_along(position[None], np.array([voltage]), touching)[0]
 
     def forces_along(self, positions: Floats, voltages: Floats, touching: Any) -> Floats:
-        """`forces` at W places of a way (W, P, 2), from positions (W, P, 2) and voltages (W,)."""
+        """`forces` at W places of a way (W, P, dim), from positions (W, P, dim) and voltages (W,)."""
         if not voltages.any():
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
         gaps = np.maximum(frame.gap, 0.0).reshape(len(positions), -1)
         pairs = list(zip(gaps, voltages.tolist(), strict=True))
         on = 1.0 if self.air_layer else touching.astype(float)
-        x = positions[..., 0]
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
-        weight = on * pressure * self.pad.length(x)
+        weight = on * pressure * self.pad.tributary(positions)
         if self.direction == "vertical":
-            return np.stack([np.zeros_like(weight), -weight], axis=-1)
+            forces = np.zeros_like(positions)
+            forces[..., 1] = -weight
+            return forces
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
+        x = positions[..., 0]
         sideways = [self._sideways(*each) for each in zip(x, potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
     def _sideways(self, x: Floats, potential: Floats) -> Floats:
         """Forces along x (P,) that lengthen the tributary lengths, at x (P,), by the potential (P,)."""
+        assert isinstance(self.pad, Pad)  # three dimensions have the vertical direction alone
         of, moved, value = self.pad.length_gradient(x)
         return np.asarray(-np.bincount(moved, potential[of] * value, x.size), dtype=float)
 
@@ -93,27 +100,26 @@ class Attraction:
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
         rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
-        return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
+        return np.where(gap > TOUCHING, -on * rate * self.pad.tributary(position), 0.0)
 
     def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
-        component).
+        """Derivative of `forces` by the node positions, sparse (dim P, dim P), unknowns ordered
+        (node, component).
         """
-        size = position.shape[0]
+        size, dim = position.shape
         frame = surface_state(self.surface, position)
-        length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
         p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
         dp = -self.negative_stiffness(position, voltage, touching)
-        of, moved, value = self.pad.length_gradient(position[:, 0])
+        of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
-        rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]
-        columns = [2 * nodes + 1, 2 * nodes, 2 * moved]
+        rows = [dim * nodes + 1, dim * nodes + 1, dim * of + 1]
+        columns = [dim * nodes + 1, dim * nodes, moved]
         values = [-dp, dp * frame.slope, -p[of] * value]
         if self.direction == "normal":
-            w = p * length
-            rows += [2 * nodes, 2 * nodes, 2 * of, 2 * moved, 2 * moved]
-            columns += [2 * nodes + 1, 2 * nodes, 2 * moved, 2 * of + 1, 2 * of]
+            w = p * self.pad.tributary(position)
+            rows += [2 * nodes, 2 * nodes, 2 * of, moved, moved]
+            columns += [2 * nodes + 1, 2 * nodes, moved, 2 * of + 1, 2 * of]
             values += [
                 dp * frame.slope,
                 w * frame.curvature - dp * frame.slope**2,
@@ -122,4 +128,4 @@ class Attraction:
                 (p * frame.slope)[of] * value,
             ]
         triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_matrix(triplets, shape=(2 * size, 2 * size))
+        return sparse.csr_matrix(triplets, shape=(dim * size, dim * size))
