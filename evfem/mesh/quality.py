@@ -51,7 +51,7 @@ def _some(numbers: Ints) -> str:
 
 
 def _arrays(mesh: Mesh, refuse: Refuse) -> None:
-    if mesh.kind not in KINDS:
+    if mesh.kind not in KINDS or mesh.dim != 2:
         refuse(f"{mesh.kind} cells", "cells of one kind: " + ", ".join(KINDS))
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):

@@ -71,9 +71,9 @@ class Finger(Protocol):
 class Solver:
     """How a scene is solved; the defaults are the recommended ones.
 
-    `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free
-    residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go
-    with `contact="penalty"` alone. `strategy` says how hard steps are tried.
+    `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
+    largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
+    (N/mm3) go with `contact="penalty"` alone. `strategy` says how hard steps are tried.
     """
 
     element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
@@ -97,7 +97,7 @@ class Solver:
             raise InputError("penalty_normal", ABSENT, allowed)
 
     def element_on(self, corners: int) -> str:
-        """The element used on cells with that many corners (3 or 4).
+        """The element used on cells with that many corners (3, 4 or 8).
 
         >>> Solver().element_on(4), Solver().element_on(3), Solver(element="q1").element_on(4)
         ('q2p1', 'p2', 'q1')
@@ -107,9 +107,9 @@ class Solver:
         """
         names = elements_on(corners)
         if self.element is None:
-            return "p2" if corners == 3 else "q2p1"
+            return {3: "p2", 4: "q2p1", 8: "hex27p1"}[corners]
         if self.element not in names:
-            cells = "triangles" if corners == 3 else "quads"
+            cells = {3: "triangles", 4: "quads", 8: "hexahedra"}[corners]
             raise InputError("solver.element", f"{self.element} on a mesh of {cells}", " | ".join(names))
         return self.element
 
