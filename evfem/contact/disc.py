@@ -1,46 +1,35 @@
-r"""Unilateral contact with Coulomb friction in three dimensions, solved exactly on the dense
-compliance of the contact candidates. The twin of `evfem.contact.signorini`, for shear forces that
-lie in a disc.
+r"""Signorini and Coulomb's disc in three dimensions, solved exactly: sweeps, and Newton's method with
+the direction of slip as an unknown.
 
-A node has a normal n and two tangents; components are ordered per node (n, t1, t2). With the
-contact forces :math:`\lambda` the new gaps and slips are :math:`v = (g, s) = v_0 + W\lambda + e\,d`,
-where d are optional extra unknowns (the bone's travel under a prescribed force, for example) with
-the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb's disc ask, per node, for
-
-.. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
-          p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
-
-the same for all positive r; taken is the inverse of the node's own compliance. A node is open if
-:math:`p \le 0`, sticks if :math:`|z| \le \mu p` and slips along :math:`d = z/|z|` else, e being
-normal to d in the plane of contact. Linearised, exactly:
+The laws of `evfem.contact.coulomb`, linearised exactly where p and z have been projected; e is
+normal to z in the plane of contact:
 
 ========  ========================================================================
 status    equations
 ========  ========================================================================
 OPEN      lam = 0
 STICK     g = 0, s = 0
-SLIP      g = 0, lam_t = mu lam_n d + lam_e e,
+SLIP      g = 0, lam_t = mu lam_n z/abs(z) + lam_e e,
           (1 - m) lam_e + m r_t (e . s) = 0  with  m = min(1, mu p / abs(z))
 ========  ========================================================================
 
 The last equation turns the direction of slip; at the solution r drops out. These are three
-unknowns for a sticking node, two for a slipping one, one without friction. The attraction of an
-open node weakens with its gap; its drop is one more unknown, as in `evfem.contact.signorini`.
+unknowns for a sticking node, two for a slipping one, one without friction, one for the drop of an
+open node's attraction, and one more row for every extra unknown.
 
 Algorithm (`solve_disc`)::
 
     repeat
-        sweeps: block Gauss-Seidel, each node projected with its own compliance; twice as many each time, none
-            at first if the forces at hand are those of the last iteration
-        Newton's method for the equations above, every extra unknown as one more row
+        sweeps of block Gauss-Seidel (`evfem.contact.sweeps`), twice as many each time; none at first if the
+            forces at hand are those of the last iteration
+        Newton's method; from the second time on with steps shortened where the laws are missed by more
         done where forces, gaps and slips obey the laws to rounding
 
-Newton's method alone may cycle between statuses, sweeps alone take 500 to 1,500. Without a
-sweep in which d changes, a prescribed force is met by Newton's method alone.
+Newton's method alone may cycle between statuses, sweeps alone are slow. Extra unknowns stay during
+sweeps.
 
-Sources: P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
-doi:10.1016/0045-7825(91)90022-X (projections and their linearisation); M. Jean, Comput. Methods
-Appl. Mech. Eng. 177 (1999) 235, doi:10.1016/S0045-7825(98)00383-1 (block Gauss-Seidel).
+Source: P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
+doi:10.1016/0045-7825(91)90022-X (projections and their linearisation).
 """
 
 from __future__ import annotations
@@ -51,114 +40,9 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import DISC_FALL, DISC_NEWTON, DISC_ROUNDING, DISC_ROUNDS, DISC_SWEEPS, STABLE
-from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved, ExtraUnknowns
-
-#: status of a node that slips in any direction
-SLIP = 2
-
-
-@dataclass(frozen=True)
-class DiscProblem:
-    """Gaps and slips without contact forces (3 k,), compliance (3 k, 3 k), both per node (n, t1,
-    t2), friction coefficients (k,), and optional extra unknowns and attraction as in
-    `evfem.contact.signorini`.
-    """
-
-    start: Floats
-    compliance: Floats
-    friction: Floats
-    extra_unknowns: ExtraUnknowns | None = None
-    attraction: AttractionStiffness | None = None
-
-    @property
-    def size(self) -> int:
-        """Number of candidate nodes k."""
-        return self.friction.size
-
-    @property
-    def own(self) -> tuple[Floats, Floats]:
-        """Each node's own compliance along the normal and, the larger one, along the tangents,
-        (k,).
-        """
-        i = 3 * np.arange(self.size)
-        C = self.compliance
-        a, b = C[i + 1, i + 1], C[i + 2, i + 2]
-        c = 0.5 * (C[i + 1, i + 2] + C[i + 2, i + 1])
-        return C[i, i], 0.5 * (a + b) + np.hypot(0.5 * (a - b), c)
-
-    def state(self, forces: Forces) -> Floats:
-        """Gaps and slips (3 k,) under these forces."""
-        v = self.start + self.compliance @ (forces.contact + forces.drop)
-        return v if self.extra_unknowns is None else v + self.extra_unknowns.columns @ forces.extra
-
-
-@dataclass(frozen=True, eq=False)
-class Forces:
-    """Contact forces and drops of the attraction (3 k,), and extra unknowns (p,)."""
-
-    contact: Floats
-    drop: Floats
-    extra: Floats
-
-
-@dataclass(frozen=True)
-class DiscSolution:
-    """Contact forces and drops of the attraction (3 k,), statuses (k,), the extra unknowns (p,),
-    new gaps and slips (3 k,), the number of dense solves, and whether the negative stiffness had
-    to be scaled down.
-    """
-
-    force: Floats
-    attraction_drop: Floats
-    status: Ints
-    extra: Floats
-    state: Floats
-    solves: int
-    reduced: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class Projected:
-    """What the laws make of forces, gaps and slips: p and z of every node, (k,) and (k, 2), its
-    status (k,), and by how much a force misses them, relative to the largest one.
-    """
-
-    p: Floats
-    z: Floats
-    status: Ints
-    miss: float
-
-
-def projected(problem: DiscProblem, forces: Forces, state: Floats) -> Projected:
-    """Forces, gaps and slips against the laws of Signorini and Coulomb."""
-    normal_own, shear_own = problem.own
-    force, v = forces.contact.reshape(-1, 3), state.reshape(-1, 3)
-    p = force[:, 0] - v[:, 0] / normal_own
-    z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
-    limit, size = problem.friction * np.maximum(p, 0.0), np.hypot(*z.T)
-    status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & (problem.friction > 0.0), STICK, SLIP))
-    shear = z * np.where(status == STICK, 1.0, limit / np.maximum(size, 1e-300))[:, None]
-    shear[status == OPEN] = 0.0
-    wanted = np.column_stack([np.maximum(p, 0.0), shear])
-    drop = _drop(problem, status, v[:, 0]) - forces.drop[::3]
-    scale = max(np.abs(wanted).max(initial=0.0), np.abs(force).max(initial=0.0), 1e-300)
-    miss = max(np.abs(wanted - force).max(initial=0.0), np.abs(drop).max(initial=0.0))
-    if problem.extra_unknowns is not None:
-        miss = max(miss, np.abs(_lacking(problem.extra_unknowns, forces)).max(initial=0.0))
-    return Projected(p, z, status, float(miss / scale))
-
-
-def _drop(problem: DiscProblem, status: Ints, gap: Floats) -> Floats:
-    """Drop of the attraction (k,) of nodes of these statuses at these gaps."""
-    if problem.attraction is None:
-        return np.zeros(problem.size)
-    known = problem.attraction
-    weaker = known.negative_stiffness * (gap - known.reference_gap)
-    return np.where(status == OPEN, weaker, -known.gain_on_closing)
-
-
-def _lacking(extra: ExtraUnknowns, forces: Forces) -> Floats:
-    return extra.right - extra.rows @ (forces.contact + forces.drop) - extra.pivot @ forces.extra
+from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution, Forces, Projected, projected
+from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved
+from evfem.contact.sweeps import sweeps
 
 
 def solve_disc(problem: DiscProblem, force: Floats) -> DiscSolution:
@@ -185,77 +69,6 @@ def _solution(problem: DiscProblem, forces: Forces, found: Projected, solves: in
     )
 
 
-def sweeps(problem: DiscProblem, forces: Forces, count: int) -> Forces:
-    """Forces after so many sweeps of block Gauss-Seidel; the extra unknowns stay."""
-    start = problem.start
-    if problem.extra_unknowns is not None:
-        start = start + problem.extra_unknowns.columns @ forces.extra
-    nodes = [_Node.of(problem, i, start) for i in range(problem.size)]
-    contact, drop = forces.contact.copy(), forces.drop.copy()
-    total = contact + drop
-    for _ in range(count):
-        for node in nodes:
-            own = node.place
-            now = contact[own].tolist()
-            new, fallen = node.solve((node.rows @ total).tolist(), now, float(drop[own.start]))
-            contact[own], drop[own.start] = new, fallen
-            total[own] = new
-            total[own.start] += fallen
-    return Forces(contact, drop, forces.extra)
-
-
-@dataclass(frozen=True, eq=False)
-class _Node:
-    """One node of the sweeps: where its components are, its rows of the compliance, gap and slips
-    without forces, and its own compliance.
-    """
-
-    place: slice
-    rows: Floats
-    start: list[float]
-    own: list[list[float]]
-    shear: float
-    friction: float
-    weakening: float
-    reference: float
-    gain: float
-
-    @classmethod
-    def of(cls, problem: DiscProblem, i: int, start: Floats) -> _Node:
-        place, known = slice(3 * i, 3 * i + 3), problem.attraction
-        rows = problem.compliance[place]
-        own = rows[:, place]
-        shear = float(np.linalg.eigvalsh(0.5 * (own[1:, 1:] + own[1:, 1:].T))[-1])
-        pull = [0.0, 0.0, 0.0]
-        if known is not None:
-            pull = [float(a[i]) for a in (known.negative_stiffness, known.reference_gap, known.gain_on_closing)]
-        friction = float(problem.friction[i])
-        return cls(place, rows, start[place].tolist(), own.tolist(), shear, friction, *pull)
-
-    def solve(self, moved: list[float], force: list[float], drop: float) -> tuple[list[float], float]:
-        """New contact force and drop from the motion by all forces, those of this node included."""
-        own, (n, t1, t2) = self.own, force
-        held = n + drop
-        g, s1, s2 = (
-            self.start[a] + moved[a] - own[a][0] * held - own[a][1] * t1 - own[a][2] * t2 for a in range(3)
-        )
-        # open, the attraction weakened
-        weaker = 1.0 - own[0][0] * self.weakening
-        gap = g if weaker <= 1.0 - STABLE else (g - own[0][0] * self.weakening * self.reference) / weaker
-        if gap >= 0.0:
-            return [0.0, 0.0, 0.0], self.weakening * (gap - self.reference)
-        n = max(0.0, n)
-        for _ in range(3):
-            n = max(0.0, self.gain - (g + own[0][1] * t1 + own[0][2] * t2) / own[0][0])
-            pressed = n - self.gain
-            z1 = t1 - (s1 + own[1][0] * pressed + own[1][1] * t1 + own[1][2] * t2) / self.shear
-            z2 = t2 - (s2 + own[2][0] * pressed + own[2][1] * t1 + own[2][2] * t2) / self.shear
-            size, limit = (z1 * z1 + z2 * z2) ** 0.5, self.friction * n
-            part = 1.0 if size <= limit else limit / size
-            t1, t2 = part * z1, part * z2
-        return [n, t1, t2], -self.gain
-
-
 def _newton(problem: DiscProblem, forces: Forces, damped: bool) -> tuple[Forces, Projected, int]:
     """Forces after Newton's iterations, what the laws make of them, and the number of solves; the
     best ones where it does not end. `damped` steps are the best of 1, 1/2, 1/4 ... of a whole one.
@@ -269,7 +82,9 @@ def _newton(problem: DiscProblem, forces: Forces, damped: bool) -> tuple[Forces,
             return *best, tries
         after = projected(problem, new, problem.state(new))
         if damped and not after.miss < DISC_FALL * found.miss:
-            new, after = min((_part(problem, forces, new, 0.5**n) for n in range(5)), key=lambda one: one[1].miss)
+            new, after = min(
+                (_part(problem, forces, new, 0.5**n) for n in range(5)), key=lambda one: one[1].miss
+            )
         forces, found = new, after
         if not np.isfinite(found.miss):
             return *best, tries
@@ -415,7 +230,9 @@ def feedback(problem: DiscProblem, stiffness: Floats, status: Ints) -> float:
     stick = 3 * np.flatnonzero(status == STICK)
     rows = np.concatenate([3 * np.flatnonzero(status != OPEN), stick + 1, stick + 2])
     if rows.size:
-        held = held - C[np.ix_(3 * free, rows)] @ np.linalg.solve(C[np.ix_(rows, rows)], C[np.ix_(rows, 3 * free)])
+        held = held - C[np.ix_(3 * free, rows)] @ np.linalg.solve(
+            C[np.ix_(rows, rows)], C[np.ix_(rows, 3 * free)]
+        )
     root = np.sqrt(stiffness[free])
     gain = root[:, None] * held * root
     return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])

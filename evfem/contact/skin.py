@@ -26,7 +26,7 @@ from evfem.mesh.mesh import Mesh
 
 #: corners, middles of the edges and centre of a face, in the order of its nodes
 PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
-#: where a node's share of a face ends, each way: half of a bilinear face, 1/6, 4/6 and 1/6 of a biquadratic one
+#: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
 ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}
 ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
 

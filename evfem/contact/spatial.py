@@ -19,7 +19,8 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import STABLE
 from evfem.contact.condensed import Candidates, LinearContactStep
-from evfem.contact.disc import SLIP, DiscProblem, DiscSolution, solve_attracted_disc
+from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution
+from evfem.contact.disc import solve_attracted_disc
 from evfem.contact.signorini import AttractionStiffness, ContactNotSolved, ExtraUnknowns
 
 

@@ -62,6 +62,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.simulation.model import Model
+from evfem.solver.spatial import SkinInterface, slipped
 from evfem.solver.state import State
 
 SUMS = (
@@ -199,8 +200,7 @@ class Part:
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
-        slip, x0, x1 = self._slip, self._x[0], self._x[1]
-        length = np.abs(slip)
+        length, x0, x1 = self._slip_length, self._x[0], self._x[1]
         if not length.any():
             return 0.0
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
@@ -236,6 +236,14 @@ class Part:
         forward = ((status == FORWARD) & (slip > 0.0)) | carried
         return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
 
+    @cached_property
+    def _slip_length(self) -> Floats:
+        """How far the pad nodes (P,) slip, in mm."""
+        interface = self.model.equilibrium.interface
+        if isinstance(interface, SkinInterface):
+            return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
+        return np.abs(self._slip)
+
     def _coefficient(self, x: Floats) -> Floats:
         """Friction coefficient of the pad nodes (P,) at the positions x (P,)."""
         return self.model.equilibrium.interface.friction(self.old, np.arange(x.size), x)
@@ -270,7 +278,15 @@ class Part:
             work += float(np.sum((at[1] - at[0]) * along))
         x = model.equilibrium.positions(carried.u)[:, 0]
         less = self._coefficient(x) - self._coefficient(self._x[1])
-        return work + float(np.sum(less * new.contact_force[:, 0] * np.sign(self._slip) * along[:, 0]))
+        return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
+
+    def _with_slip(self, along: Floats) -> Floats:
+        """The share (P,) of the way `along` (P, dim) that the pad nodes go the way they slip."""
+        interface = self.model.equilibrium.interface
+        if isinstance(interface, SkinInterface):
+            slip = slipped(interface, self.old, self.new) / np.maximum(self._slip_length, 1e-300)[:, None]
+            return np.asarray(np.sum(slip * along[:, ::2], axis=1))
+        return np.sign(self._slip) * along[:, 0]
 
 
 def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:

@@ -262,8 +262,8 @@ class Target:
     def held(cls, bone: Floats, voltage: float) -> Target:
         """The bone at a given translation (dim,), under a given voltage.
 
-        >>> Target.held(np.array([0.5, -0.1]), 100.0)
-        Target(x=0.5, height=Indentation(height=-0.1), drive=GivenVoltage(voltage=100.0), duration=0.0, z=None)
+        >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
+        [0.5, -0.1, 2.0]
         """
         z = float(bone[2]) if len(bone) == 3 else None
         return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)

@@ -14,7 +14,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import SMALLEST_FORCE
-from evfem.contact.disc import SLIP
+from evfem.contact.coulomb import SLIP
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import STICK
 from evfem.contact.skin import Skin
@@ -100,5 +100,3 @@ def slipped(interface: SkinInterface, old: State, new: State) -> Floats:
     """Slips (P, 2) in mm of nodes that slip at the end, or did so before they left."""
     status = np.where(new.touching | (old.status == STICK), new.status, old.status)
     return np.where((status == SLIP)[:, None], interface.slip(old, new), 0.0)
-
-
