@@ -32,19 +32,20 @@ ROOMS = {
     "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "surfaces textures own pad edge skin attraction signorini follower condensed coulomb sweeps "
+        "disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface linearisation pressure anderson findings "
+        "strategy state control condensation interface spatial linearisation pressure anderson findings "
         "equilibrium factorised relaxation stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution drift sense plan",
+        "motion terms scene keys voltage meanings schema file resolution drift sense spatial plan",
     ),
     "simulation": (
-        {"numpy", "threadpoolctl"},
+        {"numpy", "scipy", "threadpoolctl"},
         "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),

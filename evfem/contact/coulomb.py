@@ -112,7 +112,8 @@ def projected(problem: DiscProblem, forces: Forces, state: Floats) -> Projected:
     shear[status == OPEN] = 0.0
     wanted = np.column_stack([np.maximum(p, 0.0), shear])
     drop = _drop(problem, status, v[:, 0]) - forces.drop[::3]
-    scale = max(np.abs(wanted).max(initial=0.0), np.abs(force).max(initial=0.0), 1e-300)
+    held = 1e-3 * np.abs(v[:, 0] / normal_own)  # what would close the gap, where no node presses
+    scale = max(1e-300, *(np.abs(part).max(initial=0.0) for part in (wanted, force, forces.drop, held)))
     miss = max(np.abs(wanted - force).max(initial=0.0), np.abs(drop).max(initial=0.0))
     if problem.extra_unknowns is not None:
         miss = max(miss, np.abs(_lacking(problem.extra_unknowns, forces)).max(initial=0.0))

@@ -143,13 +143,21 @@ class Unknowns:
 
     def columns(self, C: Floats) -> Floats:
         """C B for a matrix (q, 3 k)."""
-        by_node = C.reshape(len(C), C.shape[1] // 3, 3)[:, self.node]
-        return np.asarray(np.einsum("qma,ma->qm", by_node, self.force))
+        place = 3 * self.node
+        total = C[:, place] * self.force[:, 0]
+        for a in (1, 2):
+            some = np.flatnonzero(self.force[:, a])
+            total[:, some] += C[:, place[some] + a] * self.force[some, a]
+        return total
 
     def rows(self, v: Floats) -> Floats:
-        """The rows (m, ...) of gaps and slips (3 k, ...)."""
-        by_node = v.reshape(len(v) // 3, 3, *v.shape[1:])[self.node]
-        return np.asarray(np.einsum("ma...,ma->m...", by_node, self.row))
+        """The rows (m, q) of gaps and slips (3 k, q)."""
+        place = 3 * self.node
+        total = v[place] * self.row[:, :1]
+        for a in (1, 2):
+            some = np.flatnonzero(self.row[:, a])
+            total[some] += v[place[some] + a] * self.row[some, a, None]
+        return total
 
     def spread(self, x: Floats, size: int) -> Floats:
         """Forces (3 size,) of the unknowns' values x (m,)."""
@@ -171,7 +179,7 @@ def _linearised(problem: DiscProblem, found: Projected) -> Forces:
     pushed = np.hstack([unknowns.columns(C), C[:, attracted]])
     known = problem.start + (C @ drop if drop.any() else 0.0)
     matrix = np.vstack([unknowns.rows(pushed), pushed[attracted]])
-    right = -np.concatenate([unknowns.rows(known), known[attracted]])
+    right = -np.concatenate([unknowns.rows(known[:, None])[:, 0], known[attracted]])
     matrix[np.arange(m), np.arange(m)] += unknowns.keep
     if attracted.size:
         assert problem.attraction is not None

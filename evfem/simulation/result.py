@@ -46,7 +46,7 @@ from evfem.simulation.provenance import versions as versions
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-4"
+CHECKPOINT_FORMAT = "evfem-checkpoint-5"
 #: what is shown of the last step
 SHOWN = (
     *("position", "indentation", "voltage"),

@@ -84,6 +84,8 @@ def simulate(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
+    import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
+
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)

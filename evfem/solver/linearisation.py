@@ -128,7 +128,7 @@ class Linearisation:
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         dynamics = self.body.dynamics
         begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds, state.pressure)
+        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds, state.status, state.pressure)
         self._made_at = TangentPoint(*at)
         self.record.factorisations += 1
 
@@ -146,7 +146,7 @@ class Linearisation:
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage, pressure=at.pressure))
+        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
