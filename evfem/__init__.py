@@ -22,6 +22,7 @@ _NAMES = {
     "calibration.result": ("FitResult",),
     "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "contact.textures": ("Grating", "SelfAffine"),
+    "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),
     "electrostatics.laws": (
         "FILM",
         "Kaczmarek",

@@ -21,6 +21,8 @@ from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
 from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
+from evfem.electrostatics.dielectrics import Dielectric as Dielectric
+from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek

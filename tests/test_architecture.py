@@ -29,7 +29,10 @@ ROOMS = {
         "space pattern assembly weakform userforms dynamics drag body",
     ),
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "electrostatics": (
+        {"numpy", "scipy"},
+        "laws dielectrics charges alternating forces signals wav timesignals encoding hjif signalfile",
+    ),
     "contact": (
         {"numpy", "scipy"},
         "surfaces textures own pad edge skin attraction signorini follower condensed coulomb sweeps "
@@ -42,7 +45,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene keys voltage meanings schema file resolution drift sense spatial plan",
+        "motion terms scene written keys voltage meanings schema file resolution drift sense spatial plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
@@ -234,6 +237,17 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
         "ev.NeoHookean(E=1.0, nu=0.3), ev.Sinusoid(), ev.VoltageProfile([0.0], [1.0])\n"
         "ev.Scene(ev.FingerPad(), ev.Display(), motion=[ev.Press(force=0.1)])\n"
         "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio', 'pydantic'}\n"
+        "print(sorted(heavy & set(sys.modules)))"
+    )
+    assert fresh_process(code) == "[]"
+
+
+def test_a_press_loads_no_package_that_it_has_no_use_for():
+    code = (
+        "import evfem as ev\n"
+        "finger = ev.FingerPad(ridges=False, resolution='coarse')\n"
+        "ev.simulate(ev.Scene(finger, ev.Flat(), motion=[ev.Press(indentation=0.05, steps=1)]))\n"
+        "heavy = {'pydantic', 'scipy.spatial', 'scipy.optimize', 'tqdm', 'matplotlib', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     assert fresh_process(code) == "[]"

@@ -86,14 +86,37 @@ def shown(wanted: bool = True) -> Iterator[None]:
         yield
 
 
+class _NoBar:
+    """What is done with a bar, and nothing to see."""
+
+    leave = False
+
+    def __enter__(self) -> _NoBar:
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        return
+
+    def update(self, steps: int = 1) -> None:
+        """Steps are done."""
+
+    def set_postfix_str(self, text: str, refresh: bool = True) -> None:
+        """Something to say behind the bar."""
+
+    def close(self) -> None:
+        """No more to come."""
+
+
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
     """A progress bar (tqdm) with the time that is left, in a notebook a widget; one that is not
-    `wanted` draws nothing.
+    `wanted` draws nothing, and does not load what would draw it.
     """
+    if not wanted:
+        return _NoBar()
     from tqdm.auto import tqdm
 
     form = "{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}, {remaining} left, {rate_fmt}{postfix}]"
-    return tqdm(total=total, initial=done, unit=unit, disable=not wanted, ncols=_columns(), bar_format=form)
+    return tqdm(total=total, initial=done, unit=unit, ncols=_columns(), bar_format=form)
 
 
 def milestone(unit: str, done: int, total: int) -> None:

@@ -77,8 +77,6 @@ def _extent(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _nodes(mesh: Mesh, refuse: Refuse) -> None:
-    from scipy.spatial import cKDTree
-
     unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
     if len(unused):
         refuse(f"{len(unused)} nodes that no cell uses (node {_some(unused)})", "only nodes of cells")
@@ -87,10 +85,12 @@ def _nodes(mesh: Mesh, refuse: Refuse) -> None:
     box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
     order = np.lexsort(box.T)
     same = np.flatnonzero((np.diff(box[order], axis=0) == 0).all(axis=1))
-    pairs = np.stack([order[same], order[same + 1]], axis=1)
-    if not len(pairs):
-        pairs = cKDTree(mesh.points).query_pairs(radius, output_type="ndarray")
-    if len(pairs):
+    pairs: Ints | None = np.stack([order[same], order[same + 1]], axis=1)
+    if not same.size:
+        pairs = _pairs_within(mesh.points, radius)
+    if pairs is None:
+        refuse("too many nodes in one line", "nodes of cells that fill an area")
+    elif len(pairs):
         first, second = pairs[0]
         fault = f"{len(pairs)} pairs of nodes in the same place (nodes {first} and {second})"
         refuse(fault, "one node per place: merge double nodes, or the parts come loose")
@@ -122,9 +122,6 @@ def _shapes(mesh: Mesh, refuse: Refuse) -> None:
 
 
 def _connection(mesh: Mesh, refuse: Refuse) -> None:
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     edges, of_cell = mesh.edges
     cells_of_edge = np.bincount(of_cell.ravel())
     if (cells_of_edge > 2).any():
@@ -142,14 +139,24 @@ def _connection(mesh: Mesh, refuse: Refuse) -> None:
             refuse(
                 "neighbouring cells with different mid-nodes on their common edge", "one mid-node per edge"
             )
-    ones = np.ones(of_cell.size, dtype=np.int8)
-    # the graph routines of older SciPy know no other integers
-    cell = np.repeat(np.arange(len(of_cell), dtype=np.int32), mesh.corners)
-    edge = of_cell.ravel().astype(np.int32)
-    table = coo_array((ones, (cell, edge)), shape=(len(of_cell), len(edges))).tocsr()
-    parts, _ = connected_components(table @ table.T, directed=False)
+    parts = _parts(of_cell, len(edges))
     if parts > 1:
         refuse(f"{parts} separate parts", "one body, its cells joined by common edges")
+
+
+def _parts(of_cell: Ints, edges: int) -> int:
+    """Number of parts that hang together, from the edges (E, corners) of each cell: a cell takes the
+    smallest number among its neighbours, which is looked up in turn, until all of a part have one.
+    """
+    part = np.arange(len(of_cell))
+    while True:
+        smallest = np.full(edges, len(of_cell))
+        np.minimum.at(smallest, of_cell, part[:, None])
+        found = smallest[of_cell].min(axis=1)
+        if np.array_equal(found, part):
+            return len(np.unique(part))
+        np.minimum.at(part, part.copy(), found)
+        part = part[part]
 
 
 def _outline(mesh: Mesh, refuse: Refuse) -> None:
@@ -177,17 +184,31 @@ def _outline(mesh: Mesh, refuse: Refuse) -> None:
 
 def _near_pairs(segments: Floats, refuse: Refuse) -> Ints:
     """Pairs of segments (K, 2, 2) whose middles are near enough for them to meet."""
-    from scipy.spatial import cKDTree
-
     half, middle = 0.5005 * np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1), segments.mean(axis=1)
-    tree, reach = cKDTree(middle), 2.0 * float(half.max())
-    if tree.count_neighbors(tree, reach) > 2 * MOST_PAIRS:
+    pairs = _pairs_within(middle, 2.0 * float(half.max()))
+    if pairs is None:
         refuse(
             "edges of the outline too close for their lengths", "edges of similar lengths along the outline"
         )
-    pairs = np.asarray(tree.query_pairs(reach, output_type="ndarray"))
+        return np.zeros((0, 2), dtype=np.int64)
     distance = np.linalg.norm(middle[pairs[:, 0]] - middle[pairs[:, 1]], axis=1)
     return pairs[distance <= half[pairs].sum(axis=1)]
+
+
+def _pairs_within(points: Floats, reach: float) -> Ints | None:
+    """Pairs (K, 2) of points (N, dim) at most `reach` apart; None where more than `MOST_PAIRS` would
+    have to be looked at: those that are near along an oblique line, which no row of a mesh follows.
+    """
+    direction = np.sqrt([2.0, 3.0, 5.0])[: points.shape[1]]
+    along = points @ (direction / np.linalg.norm(direction))
+    order = np.argsort(along)
+    following = np.searchsorted(along[order], along[order] + reach, side="right") - np.arange(len(order)) - 1
+    if following.sum() > MOST_PAIRS:
+        return None
+    first = np.repeat(np.arange(len(order)), following)
+    second = np.arange(first.size) - np.repeat(np.cumsum(following) - following, following) + first + 1
+    pairs = np.stack([order[first], order[second]], axis=1)
+    return pairs[np.linalg.norm(points[pairs[:, 0]] - points[pairs[:, 1]], axis=1) <= reach]
 
 
 def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:

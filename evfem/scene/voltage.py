@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from evfem.common.views import changed
 from evfem.electrostatics.signalfile import read_voltage
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
@@ -105,28 +104,3 @@ def _sampled(values: dict[str, Any], prefix: str, folder: Path) -> Sampled:
         if wav:
             return Sampled.from_wav(path, values["full_scale"], start=start, repeat=values["repeat"])
         return Sampled.from_csv(path, repeat=values["repeat"])
-
-
-def voltage_keys(voltage: Any) -> dict[str, Any]:
-    """The keys of [electrostatics] that give this voltage, without files."""
-    if isinstance(voltage, VoltageProfile):
-        rows = zip(voltage.position.tolist(), voltage.voltage.tolist(), strict=True)
-        return {"voltage_profile": [list(row) for row in rows]}
-    if isinstance(voltage, (Sine, Carrier, Sampled)):
-        return {"signal": _signal_table(voltage)}
-    if not isinstance(voltage, float):
-        allowed = "a number, a VoltageProfile, Sine, Carrier or Sampled in a scene file"
-        raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
-    return {"voltage": voltage}
-
-
-def _signal_table(signal: Sine | Carrier | Sampled) -> dict[str, Any]:
-    table = {"kind": signal.kind, **changed(signal)}
-    if isinstance(signal, Sampled):
-        table["voltage"] = signal.voltage.tolist()
-    elif isinstance(signal, Carrier) and isinstance(signal.envelope, TimeSignal):
-        if not isinstance(signal.envelope, (Sine, Carrier, Sampled)):
-            given = f"a carrier with an envelope of the class {type(signal.envelope).__name__}"
-            raise InputError("electrostatics.voltage", given, "Sine, Carrier or Sampled in a scene file")
-        table["envelope"] = _signal_table(signal.envelope)
-    return table

@@ -288,6 +288,7 @@ class Run:
             "contact_solves": record.contact_solves,
             "cuts": self.stepper.cuts,
             "relaxations": self.stepper.relaxations,
+            "unsettled": self.stepper.unsettled,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",

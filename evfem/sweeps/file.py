@@ -22,9 +22,10 @@ from pydantic import Field as Key
 
 from evfem.common.checks import set_frozen
 from evfem.errors import InputError, quoted, unknown
-from evfem.scene.file import VERSION, dump, read_text, tables_of
+from evfem.scene.file import read_text, tables_of
 from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
+from evfem.scene.written import VERSION, dump
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
 

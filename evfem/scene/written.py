@@ -1,0 +1,153 @@
+"""A scene as TOML: what `evfem.scene.file` reads back.
+
+Beyond what files written by hand need, three keys let a file stand alone: `points` of a profile,
+`voltage_profile`, `gap_eps_r`. Every run keeps its scene this way, so nothing here loads the models
+that check a file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from evfem.common.views import changed
+from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
+from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
+from evfem.errors import InputError
+from evfem.finger.fingerpad import FingerPad, MeshedFinger
+from evfem.finger.scan import RidgeScan
+from evfem.protocols import TimeSignal
+from evfem.scene.scene import Scene
+from evfem.tissue.laws import LAWS
+
+VERSION = 1
+#: kinds of textures and names of force laws in a file
+TEXTURES: Mapping[str, type] = {"grating": Grating, "self_affine": SelfAffine}
+FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
+
+
+def dump(scene: Scene) -> str:
+    """The scene as TOML; `loads` makes an equal scene of it.
+
+    An insulator without a law has no effect and no place in a file. Raises InputError for what a
+    file cannot hold: a mesh object, a law or a weak form of the user's own.
+    """
+    if scene.forms:
+        raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
+    tables = {
+        "version": VERSION,
+        "finger": _finger_table(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
+        "surface": _surface_table(scene.surface),
+    }
+    if scene.law is not None:
+        tables["electrostatics"] = _electrostatics_table(scene)
+    solver = _changed(scene.solver)
+    if "strategy" in solver:
+        solver["strategy"] = _changed(scene.solver.strategy)
+    tables["solver"] = solver
+    tables["output"] = _changed(scene.output)
+    tables["motion"] = [{"kind": motion.kind, **_changed(motion)} for motion in scene.motion]
+    return tomli_w.dumps({name: table for name, table in tables.items() if table != {}})
+
+
+def _changed(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass that differ from their defaults."""
+    return {name: v for name, v in changed(value).items() if v is not None}
+
+
+def _finger_table(finger: Any) -> dict[str, Any]:
+    if isinstance(finger, MeshedFinger):
+        if not isinstance(finger.source, (str, Path)):
+            raise InputError("finger.mesh", "a mesh object", "a mesh in a file, for a file")
+        table: dict[str, Any] = {"mesh": str(Path(finger.source).resolve()), "regions": finger.regions}
+        table |= {
+            "viscosity": finger.viscosity,
+            "materials": finger.materials,
+            "electrical": finger.electrical,
+        }
+    elif isinstance(finger, FingerPad):
+        usual = FingerPad().materials
+        table = _changed(finger)
+        table["materials"] = {name: law for name, law in finger.materials.items() if law != usual[name]}
+        if isinstance(finger.ridge_scan, RidgeScan):
+            table["ridge_scan"] = finger.ridge_scan.columns
+    else:
+        raise InputError("finger", type(finger).__name__, "FingerPad or MeshedFinger, for a file")
+    if "materials" in table:
+        table["materials"] = {name: _law_table(name, law) for name, law in table["materials"].items()}
+    if "electrical" in table:
+        table["electrical"] = _changed(table["electrical"])
+    return {
+        name: dict(v) if isinstance(v, Mapping) else v for name, v in table.items() if v not in (None, {})
+    }
+
+
+def _law_table(region: str, law: Any) -> dict[str, Any]:
+    names = [name for name, cls in LAWS.items() if type(law) is cls]
+    if not names:
+        raise InputError(f"finger.materials.{region}", type(law).__name__, f"{', '.join(LAWS)}, for a file")
+    return {"law": names[0], **_changed(law)}
+
+
+def _surface_table(surface: Any) -> dict[str, Any]:
+    if type(surface) not in (Flat, Display, Sinusoid, Profile, *TEXTURES.values()):
+        allowed = "Flat, Display, Sinusoid, Profile, Grating or SelfAffine, for a file"
+        raise InputError("surface", type(surface).__name__, allowed)
+    friction = (
+        surface.friction if isinstance(surface.friction, float) else [list(row) for row in surface.friction]
+    )
+    table = {"friction": friction} | ({} if surface.y is None else {"y": float(surface.y)})
+    if type(surface) in (Flat, Display):
+        return {"kind": "flat", **table}
+    if type(surface) is Sinusoid:
+        return {"kind": "sinusoid", **table, "terms": [list(row) for row in surface.terms or ()]}
+    for kind, cls in TEXTURES.items():
+        if type(surface) is cls:
+            own = {name: value for name, value in _changed(surface).items() if name != "insulator"}
+            return {"kind": kind, **own, **table}
+    rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
+    return {"kind": "profile", **table, "points": [list(row) for row in rows]}
+
+
+def _electrostatics_table(scene: Scene) -> dict[str, Any]:
+    names = [name for name, cls in FORCE_LAWS.items() if type(scene.law) is cls]
+    if not names:
+        raise InputError(
+            "electrostatics.law", type(scene.law).__name__, f"{' | '.join(FORCE_LAWS)}, for a file"
+        )
+    table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
+    table |= voltage_keys(scene.voltage)
+    insulator = scene.ground.insulator
+    table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
+    return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}
+
+
+def voltage_keys(voltage: Any) -> dict[str, Any]:
+    """The keys of [electrostatics] that give this voltage, without files."""
+    if isinstance(voltage, VoltageProfile):
+        rows = zip(voltage.position.tolist(), voltage.voltage.tolist(), strict=True)
+        return {"voltage_profile": [list(row) for row in rows]}
+    if isinstance(voltage, (Sine, Carrier, Sampled)):
+        return {"signal": _signal_table(voltage)}
+    if not isinstance(voltage, float):
+        allowed = "a number, a VoltageProfile, Sine, Carrier or Sampled in a scene file"
+        raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
+    return {"voltage": voltage}
+
+
+def _signal_table(signal: Sine | Carrier | Sampled) -> dict[str, Any]:
+    table = {"kind": signal.kind, **changed(signal)}
+    if isinstance(signal, Sampled):
+        table["voltage"] = signal.voltage.tolist()
+    elif isinstance(signal, Carrier) and isinstance(signal.envelope, TimeSignal):
+        if not isinstance(signal.envelope, (Sine, Carrier, Sampled)):
+            given = f"a carrier with an envelope of the class {type(signal.envelope).__name__}"
+            raise InputError("electrostatics.voltage", given, "Sine, Carrier or Sampled in a scene file")
+        table["envelope"] = _signal_table(signal.envelope)
+    return table
