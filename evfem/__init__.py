@@ -38,6 +38,8 @@ _NAMES = {
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     "fast.model": ("FastModel", "reduce"),
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
+    "finger.fingerprint": ("HeightMap",),
+    "finger.fingertip": ("Fingertip",),
     "finger.scan": ("RidgeScan",),
     "loading": ("load",),
     "mesh.mesh": ("Mesh",),

@@ -49,6 +49,8 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.finger.fingerprint import HeightMap as HeightMap
+from evfem.finger.fingertip import Fingertip as Fingertip
 from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file

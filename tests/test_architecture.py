@@ -28,7 +28,10 @@ ROOMS = {
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics drag body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
+    "finger": (
+        {"numpy", "PIL"},
+        "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
+    ),
     "electrostatics": (
         {"numpy", "scipy"},
         "laws dielectrics charges alternating forces signals wav timesignals encoding hjif signalfile",
