@@ -128,8 +128,8 @@ class Linearisation:
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         dynamics = self.body.dynamics
         begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds, state.status, state.pressure)
-        self._made_at = TangentPoint(*at)
+        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        self._made_at = TangentPoint(*at, state.status, state.pressure)
         self.record.factorisations += 1
 
     def made_at(self, state: State) -> bool:

@@ -64,9 +64,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,) when
-    the step began, whether the attraction was frozen, the time step's displacements at its beginning (N, 2) and
-    its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if that is an unknown.
+    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
+    when the step began, whether the attraction was frozen, the time step's displacements at its
+    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
+    that is an unknown.
     """
 
     u: Floats

@@ -81,7 +81,8 @@ def test_a_sphere_that_slides_and_turns_has_stick_and_slip_in_all_directions(fri
     problem, _ = half_space(14, friction, *motion)
     found = solve_disc(problem, np.zeros(3 * problem.size))
     assert missed(problem, found) < 1e-10
-    assert set(found.status.tolist()) > {OPEN} and (found.status != OPEN).sum() > 20
+    assert set(found.status.tolist()) > {OPEN}
+    assert (found.status != OPEN).sum() > 20
 
 
 def test_sweeps_alone_come_to_the_same_forces():
@@ -103,7 +104,8 @@ def test_turned_tangents_turn_the_answer():
 def test_without_friction_normal_forces_alone_act():
     problem, _ = half_space(8, 0.0, (0.04, 0.03))
     found = solve_disc(problem, np.zeros(3 * problem.size))
-    assert not found.force.reshape(-1, 3)[:, 1:].any() and missed(problem, found) < 1e-12
+    assert not found.force.reshape(-1, 3)[:, 1:].any()
+    assert missed(problem, found) < 1e-12
 
 
 def test_a_prescribed_force_finds_the_travel_of_the_bone():
@@ -126,7 +128,8 @@ def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
     pull = AttractionStiffness(np.array([0.2, 0.2]), np.array([0.4, 0.4]), np.array([0.1, 0.3]))
     problem = DiscProblem(start, np.eye(6), np.full(2, 0.3))
     found = solve_attracted_disc(problem, pull, np.array([OPEN, OPEN]), np.zeros(6))
-    assert found.status.tolist() == [OPEN, STICK] and not found.reduced
+    assert found.status.tolist() == [OPEN, STICK]
+    assert not found.reduced
     assert_allclose(found.state[::3], [0.525, 0.0], atol=1e-12)
     assert_allclose(found.force[::3], [0.0, 1.3], atol=1e-12)
     assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import dblquad
+from tools.solids import block
 
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
@@ -13,7 +14,6 @@ from evfem.contact.skin import PLACES, Skin, make_skin, shape_functions
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
-from tools.solids import block
 
 FACES = {4: "bilinear", 9: "biquadratic"}
 
@@ -99,7 +99,8 @@ def test_a_skin_has_the_pad_s_faces_and_says_where_there_are_none():
     points = mesh.points[skin.nodes]
     assert (len(skin.faces), skin.free.sum()) == (8, 10)
     assert_allclose(skin.tributary(points).sum(), 8.0)
-    assert skin.facing(points).all() and skin.spacing(points) == 1.0
+    assert skin.facing(points).all()
+    assert skin.spacing(points) == 1.0
     mesh.node_sets["pad"] = mesh.node_sets["bottom"][:1]
     with pytest.raises(InputError, match="no outer face"):
         make_skin(mesh)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tools.domes import DISPLAY, Dome, dome, dome_scene
 
 import evfem as ev
 from evfem.common.constants import SMALLEST_J
@@ -10,7 +11,6 @@ from evfem.contact.coulomb import SLIP
 from evfem.simulation.history import SPATIAL, WIDTHS
 from evfem.simulation.result import Checkpoint, load
 from evfem.simulation.run import simulate
-from tools.domes import DISPLAY, Dome, dome, dome_scene
 
 PRESS = ev.Press(indentation=0.3, steps=2)
 FORCES = ("applied_force", "normal_force", "tangential_force", "tangential_force_z", "electrostatic_force")
@@ -37,17 +37,23 @@ def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
     assert_allclose(np.hypot(*shear), 0.3 * slid.normal_force[-1], rtol=2e-3)
     assert_allclose(np.degrees(np.arctan2(*shear[::-1])), 30.0, atol=0.3)
     assert_allclose([slid.position[-1], slid["position_z"][-1]], 0.5 * np.array([np.cos(np.pi / 6), 0.5]))
-    assert (slid.friction_dissipation[2:] > 0.0).all() and (np.diff(slid.friction_dissipation) >= 0.0).all()
+    assert (slid.friction_dissipation[2:] > 0.0).all()
+    assert (np.diff(slid.friction_dissipation) >= 0.0).all()
 
 
 def test_columns_of_the_plane_stay_and_widths_are_empty(slid):
     assert slid.columns[-len(SPATIAL) :] == tuple(SPATIAL)
     assert all(np.isnan(slid[name]).all() for name in WIDTHS)
-    assert (slid.contact_area >= slid.real_contact_area).all() and slid.real_contact_area[-1] > 1.0
-    assert slid.units["normal_force"] == "N" and slid.units["stored_energy"] == "mJ"
-    assert slid.units["contact_area"] == "mm2" and slid.total is slid
+    assert (slid.contact_area >= slid.real_contact_area).all()
+    assert slid.real_contact_area[-1] > 1.0
+    assert slid.units["normal_force"] == "N"
+    assert slid.units["stored_energy"] == "mJ"
+    assert slid.units["contact_area"] == "mm2"
+    assert slid.total is slid
     text = repr(slid)
-    assert "contact area" in text and "tangential force z" in text and "N/mm" not in text
+    assert "contact area" in text
+    assert "tangential force z" in text
+    assert "N/mm" not in text
 
 
 def test_a_turned_slide_turns_its_forces(slid):
@@ -128,8 +134,10 @@ def test_hover_ramp_and_snap_in_come_to_the_display():
     soft = Dome(law=ev.NeoHookean(E=0.01, nu=0.45), shape=dome(radius=40.0))
     motion = [ev.Hover(gap=0.02), ev.VoltageRamp(400.0, steps=3)]
     result = simulate(dome_scene(*motion, finger=soft, surface=thin, voltage=0.0))
-    assert result.real_contact_area[0] == 0.0 and result.min_gap[0] > 0.019
-    assert result.real_contact_area[-1] > 0.5 and result.normal_force[-1] > 0.0
+    assert result.real_contact_area[0] == 0.0
+    assert result.min_gap[0] > 0.019
+    assert result.real_contact_area[-1] > 0.5
+    assert result.normal_force[-1] > 0.0
     assert_allclose(result.normal_force - result.electrostatic_force, result.applied_force, atol=1e-8)
     assert balance(result) < 1e-5
 
@@ -139,7 +147,8 @@ def test_time_adds_viscous_stress_and_inertia():
     calm = simulate(dome_scene(*quick, law=None, voltage=0.0))
     solver = ev.Solver(element="hex8", dynamics="inertial")
     timed = simulate(dome_scene(*quick, law=None, voltage=0.0, solver=solver, finger=Dome(viscosity=5e-3)))
-    assert timed.viscous_dissipation[-1] > 0.0 and timed.kinetic_energy[-1] > 0.0
+    assert timed.viscous_dissipation[-1] > 0.0
+    assert timed.kinetic_energy[-1] > 0.0
     assert timed.applied_force[1] > 1.02 * calm.applied_force[1]
     assert balance(timed) < 1e-7
 
