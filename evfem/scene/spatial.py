@@ -6,6 +6,7 @@ solver needs.
 
 from __future__ import annotations
 
+from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
@@ -43,6 +44,9 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.direction != "vertical":
         found.append(("electrostatics.direction", f"{scene.direction} {SOLID}", "vertical"))
+    if not isinstance(roughness_of(scene.roughness_gap), (ConstantRoughness, type(None))):
+        allowed = "a number: separations that depend on the pressure are those of the plane"
+        found.append(("electrostatics.roughness_gap", f"a law {SOLID}", allowed))
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
     if isinstance(scene.voltage, FollowForce) and any(
