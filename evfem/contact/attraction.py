@@ -88,9 +88,8 @@ class Attraction:
         if not voltages.any():
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
-        gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1]) + self._separation(
-            positions, pressing
-        )
+        apart = self._separation(positions, pressing)
+        gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1]) + apart
         pairs = list(zip(gaps, voltages.tolist(), strict=True))
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
@@ -100,8 +99,7 @@ class Attraction:
             forces[..., 1] = -weight
             return forces
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
-        x = positions[..., 0]
-        sideways = [self._sideways(*each) for each in zip(x, potential, strict=True)]
+        sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
     def _sideways(self, x: Floats, potential: Floats) -> Floats:
