@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -33,13 +33,13 @@ ROOMS = {
         "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
-        {"numpy", "scipy"},
-        "laws dielectrics charges alternating roughness forces signals wav timesignals encoding hjif "
-        "signalfile",
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge skin attraction signorini follower condensed coulomb sweeps "
+        "surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb sweeps "
         "disc spatial stability",
     ),
     "solver": (
@@ -49,7 +49,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense spatial plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "timescales spatial plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
@@ -96,7 +97,7 @@ LATE = {
     "SurfaceTopography",
 }
 #: compiled from C, without imports
-BUILT = {"evfem.tissue.kernels.loops"}
+BUILT = {"evfem.tissue.kernels.loops", "evfem.tissue.kernels.solids"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 
 

@@ -22,32 +22,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
+from evfem.mesh.faces import PLACES, shape_functions
 from evfem.mesh.mesh import Mesh
 
-#: corners, middles of the edges and centre of a face, in the order of its nodes
-PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
 #: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
 ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}
 ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
-
-
-def shape_functions(nodes: int, places: Floats) -> tuple[Floats, Floats]:
-    """Values (G, m) and derivatives (G, m, 2) of the m = 4 or 9 shape functions at places (G, 2).
-
-    >>> value, slope = shape_functions(9, PLACES)
-    >>> bool(np.allclose(value, np.eye(9))), bool(np.allclose(slope.sum(axis=1), 0.0))
-    (True, True)
-    """
-
-    def along(t: Floats, at: Floats) -> tuple[Floats, Floats]:
-        if nodes == 4:
-            return 0.5 * (1.0 + t * at), 0.5 * at + 0.0 * t
-        middle = at == 0.0
-        value = np.where(middle, 1.0 - t**2, 0.5 * t * (t + at))
-        return value, np.where(middle, -2.0 * t, t + 0.5 * at)
-
-    (a, da), (b, db) = (along(places[:, i : i + 1], PLACES[:nodes, i]) for i in (0, 1))
-    return a * b, np.stack([da * b, a * db], axis=2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -47,6 +47,8 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if not isinstance(roughness_of(scene.roughness_gap), (ConstantRoughness, type(None))):
         allowed = "a number: separations that depend on the pressure are those of the plane"
         found.append(("electrostatics.roughness_gap", f"a law {SOLID}", allowed))
+    if scene.drive is not None and scene.drive.resolved:
+        found.append(("electrostatics.drive", f"resolved {SOLID}", "mean"))
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
     if isinstance(scene.voltage, FollowForce) and any(

@@ -10,10 +10,11 @@ from tools.solids import block
 
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
-from evfem.contact.skin import PLACES, Skin, make_skin, shape_functions
+from evfem.contact.skin import Skin, make_skin
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
+from evfem.mesh.faces import PLACES, shape_functions
 
 FACES = {4: "bilinear", 9: "biquadratic"}
 
