@@ -81,22 +81,22 @@ class Attraction:
         """Charges (2, P) of an uncharged pad, (2, 0) where charges do not move."""
         return np.zeros((2, 0)) if self.charging is None else self.charging.none
 
-    def _seen(self, gap: Any, voltage: float, x: Floats) -> Any:
-        """The voltage that the law sees at gaps (P,) of nodes at x (P,): that of the charges, too."""
+    def _seen(self, gap: Any, voltage: float, position: Floats) -> Any:
+        """The voltage that the law sees at gaps (P,) of nodes at (P, dim): that of the charges, too."""
         if self.charging is None:
             return voltage
-        return self.charging.effective(gap, voltage, self.pad.length(x))
+        return self.charging.effective(gap, voltage, self.pad.tributary(position))
 
     def charged(
         self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
     ) -> Charged:
-        """The electric state at positions (P, 2): with the charges (2, P), or those at the end of
+        """The electric state at positions (P, dim): with the charges (2, P), or those at the end of
         the present step.
         """
         assert self.charging is not None
-        x = position[:, 0]
-        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + self._separation(x, pressing)
-        length = self.pad.length(x)
+        apart = self._separation(position, pressing)
+        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + apart
+        length = self.pad.tributary(position)
         found = self.charging.after(gap, voltage, length) if charges is None else charges
         return Charged(found, voltage, gap, length)
 
@@ -118,9 +118,10 @@ class Attraction:
         if not voltages.any() and self.charging is None:
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
-        x, apart = positions[..., 0], self._separation(positions, pressing)
-        gaps = np.maximum(frame.gap, 0.0).reshape(x.shape) + apart
-        pairs = [(gap, self._seen(gap, u, at)) for gap, u, at in zip(gaps, voltages.tolist(), x, strict=True)]
+        gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
+        gaps = gaps + self._separation(positions, pressing)
+        at = zip(gaps, voltages.tolist(), positions, strict=True)
+        pairs = [(gap, self._seen(gap, u, position)) for gap, u, position in at]
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.tributary(positions)
@@ -161,7 +162,7 @@ class Attraction:
         on = 1.0 if self.air_layer else touching.astype(float)
         p = self._contact_pressure(position, pressing)
         closer = separation_derivative(self.roughness, p)
-        rate = self._rate(self.roughness.separation(p), voltage, position[:, 0])
+        rate = self._rate(self.roughness.separation(p), voltage, position)
         return np.asarray(on * rate * closer)
 
     def negative_stiffness(
@@ -174,16 +175,16 @@ class Attraction:
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(gap, 0.0) + self._separation(position, pressing)
-        rate = self._rate(apart, voltage, position[:, 0])
+        rate = self._rate(apart, voltage, position)
         weakening = -on * rate * self.pad.tributary(position)
         return np.where((gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
 
-    def _rate(self, apart: Floats, voltage: float, x: Floats) -> Any:
-        """dp/dg (P,) in MPa/mm of nodes at x (P,), the charges of the present step following."""
+    def _rate(self, apart: Floats, voltage: float, position: Floats) -> Any:
+        """dp/dg (P,) in MPa/mm of nodes at (P, dim), the charges of the present step following."""
         if self.charging is None:
             return traction_derivative(self.law, apart, voltage, self.layers)
         law = self.law
-        seen = lambda g: law.traction(g, self._seen(g, voltage, x), self.layers)  # noqa: E731
+        seen = lambda g: law.traction(g, self._seen(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
     def stiffness(
@@ -196,7 +197,7 @@ class Attraction:
         frame = surface_state(self.surface, position)
         on = 1.0 if self.air_layer else touching.astype(float)
         apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
-        p = on * self.law.traction(apart, self._seen(apart, voltage, position[:, 0]), self.layers)
+        p = on * self.law.traction(apart, self._seen(apart, voltage, position), self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)

@@ -238,12 +238,12 @@ class Part:
             return 0.0
         charging = attraction.charging
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
-        grown = attraction.pad.length(end[:, 0]) - attraction.pad.length(begin[:, 0])
+        grown = attraction.pad.tributary(end) - attraction.pad.tributary(begin)
         pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
         work = 0.0
         for way, share in zip(WAY, SHARE, strict=True):
             position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
-            carried = charging.carried(attraction.pad.length(position[:, 0]))
+            carried = charging.carried(attraction.pad.tributary(position))
             at = attraction.charged(position, charging.old.voltage, pressing, carried)
             work += share * float(charging.energy_density(at) @ grown)
         return work
