@@ -12,6 +12,7 @@ import numpy as np
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
+from evfem.contact.friction import Coulomb
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.electrostatics.roughness import roughness_of
@@ -79,6 +80,8 @@ def make_model(scene: Scene) -> Model:
     limits = Limits(solver.tolerance, solver.strategy, solver.threads)
     kind = PenaltyInterface if solver.contact == "penalty" else Interface
     interface = kind(pad, mesh.points, surface, solver.tolerance)
+    if not isinstance(scene.friction_law, Coulomb):
+        interface.law = scene.friction_law
     if isinstance(interface, PenaltyInterface):
         normal = float(solver.penalty_normal or 0.0)
         interface.penalties = (normal, solver.penalty_tangential or normal)
