@@ -35,7 +35,7 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "friction surfaces textures own pad edge attraction signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},

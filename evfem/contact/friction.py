@@ -9,7 +9,7 @@ law                   tau                                                       
 ====================  ==================================================================  ===========
 `Coulomb`             mu p                                                                coulomb
 `LoadIndexFriction`   mu p (p / pressure)^(index - 1)                                     load_index
-`AdhesiveFriction`    strength + mu p                                                     adhesive
+`AdhesiveFriction`    strength min(1, p / full) + mu p                                               adhesive
 `RateFriction`        mu p (ratio + (1 - ratio) exp(-v / speed)) (v / speed)^exponent     rate
 `AgeingFriction`      mu p (1 - (1 - fresh) exp(-t / time))                               ageing
 ====================  ==================================================================  ===========
@@ -36,8 +36,9 @@ from evfem.common.checks import Values, Within, check_fields, number, plain
 from evfem.protocols import FrictionLaw
 from evfem.tensor import derivative
 
-#: share of a law's own pressure and speed below which its power stays as it is, unless it is given
-LOWEST = 1e-3
+#: share of a law's own pressure and speed below which its power stays as it is, unless it is given: where
+#: friction rises without bound as the load vanishes, nodes at the edge of contact would wedge
+LOWEST = 0.01
 #: steps of differences of a law that drops imaginary parts: in MPa, of a coefficient, in mm/s
 PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
@@ -64,7 +65,7 @@ class Coulomb:
 @dataclass(frozen=True)
 class LoadIndexFriction:
     """The force grows with the power `index` of the load: the coefficient is that of the surface at
-    `pressure` (MPa), and below `lowest` (MPa; None: a thousandth of it) what it is there.
+    `pressure` (MPa), and below `lowest` (MPa; None: a hundredth of it) what it is there.
 
     >>> law = LoadIndexFriction(pressure=0.01, index=0.7)
     >>> round(float(law.bound(0.02, 0.3, 0.0, 0.0) / law.bound(0.01, 0.3, 0.0, 0.0)), 12) == round(2**0.7, 12)
@@ -88,13 +89,15 @@ class LoadIndexFriction:
 
 @dataclass(frozen=True)
 class AdhesiveFriction:
-    """Every touching place resists with the shear `strength` (MPa) besides mu p.
+    """Every place in real contact resists with the shear `strength` (MPa) besides mu p. Contact is
+    complete from the pressure `full` on (MPa; None: the strength), and below it grows in proportion.
 
-    >>> AdhesiveFriction(strength=0.004).bound(0.01, 0.3, 0.0, 0.0)
-    0.007
+    >>> AdhesiveFriction(strength=0.004).bound(np.array([0.002, 0.01]), 0.3, 0.0, 0.0).tolist()
+    [0.0026, 0.007]
     """
 
-    strength: float = field(metadata=number("a stress in MPa from 0 to 1e6", Within(0.0, 1e6)))
+    strength: float = field(metadata=_PRESSURE)
+    full: float | None = field(default=None, metadata=_PRESSURE)
     kind = "adhesive"
     timed = False
 
@@ -103,13 +106,14 @@ class AdhesiveFriction:
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
-        return self.strength + mu * pressure
+        share = np.asarray(pressure) / (self.strength if self.full is None else self.full)
+        return plain(self.strength * np.where(share.real < 1.0, share, 1.0) + mu * pressure)
 
 
 @dataclass(frozen=True)
 class RateFriction:
     """Friction of sliding at `speed` (mm/s): it falls from mu to `ratio` mu around it, and goes with
-    the power `exponent` of the speed, which below `slowest` (mm/s; None: a thousandth of `speed`)
+    the power `exponent` of the speed, which below `slowest` (mm/s; None: a hundredth of `speed`)
     counts as that.
 
     >>> stribeck = RateFriction(speed=5.0, ratio=0.5)

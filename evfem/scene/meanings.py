@@ -133,12 +133,13 @@ ELECTROSTATICS = {
 FRICTION = {
     "pressure": Text("MPa", "contact pressure at which the coefficient is that of the surface"),
     "index": Text("", "the force grows with this power of the load"),
-    "lowest": Text("MPa", "below it the coefficient stays; without it a thousandth of the pressure"),
-    "strength": Text("MPa", "shear traction that every touching place carries beside mu p"),
+    "lowest": Text("MPa", "below it the coefficient stays; without it a hundredth of the pressure"),
+    "strength": Text("MPa", "shear traction that every place in real contact carries beside mu p"),
+    "full": Text("MPa", "contact pressure at which real contact is complete; without it the strength"),
     "speed": Text("mm/s", "at which friction of sliding differs from that of sticking"),
     "ratio": Text("", "friction of fast sliding over that of sticking"),
     "exponent": Text("", "friction goes with this power of speed over that speed"),
-    "slowest": Text("mm/s", "below it that power stays; without it a thousandth of the speed"),
+    "slowest": Text("mm/s", "below it that power stays; without it a hundredth of the speed"),
     "fresh": Text("", "share of the friction that a place has when it touches"),
     "time": Text("s", "time constant of the rest"),
 }

@@ -189,7 +189,7 @@ class Interface:
         """The accepted state with the ages of its nodes, if a law of friction may ask for them."""
         if self.law is None:
             return state
-        return replace(state, age=np.where(state.touching, self.age(old), 0.0))
+        return replace(state, age=self.age(old))
 
     def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
         """Largest shear forces of the pad nodes (P,) at x (P,) under contact forces (P,), on a part of a
