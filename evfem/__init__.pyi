@@ -26,6 +26,9 @@ from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
 from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
+from evfem.electrostatics.dielectrics import Dielectric as Dielectric
+from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
+from evfem.electrostatics.drive import Drive as Drive
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
@@ -45,6 +48,7 @@ from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine
+from evfem.electrostatics.timesignals import Square as Square
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
@@ -55,6 +59,8 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.finger.fingerprint import HeightMap as HeightMap
+from evfem.finger.fingertip import Fingertip as Fingertip
 from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file
@@ -94,6 +100,8 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.textures.texture import Texture as Texture
+from evfem.textures.touch import Touch as Touch
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form
 from evfem.tissue.forms import grad as grad

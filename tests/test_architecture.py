@@ -22,20 +22,24 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics drag body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
+    "finger": (
+        {"numpy", "PIL"},
+        "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
+    ),
     "electrostatics": (
-        {"numpy", "scipy"},
-        "laws roughness forces signals wav timesignals encoding hjif signalfile",
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge attraction signorini follower condensed stability",
+        "friction surfaces textures own pad edge charging attraction signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -44,7 +48,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "timescales plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},
@@ -56,6 +61,10 @@ ROOMS = {
         "samples file schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
+    "textures": (
+        {"numpy", "scipy", "PIL", "SurfaceTopography"},
+        "texture generate library cleaning importing scans parametric touch estimators database commands",
+    ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
@@ -74,7 +83,18 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
+LATE = {
+    "skfem",
+    "meshio",
+    "matplotlib",
+    "PIL",
+    "pypardiso",
+    "tqdm",
+    "distributed",
+    "pyarrow",
+    "pandas",
+    "SurfaceTopography",
+}
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

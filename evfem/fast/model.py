@@ -248,6 +248,8 @@ def _check_scene(scene: Scene) -> None:
     if not isinstance(scene.friction_law, Coulomb):
         given = type(scene.friction_law).__name__
         raise InputError("surface.friction_law", given, "Coulomb with the fast model")
+    if scene.drive is not None and scene.drive.resolved:
+        raise InputError("drive", "resolved in time", "the mean over the cycle with the fast model")
     rough = roughness_of(scene.roughness_gap)
     if rough is not None and not isinstance(rough, ConstantRoughness):
         allowed = "a length in mm with the fast model"

@@ -37,7 +37,17 @@ from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Target, sticks
 from evfem.solver.interface import Interface
-from evfem.solver.state import NO_AGE, Balance, Folded, Limits, Record, Reusable, State, StepFailed
+from evfem.solver.state import (
+    NO_AGE,
+    NO_CHARGES,
+    Balance,
+    Folded,
+    Limits,
+    Record,
+    Reusable,
+    State,
+    StepFailed,
+)
 from evfem.solver.strategy import Strategy
 
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
@@ -145,6 +155,7 @@ class Statics:
             velocity=still,
             last_increment=still,
             age=NO_AGE if self.interface.law is None else np.zeros(nodes),
+            charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
         )
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))
