@@ -1,0 +1,227 @@
+r"""The attraction of the pad from the full field instead of column by column.
+
+Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
+problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes and
+move with them (`evfem.electrostatics.columns`): the electrode at the voltage, living tissue at 0,
+the skin's layer as thick above each node as it is undeformed. Nodes that touch keep
+`SERIES_GAP` of the insulator's reduced thickness, and what rough faces keep, as a gap in series.
+Nodal forces are derivatives of the discrete energy
+
+.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
+
+with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
+the column law, which they are close to, so contact, friction and controls know nothing of the
+field. In every solution C lies between its bounds (`certificate`).
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.attraction import Attraction
+from evfem.contact.pad import Pad, surface_state
+from evfem.electrostatics.columns import Capacitance, Columns
+from evfem.electrostatics.laws import Layer, eps_0
+from evfem.errors import EvfemError
+
+#: gap of touching nodes, as a share of the insulator's reduced thickness
+SERIES_GAP = 1e-4
+#: outer edges steeper than this, |n_y| below it, belong to the flanks
+FLANK = 0.3
+#: rows as shares of the layers' heights: fine where insulator and skin meet the air
+INSULATOR = 1.0 - np.linspace(1.0, 0.0, 5) ** 2
+AIR = np.linspace(0.0, 1.0, 5)
+SKIN = np.linspace(0.0, 1.0, 6) ** 2
+#: share by which a discrete capacitance may miss its bounds
+MARGIN = 1e-3
+#: solutions that are remembered
+KEPT = 3
+#: places and weights of quadrature along an edge of the outline
+_AT, _WEIGHT = (part / 2.0 for part in np.polynomial.legendre.leggauss(5))
+
+
+def facing(pad: Pad, points: Floats) -> Ints:
+    """Pad edges (K,), from left to right, of the chain that faces the display below the lowest node;
+    `points` (P, 2) of the pad undeformed. Its ends are where the flanks begin.
+    """
+    way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
+    after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
+    before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
+    start = int(np.argmin(points[pad.edges[:, :2], 1].min(axis=1)))
+    chain = [start]
+    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and way[k, 0] > 0.0 and k != start:
+        chain.append(k)
+    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and way[k, 0] > 0.0 and k != chain[-1]:
+        chain.insert(0, k)
+    flat = way[chain, 0] >= FLANK * np.hypot(*way[chain].T)
+    flat[chain.index(start)] = True
+    ends = np.flatnonzero(flat)[[0, -1]]
+    return np.array(chain[ends[0] : ends[1] + 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Lower and upper bound of a capacitance in F per m of depth (N/V^2); the lower one is the
+    column law's.
+    """
+
+    lower: float
+    upper: float
+
+    @property
+    def spread(self) -> float:
+        """By how much of itself the column law's energy may be too small."""
+        return self.upper / self.lower - 1.0
+
+
+def certificate(x: Floats, gap: Floats, insulator: tuple[float, float], skin: Floats) -> Bounds:
+    """Bounds for an outline without solving: edges at `x` (K, 3) with gaps `gap` (K, 3) in mm, quadratic
+    in between, above an insulator of that thickness (mm) and permittivity; `skin` (K, 3) is the
+    skin's layer, reduced (mm).
+
+    Below: the vertical flux through all layers, the column law. Above: the potential that is linear
+    along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
+    """
+    thickness, eps_r = insulator
+    reduced = thickness / eps_r
+    N = np.stack([(1 - _XI) * (1 - 2 * _XI), 4 * _XI * (1 - _XI), _XI * (2 * _XI - 1)])
+    dN = np.stack([4 * _XI - 3, 4 - 8 * _XI, 4 * _XI - 1])
+    dx = x @ dN
+    H, slope = gap @ N + reduced, gap @ dN / dx
+    weight = _WEIGHT * dx
+    lower = float(np.sum(weight / (H + skin @ N)))
+    spreading = (eps_r**2 - 1.0) * reduced**3 / H**4
+    upper = float(np.sum(weight * (1.0 / H + slope**2 / 3.0 * (1.0 / H + spreading))))
+    return Bounds(eps_0 * lower, eps_0 * upper)
+
+
+_XI = 0.5 + _AT
+
+
+@dataclass(frozen=True, eq=False)
+class FieldAttraction(Attraction):
+    """The attraction of the full field: `edges` (K,) of the pad that face the display, from left to
+    right, and the skin's layer under each pad node, `skin`.
+    """
+
+    edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    skin: Layer = Layer(0.0, 1.0)
+    solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
+
+    @cached_property
+    def flanks(self) -> Attraction:
+        """The column law on the other edges."""
+        others = np.setdiff1d(np.arange(len(self.pad.edges)), self.edges)
+        pad = replace(self.pad, edges=self.pad.edges[others])
+        return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
+
+    @cached_property
+    def _ends(self) -> Ints:
+        """Pad nodes (K, 3) of the facing edges: start, middle, end; without a middle node its start."""
+        edges = self.pad.edges[self.edges]
+        return edges[:, [0, 2, 1]] if edges.shape[1] == 3 else edges[:, [0, 0, 1]]
+
+    def forces_along(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """Forces (W, P, 2) at W places of a way, each from its own solution."""
+        forces = self.flanks.forces_along(positions, voltages, touching, pressing)
+        for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
+            if voltage != 0.0:
+                own = None if pressing is None else pressing[k]
+                forces[k] += voltage**2 * self._unit_forces(position, own)
+        return forces
+
+    def column_forces(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """The column law's forces (P, 2), for the tangent."""
+        pressed = None if pressing is None else pressing[None]
+        return Attraction.forces_along(self, position[None], np.array([voltage]), touching, pressed)[0]
+
+    def energy(self, position: Floats, pressing: Floats | None = None) -> float:
+        """Co-energy of the facing part at 1 V, N mm per mm of depth and V^2."""
+        return 0.5 * self.solve(position, pressing).value
+
+    def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
+        """The field under the pad at `position` (P, 2); the last solutions are remembered."""
+        x, levels = self.outline(position, pressing)
+        key = x.tobytes() + levels.tobytes()
+        found = self.solved.get(key)
+        if found is None:
+            found = self._columns.solve(x, levels)
+            self._check(x, levels, found.value)
+            self.solved[key] = found
+            while len(self.solved) > KEPT:
+                self.solved.popitem(last=False)
+        return found
+
+    @cached_property
+    def _columns(self) -> Columns:
+        layers = [(self.surface.insulator.eps_r, INSULATOR), (getattr(self.law, "gap_eps_r", 1.0), AIR)]
+        if np.max(self.skin.thickness) > 0.0:
+            layers.append((float(self.skin.eps_r), SKIN))
+        return Columns(tuple(eps for eps, _ in layers), tuple(share for _, share in layers))
+
+    def outline(self, position: Floats, pressing: Floats | None = None) -> tuple[Floats, Floats]:
+        """x (L,) of the lines and the curves' heights (n + 1, L): electrode, insulator, skin, living
+        tissue.
+        """
+        frame = surface_state(self.surface, position)
+        rough = np.broadcast_to(self._separation(position[:, 0], pressing), frame.gap.shape)
+        insulator = self.surface.insulator
+        lowest = SERIES_GAP * insulator.thickness / insulator.eps_r
+        gap = np.maximum(np.maximum(frame.gap, 0.0) + rough, lowest)
+        ground = position[:, 1] - frame.gap
+        rows = [position[:, 0], ground - insulator.thickness, ground, ground + gap]
+        if len(self._columns.eps_r) == 3:
+            rows.append(ground + gap + self.skin.thickness)
+        lines = np.stack([self._on_lines(row) for row in rows])
+        return lines[0], lines[1:]
+
+    def _on_lines(self, values: Floats) -> Floats:
+        """Values of the pad nodes (P,) on the lines (L,)."""
+        ends = values[self._ends]
+        if self.pad.edges.shape[1] == 2:
+            ends[:, 1] = 0.5 * (ends[:, 0] + ends[:, 2])
+        return np.append(ends[:, :2].ravel(), ends[-1, 2])
+
+    def _to_nodes(self, values: Floats) -> Floats:
+        """Derivatives by the lines (L,) as derivatives by the pad nodes (P,)."""
+        starts, middles, ends = values[0:-1:2].copy(), values[1::2], np.zeros(len(self.edges))
+        ends[-1] = values[-1]
+        if self.pad.edges.shape[1] == 2:
+            starts, ends, middles = starts + 0.5 * middles, ends + 0.5 * middles, 0.0 * middles
+        parts = np.stack([starts, middles, ends], axis=1)
+        return np.bincount(self._ends.ravel(), parts.ravel(), self.pad.nodes.size).astype(float)
+
+    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
+        """Forces (P, 2) of the field at 1 V."""
+        found = self.solve(position, pressing)
+        by_level = [self._to_nodes(row) for row in found.by_level]
+        slope = surface_state(self.surface, position).slope
+        up = sum(by_level[2:])
+        along = self._to_nodes(found.by_x) + slope * (by_level[0] + by_level[1])
+        return 0.5 * np.stack([along, np.asarray(up)], axis=1)
+
+    def bounds(self, x: Floats, levels: Floats) -> Bounds:
+        """The bounds of C between these curves."""
+        edges = 2 * np.arange(len(self.edges))[:, None] + np.arange(3)
+        insulator = self.surface.insulator
+        skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
+        gap = (levels[2] - levels[1])[edges]
+        return certificate(x[edges], gap, (insulator.thickness, insulator.eps_r), skin[edges])
+
+    def _check(self, x: Floats, levels: Floats, value: float) -> None:
+        bounds = self.bounds(x, levels)
+        if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
+            raise EvfemError(
+                f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds {bounds.lower:.6g} and "
+                f"{bounds.upper:.6g}; a finer mesh of the finger resolves it"
+            )
