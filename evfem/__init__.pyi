@@ -23,6 +23,7 @@ from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
 from evfem.electrostatics.dielectrics import Dielectric as Dielectric
 from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
+from evfem.electrostatics.drive import Drive as Drive
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
@@ -42,6 +43,7 @@ from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine
+from evfem.electrostatics.timesignals import Square as Square
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged

@@ -34,12 +34,12 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
-        "forces signals wav timesignals encoding hjif signalfile",
+        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges alternating "
+        "roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "surfaces textures own pad edge charging attraction fullfield signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -48,7 +48,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "fieldchoice timescales plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},

@@ -26,8 +26,9 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import Pad, surface_state
+from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns
-from evfem.electrostatics.laws import Layer, eps_0
+from evfem.electrostatics.laws import eps_0
 from evfem.errors import EvfemError
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
@@ -42,8 +43,6 @@ SKIN = np.linspace(0.0, 1.0, 6) ** 2
 MARGIN = 1e-3
 #: solutions that are remembered
 KEPT = 3
-#: places and weights of quadrature along an edge of the outline
-_AT, _WEIGHT = (part / 2.0 for part in np.polynomial.legendre.leggauss(5))
 
 
 def facing(pad: Pad, points: Floats) -> Ints:
@@ -65,6 +64,13 @@ def facing(pad: Pad, points: Floats) -> Ints:
     return np.array(chain[ends[0] : ends[1] + 1])
 
 
+def in_line(pad: Pad, edges: Ints) -> Ints:
+    """Pad nodes (L,) of a chain of edges (K,) from left to right."""
+    ends = pad.edges[edges]
+    inner = ends[:, [0, *range(2, ends.shape[1])]].ravel()
+    return np.append(inner, ends[-1, 1])
+
+
 @dataclass(frozen=True, eq=False)
 class Bounds:
     """Lower and upper bound of a capacitance in F per m of depth (N/V^2); the lower one is the
@@ -81,27 +87,16 @@ class Bounds:
 
 
 def certificate(x: Floats, gap: Floats, insulator: tuple[float, float], skin: Floats) -> Bounds:
-    """Bounds for an outline without solving: edges at `x` (K, 3) with gaps `gap` (K, 3) in mm, quadratic
-    in between, above an insulator of that thickness (mm) and permittivity; `skin` (K, 3) is the
-    skin's layer, reduced (mm).
+    """Bounds for an outline without solving: points at `x` (L,) with gaps `gap` (L,) in mm above an
+    insulator of that thickness (mm) and permittivity; `skin` (L,) is the skin's layer, reduced (mm).
 
-    Below: the vertical flux through all layers, the column law. Above: the potential that is linear
-    along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
+    Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
+    are linear along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
     """
     thickness, eps_r = insulator
     reduced = thickness / eps_r
-    N = np.stack([(1 - _XI) * (1 - 2 * _XI), 4 * _XI * (1 - _XI), _XI * (2 * _XI - 1)])
-    dN = np.stack([4 * _XI - 3, 4 - 8 * _XI, 4 * _XI - 1])
-    dx = x @ dN
-    H, slope = gap @ N + reduced, gap @ dN / dx
-    weight = _WEIGHT * dx
-    lower = float(np.sum(weight / (H + skin @ N)))
-    spreading = (eps_r**2 - 1.0) * reduced**3 / H**4
-    upper = float(np.sum(weight * (1.0 / H + slope**2 / 3.0 * (1.0 / H + spreading))))
-    return Bounds(eps_0 * lower, eps_0 * upper)
-
-
-_XI = 0.5 + _AT
+    lower = columns_sum(x, gap + reduced + skin)
+    return Bounds(eps_0 * lower, eps_0 * least_upper_sum(x, gap, thickness, eps_r))
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +106,7 @@ class FieldAttraction(Attraction):
     """
 
     edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
-    skin: Layer = Layer(0.0, 1.0)
+    skin: Any = None
     solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
 
     @cached_property
@@ -122,10 +117,9 @@ class FieldAttraction(Attraction):
         return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
 
     @cached_property
-    def _ends(self) -> Ints:
-        """Pad nodes (K, 3) of the facing edges: start, middle, end; without a middle node its start."""
-        edges = self.pad.edges[self.edges]
-        return edges[:, [0, 2, 1]] if edges.shape[1] == 3 else edges[:, [0, 0, 1]]
+    def _line(self) -> Ints:
+        """Pad nodes (L,) of the facing edges from left to right."""
+        return in_line(self.pad, self.edges)
 
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
@@ -145,14 +139,27 @@ class FieldAttraction(Attraction):
         pressed = None if pressing is None else pressing[None]
         return Attraction.forces_along(self, position[None], np.array([voltage]), touching, pressed)[0]
 
-    def energy(self, position: Floats, pressing: Floats | None = None) -> float:
-        """Co-energy of the facing part at 1 V, N mm per mm of depth and V^2."""
-        return 0.5 * self.solve(position, pressing).value
+    @property
+    def has_energy(self) -> bool:  # type: ignore[override]
+        """Without rough faces, whose gap depends on the contact forces."""
+        return self.roughness is None
+
+    def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
+        """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
+        work of the forces at its ends (N mm per mm of depth), the squared voltage growing evenly.
+        """
+        squared = [voltage**2 for voltage in voltages]
+        before, after = self.solve(begin), self.solve(end)
+        energy = 0.25 * sum(squared) * (after.value - before.value)
+        ends = zip(squared, (begin, end), strict=True)
+        forces = sum(square * self._unit_forces(at, None) for square, at in ends)
+        return energy - 0.5 * float(np.sum(forces * (end - begin)))
 
     def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
         """The field under the pad at `position` (P, 2); the last solutions are remembered."""
-        x, levels = self.outline(position, pressing)
-        key = x.tobytes() + levels.tobytes()
+        line = self.seen(position)
+        x, levels = self.outline(position, line, pressing)
+        key = line.tobytes() + x.tobytes() + levels.tobytes()
         found = self.solved.get(key)
         if found is None:
             found = self._columns.solve(x, levels)
@@ -169,9 +176,26 @@ class FieldAttraction(Attraction):
             layers.append((float(self.skin.eps_r), SKIN))
         return Columns(tuple(eps for eps, _ in layers), tuple(share for _, share in layers))
 
-    def outline(self, position: Floats, pressing: Floats | None = None) -> tuple[Floats, Floats]:
-        """x (L,) of the lines and the curves' heights (n + 1, L): electrode, insulator, skin, living
-        tissue.
+    def seen(self, position: Floats) -> Ints:
+        """Those of the facing nodes (L,) at which columns stand: of nodes that do not go on to the
+        right the higher ones are behind an overhang.
+        """
+        x, y = position[self._line].T
+        if np.all(np.diff(x) > 0.0):
+            return self._line
+        kept: list[int] = []
+        for k in range(x.size):
+            while kept and x[k] <= x[kept[-1]] and y[k] < y[kept[-1]]:
+                kept.pop()
+            if not kept or x[k] > x[kept[-1]]:
+                kept.append(k)
+        return self._line[kept]
+
+    def outline(
+        self, position: Floats, line: Ints, pressing: Floats | None = None
+    ) -> tuple[Floats, Floats]:
+        """x (L,) of columns at the nodes `line` (L,) and the curves' heights (n + 1, L): electrode,
+        insulator, skin, living tissue.
         """
         frame = surface_state(self.surface, position)
         rough = np.broadcast_to(self._separation(position[:, 0], pressing), frame.gap.shape)
@@ -182,46 +206,33 @@ class FieldAttraction(Attraction):
         rows = [position[:, 0], ground - insulator.thickness, ground, ground + gap]
         if len(self._columns.eps_r) == 3:
             rows.append(ground + gap + self.skin.thickness)
-        lines = np.stack([self._on_lines(row) for row in rows])
+        lines = np.stack([row[line] for row in rows])
         return lines[0], lines[1:]
 
-    def _on_lines(self, values: Floats) -> Floats:
-        """Values of the pad nodes (P,) on the lines (L,)."""
-        ends = values[self._ends]
-        if self.pad.edges.shape[1] == 2:
-            ends[:, 1] = 0.5 * (ends[:, 0] + ends[:, 2])
-        return np.append(ends[:, :2].ravel(), ends[-1, 2])
-
-    def _to_nodes(self, values: Floats) -> Floats:
-        """Derivatives by the lines (L,) as derivatives by the pad nodes (P,)."""
-        starts, middles, ends = values[0:-1:2].copy(), values[1::2], np.zeros(len(self.edges))
-        ends[-1] = values[-1]
-        if self.pad.edges.shape[1] == 2:
-            starts, ends, middles = starts + 0.5 * middles, ends + 0.5 * middles, 0.0 * middles
-        parts = np.stack([starts, middles, ends], axis=1)
-        return np.bincount(self._ends.ravel(), parts.ravel(), self.pad.nodes.size).astype(float)
+    def _to_nodes(self, values: Floats, line: Ints) -> Floats:
+        """Derivatives by the nodes `line` (L,) as derivatives by all pad nodes (P,)."""
+        return np.bincount(line, values, self.pad.nodes.size).astype(float)
 
     def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
         """Forces (P, 2) of the field at 1 V."""
         found = self.solve(position, pressing)
-        by_level = [self._to_nodes(row) for row in found.by_level]
+        line = self.seen(position)
+        by_level = [self._to_nodes(row, line) for row in found.by_level]
         slope = surface_state(self.surface, position).slope
         up = sum(by_level[2:])
-        along = self._to_nodes(found.by_x) + slope * (by_level[0] + by_level[1])
+        along = self._to_nodes(found.by_x, line) + slope * (by_level[0] + by_level[1])
         return 0.5 * np.stack([along, np.asarray(up)], axis=1)
 
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""
-        edges = 2 * np.arange(len(self.edges))[:, None] + np.arange(3)
         insulator = self.surface.insulator
         skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
-        gap = (levels[2] - levels[1])[edges]
-        return certificate(x[edges], gap, (insulator.thickness, insulator.eps_r), skin[edges])
+        return certificate(x, levels[2] - levels[1], (insulator.thickness, insulator.eps_r), skin)
 
     def _check(self, x: Floats, levels: Floats, value: float) -> None:
         bounds = self.bounds(x, levels)
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
             raise EvfemError(
-                f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds {bounds.lower:.6g} and "
-                f"{bounds.upper:.6g}; a finer mesh of the finger resolves it"
+                f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds "
+                f"{bounds.lower:.6g} and {bounds.upper:.6g}; a finer mesh of the finger resolves it"
             )

@@ -1,8 +1,9 @@
 r"""Poisson's problem below a graph over x, in columns of layers: the capacitance and its derivative.
 
 The layers (slab, air, skin) lie one above the other between curves y_l(x), l = 0 ... n, that are
-quadratic over each cell of the outline and given at its L lines, the cells' ends and middles. Each
-layer has rows at fixed shares of its height; every row of a cell is a biquadratic quadrilateral
+straight between L lines. Each layer has rows at fixed shares of its height; between two lines each
+row is a quadrilateral with straight sides, on which the potential is linear along the row (the
+lines are as dense as the outline's own nodes) and quadratic across it,
 
 .. math:: x = \sum_k N_k(\xi)\, x_k, \qquad
           y = (1 - \sigma) \sum_k N_k(\xi)\, y_{l,k} + \sigma \sum_k N_k(\xi)\, y_{l+1,k},
@@ -26,10 +27,13 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.electrostatics.laws import eps_0
 
-#: places and weights of quadrature on (0, 1), and quadratic shape functions (3, q) there
-_AT, _WEIGHT = (0.5 + 0.5 * np.polynomial.legendre.leggauss(3)[0], 0.5 * np.polynomial.legendre.leggauss(3)[1])
-_N = np.stack([(1 - _AT) * (1 - 2 * _AT), 4 * _AT * (1 - _AT), _AT * (2 * _AT - 1)])
-_DN = np.stack([4 * _AT - 3, 4 - 8 * _AT, 4 * _AT - 1])
+#: places and weights of quadrature on (0, 1); linear (2, q) and quadratic (3, q) shape functions there
+_AT, _WEIGHT = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]), np.array([0.5, 0.5])
+_N, _DN = np.stack([1 - _AT, _AT]), np.outer([-1.0, 1.0], np.ones_like(_AT))
+_UP = np.stack([(1 - _AT) * (1 - 2 * _AT), 4 * _AT * (1 - _AT), _AT * (2 * _AT - 1)])
+_DUP = np.stack([4 * _AT - 3, 4 - 8 * _AT, 4 * _AT - 1])
+#: shape functions of a cell
+_SHAPES = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +59,7 @@ class Columns:
     shares: tuple[Floats, ...]
 
     def solve(self, x: Floats, levels: Floats) -> Capacitance:
-        """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,), L odd, in mm.
+        """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
@@ -68,7 +72,7 @@ class Columns:
 
 
 class _Cells:
-    """Quadrilaterals (rows R, columns E) with Q = 9 points each, and their shape functions."""
+    """Quadrilaterals (rows R, columns E) with four points each, and their shape functions."""
 
     def __init__(self, columns: Columns, x: Floats, levels: Floats) -> None:
         self.levels = levels
@@ -76,9 +80,8 @@ class _Cells:
         low = np.concatenate([share[:-1] for share in columns.shares])
         rise = np.concatenate([np.diff(share) for share in columns.shares])
         self.low, self.rise = low, rise
-        number = (x.size - 1) // 2
-        self.lines: Ints = 2 * np.arange(number)[:, None] + np.arange(3)  # (E, 3)
-        at = levels[:, self.lines]  # (n + 1, E, 3)
+        self.lines: Ints = np.arange(x.size - 1)[:, None] + np.arange(2)  # (E, 2)
+        at = levels[:, self.lines]  # (n + 1, E, 2)
         value, slope = at @ _N, at @ _DN  # (n + 1, E, q)
         self.x_xi = (x[self.lines] @ _DN)[None, :, :, None]
         share = (low[:, None] + rise[:, None] * _AT)[:, None, None, :]  # (R, 1, 1, q)
@@ -92,26 +95,28 @@ class _Cells:
         self.by_x, self.by_y = self._gradients()
 
     def _gradients(self) -> tuple[Floats, Floats]:
-        """Derivatives of the nine shape functions by x and y: (R, E, q, q, 9)."""
-        along = np.einsum("ip,jq->pqij", _DN, _N).reshape(_AT.size, _AT.size, 9)
-        up = np.einsum("ip,jq->pqij", _N, _DN).reshape(_AT.size, _AT.size, 9)
+        """Derivatives of the six shape functions by x and y: (R, E, q, q, 6)."""
+        along = np.einsum("ip,jq->pqij", _DN, _UP).reshape(_AT.size, _AT.size, _SHAPES)
+        up = np.einsum("ip,jq->pqij", _N, _DUP).reshape(_AT.size, _AT.size, _SHAPES)
         by_y = up / self.y_eta[..., None]
         return (along - self.y_xi[..., None] * by_y) / self.x_xi[..., None], by_y
 
     def _matrices(self) -> Floats:
-        """Cell matrices of eps grad u . grad v, (R, E, 9, 9)."""
-        shape = (*self.by_x.shape[:2], -1, 9)
+        """Cell matrices of eps grad u . grad v, (R, E, 6, 6)."""
+        shape = (*self.by_x.shape[:2], -1, _SHAPES)
         weight = self.weight[..., None]
-        parts = [((g * weight).reshape(shape).swapaxes(2, 3), g.reshape(shape)) for g in (self.by_x, self.by_y)]
+        parts = [
+            ((g * weight).reshape(shape).swapaxes(2, 3), g.reshape(shape)) for g in (self.by_x, self.by_y)
+        ]
         return np.asarray(sum(left @ right for left, right in parts))
 
     @property
     def numbers(self) -> Ints:
-        """Numbers (R, E, 9) of the cells' unknowns, along the lines."""
+        """Numbers (R, E, 6) of the cells' unknowns, along the lines."""
         rows = 2 * np.arange(self.layer.size)[:, None] + np.arange(3)  # (R, 3)
         per_line = 2 * self.layer.size + 1
         number = self.lines[None, :, :, None] * per_line + rows[:, None, None, :]
-        return np.asarray(number.reshape(self.layer.size, self.lines.shape[0], 9))
+        return np.asarray(number.reshape(self.layer.size, self.lines.shape[0], _SHAPES))
 
     def potential(self) -> Floats:
         """Potential (L, rows) that is 1 on the lowest curve and 0 on the highest one."""
@@ -124,7 +129,7 @@ class _Cells:
         numbers = self.numbers
         local = self.matrices @ phi.ravel()[numbers][..., None]
         load = -np.bincount(numbers.ravel(), local.ravel(), phi.size).reshape(phi.shape)
-        width = 2 * per_line + 3
+        width = per_line + 3
         first = np.broadcast_to(numbers[..., :, None], self.matrices.shape)
         second = np.broadcast_to(numbers[..., None, :], self.matrices.shape)
         below = first >= second
@@ -148,7 +153,7 @@ class _Cells:
         Ex, Ey = (np.einsum("repqa,rea->repq", g, local) for g in (self.by_x, self.by_y))
         half = 0.5 * (Ex**2 + Ey**2)
         xx, xy, yy = (self.weight * t for t in (Ex * Ex - half, Ex * Ey, Ey * Ey - half))
-        shape, slope = _N.T[None, None, :, None, :], _DN.T[None, None, :, None, :]  # (1, 1, q, 1, 3)
+        shape, slope = _N.T[None, None, :, None, :], _DN.T[None, None, :, None, :]  # (1, 1, q, 1, 2)
         y_xi, y_eta, x_xi = (v[..., None] for v in (self.y_xi, self.y_eta, self.x_xi))
         share, rise = self.share[..., None], self.rise[:, None, None, None, None]
 
@@ -157,7 +162,7 @@ class _Cells:
             by_x = (along - y_xi / y_eta * up) / x_xi
             return -2.0 * np.sum(shear[..., None] * by_x + own[..., None] * up / y_eta, axis=(2, 3))
 
-        moved_x = work(slope + 0.0 * share, 0.0 * share * shape, xx, xy)  # (R, E, 3)
+        moved_x = work(slope + 0.0 * share, 0.0 * share * shape, xx, xy)  # (R, E, 2)
         lower = work(slope * (1.0 - share), -shape * rise, xy, yy)
         upper = work(slope * share, shape * rise, xy, yy)
         lines = phi.shape[0]
@@ -168,7 +173,7 @@ class _Cells:
             for k, part in ((layer, lower), (layer + 1, upper)):
                 by_level[k] += np.bincount(self.lines.ravel(), part[own].sum(axis=0).ravel(), lines)
         y = self._heights(phi.shape)
-        return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, y)
+        return Capacitance(eps_0 * value, np.asarray(eps_0 * by_x, float), eps_0 * by_level, phi, y)
 
     def _heights(self, shape: tuple[int, ...]) -> Floats:
         y = np.empty(shape)

@@ -238,12 +238,16 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("scene", quoted(scene), "a Scene")
     if not scene.ground.is_flat:
         raise InputError("surface", type(scene.surface).__name__, "a flat surface with the fast model")
+    if scene.field != "local":
+        raise InputError("electrostatics.field", quoted(scene.field), "local with the fast model")
     if scene.solver.dynamics != "quasistatic":
         raise InputError("solver.dynamics", quoted(scene.solver.dynamics), "quasistatic with the fast model")
     if scene.solver.contact != "exact":
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    if scene.drive is not None and scene.drive.resolved:
+        raise InputError("drive", "resolved in time", "the mean over the cycle with the fast model")
     rough = roughness_of(scene.roughness_gap)
     if rough is not None and not isinstance(rough, ConstantRoughness):
         allowed = "a length in mm with the fast model"

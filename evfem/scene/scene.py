@@ -26,10 +26,13 @@ from evfem.common.checks import (
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
+from evfem.electrostatics.drive import Drive
+from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, RoughnessLaw, Surface, TimeSignal
+from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
@@ -40,6 +43,8 @@ DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
 PRECISIONS = ("single", "double")
+#: the attraction column by column, by Poisson's problem, or whichever the bounds ask for
+FIELDS = ("local", "full", "auto")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
@@ -147,12 +152,14 @@ class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
-    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
-    `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. `roughness_gap` (mm, or a `RoughnessLaw`) is what
-    rough skin keeps between itself and the insulator where they touch. `depth` (mm) is how deep the
-    plane finger is meant to be; it changes no number but adds `Result.total`, in N and mm2. Raises
-    InputError for anything that does not fit together.
+    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
+    alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
+    surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
+    or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
+    `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
+    "auto" where bounds say that it matters.
+    `depth` (mm) is how deep the plane finger is meant to be; it changes no number but adds
+    `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -163,18 +170,20 @@ class Scene:
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
     coupling: str = field(default="monolithic", kw_only=True)
+    drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
     depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
+    field: str = field(default="local", kw_only=True)  # the last one: from here on `field` is its default
 
     def __post_init__(self) -> None:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        for check in (_check_electrostatics, _check_motion, _check_time, _check_dynamics):
+        for check in (_check_electrostatics, check_drive, _check_motion, _check_time, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
         mistakes.report()
@@ -239,6 +248,8 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("solver", quoted(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
         raise InputError("output", quoted(scene.output), "an Output")
+    if not isinstance(scene.drive, Drive | None):
+        raise InputError("electrostatics.drive", quoted(scene.drive), "a Drive, or None")
     if scene.depth is not None:
         set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
@@ -258,6 +269,7 @@ def _check_electrostatics(scene: Scene) -> None:
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
     _check_roughness(scene)
+    _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
@@ -289,6 +301,22 @@ def _check_roughness(scene: Scene) -> None:
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
 
 
+def _check_field(scene: Scene) -> None:
+    choice("electrostatics.field", scene.field, FIELDS)
+    if scene.field == "local":
+        return
+    reasons = {
+        "no law": scene.law is None,
+        "air_layer = false": not scene.air_layer,
+        "a drive": scene.drive is not None,
+        type(scene.law).__name__: scene.field == "full" and type(scene.law) is not StrongTroxel,
+    }
+    against = [reason for reason, applies in reasons.items() if applies]
+    if against:
+        allowed = "local, or StrongTroxel (the law of rigid layers) with its air layer and without a drive"
+        raise InputError("electrostatics.field", f"{scene.field} with {against[0]}", allowed)
+
+
 def _check_motion(scene: Scene) -> None:
     pressed = False
     for i, motion in enumerate(scene.motion):
@@ -307,7 +335,8 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _check_time(scene: Scene) -> None:
-    if isinstance(scene.voltage, TimeSignal) and not any(takes_time(motion) for motion in scene.motion):
+    timed = isinstance(applied(scene), TimeSignal) or (scene.drive is not None and scene.drive.resolved)
+    if timed and not any(takes_time(motion) for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 
