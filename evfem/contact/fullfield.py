@@ -1,17 +1,18 @@
 r"""The attraction of the pad from the full field instead of column by column.
 
 Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
-problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes and
-move with them (`evfem.electrostatics.columns`): the electrode at the voltage, living tissue at 0,
-the skin's layer as thick above each node as it is undeformed. Nodes that touch keep
-`SERIES_GAP` of the insulator's reduced thickness, and what rough faces keep, as a gap in series.
+problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes,
+on quadratic edges between them too, and move with them (`evfem.electrostatics.columns`). The
+electrode is at the voltage, living tissue at 0; the skin's layer is as thick above each node as it
+is undeformed. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what
+rough faces keep, as a gap in series.
 Nodal forces are derivatives of the discrete energy
 
 .. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
 
 with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
 the column law, which they are close to, so contact, friction and controls know nothing of the
-field. In every solution C lies between its bounds (`certificate`).
+field. In every accepted state C lies between its bounds (`certificate`).
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.attraction import Attraction
@@ -41,6 +43,10 @@ AIR = np.linspace(0.0, 1.0, 5)
 SKIN = np.linspace(0.0, 1.0, 6) ** 2
 #: share by which a discrete capacitance may miss its bounds
 MARGIN = 1e-3
+#: columns below an edge with a middle node
+PARTS = 4
+#: columns follow an outline up to this slope
+STEEP = 6.0
 #: solutions that are remembered
 KEPT = 3
 
@@ -117,9 +123,25 @@ class FieldAttraction(Attraction):
         return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
 
     @cached_property
-    def _line(self) -> Ints:
-        """Pad nodes (L,) of the facing edges from left to right."""
-        return in_line(self.pad, self.edges)
+    def _lines(self) -> Any:
+        """Sparse (L, P): from values of the pad nodes to those of the lines, from left to right."""
+        ends = self.pad.edges[self.edges]
+        if ends.shape[1] == 2:
+            node = np.append(ends[:, 0], ends[-1, 1])
+            return sparse.csr_matrix(
+                (np.ones(node.size), (np.arange(node.size), node)), (node.size, self._size)
+            )
+        at = np.arange(PARTS) / PARTS
+        shapes = np.stack([(1 - at) * (1 - 2 * at), at * (2 * at - 1), 4 * at * (1 - at)], axis=1)
+        row = np.repeat(np.arange(PARTS * len(ends)), 3)
+        values = np.append(np.tile(shapes.ravel(), len(ends)), 1.0)
+        column = np.append(np.repeat(ends, PARTS, axis=0).ravel(), ends[-1, 1])
+        size = (PARTS * len(ends) + 1, self._size)
+        return sparse.csr_matrix((values, (np.append(row, size[0] - 1), column)), size)
+
+    @property
+    def _size(self) -> int:
+        return int(self.pad.nodes.size)
 
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
@@ -148,6 +170,7 @@ class FieldAttraction(Attraction):
         """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
         work of the forces at its ends (N mm per mm of depth), the squared voltage growing evenly.
         """
+        self.check(end)
         squared = [voltage**2 for voltage in voltages]
         before, after = self.solve(begin), self.solve(end)
         energy = 0.25 * sum(squared) * (after.value - before.value)
@@ -157,13 +180,11 @@ class FieldAttraction(Attraction):
 
     def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
         """The field under the pad at `position` (P, 2); the last solutions are remembered."""
-        line = self.seen(position)
-        x, levels = self.outline(position, line, pressing)
-        key = line.tobytes() + x.tobytes() + levels.tobytes()
+        x, levels = self.outline(position, self.seen(position), pressing)
+        key = x.tobytes() + levels.tobytes()
         found = self.solved.get(key)
         if found is None:
             found = self._columns.solve(x, levels)
-            self._check(x, levels, found.value)
             self.solved[key] = found
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
@@ -176,52 +197,44 @@ class FieldAttraction(Attraction):
             layers.append((float(self.skin.eps_r), SKIN))
         return Columns(tuple(eps for eps, _ in layers), tuple(share for _, share in layers))
 
-    def seen(self, position: Floats) -> Ints:
-        """Those of the facing nodes (L,) at which columns stand: of nodes that do not go on to the
-        right the higher ones are behind an overhang.
+    def seen(self, position: Floats) -> Any:
+        """The lines (sparse, L x P) at which columns stand: between two that stand one above the other,
+        or nearly so, the higher one is behind an overhang, or deep in a groove.
         """
-        x, y = position[self._line].T
-        if np.all(np.diff(x) > 0.0):
-            return self._line
+        x, y = (self._lines @ position).T
+        if np.all(np.diff(x) >= np.abs(np.diff(y)) / STEEP):
+            return self._lines
         kept: list[int] = []
         for k in range(x.size):
-            while kept and x[k] <= x[kept[-1]] and y[k] < y[kept[-1]]:
+            while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:
                 kept.pop()
-            if not kept or x[k] > x[kept[-1]]:
+            if not kept or x[k] - x[kept[-1]] > max(0.0, (y[k] - y[kept[-1]]) / STEEP):
                 kept.append(k)
-        return self._line[kept]
+        return self._lines[kept]
 
-    def outline(
-        self, position: Floats, line: Ints, pressing: Floats | None = None
-    ) -> tuple[Floats, Floats]:
-        """x (L,) of columns at the nodes `line` (L,) and the curves' heights (n + 1, L): electrode,
-        insulator, skin, living tissue.
+    def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
+        """x (L,) of columns at `lines` (L, P) and the curves' heights (n + 1, L): electrode, insulator,
+        skin, living tissue.
         """
-        frame = surface_state(self.surface, position)
-        rough = np.broadcast_to(self._separation(position[:, 0], pressing), frame.gap.shape)
+        place = lines @ position
+        frame = surface_state(self.surface, place)
         insulator = self.surface.insulator
+        rough = self._separation(position[:, 0], pressing) * np.ones(self._size)
         lowest = SERIES_GAP * insulator.thickness / insulator.eps_r
-        gap = np.maximum(np.maximum(frame.gap, 0.0) + rough, lowest)
-        ground = position[:, 1] - frame.gap
-        rows = [position[:, 0], ground - insulator.thickness, ground, ground + gap]
+        gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
+        ground = place[:, 1] - frame.gap
+        levels = [ground - insulator.thickness, ground, ground + gap]
         if len(self._columns.eps_r) == 3:
-            rows.append(ground + gap + self.skin.thickness)
-        lines = np.stack([row[line] for row in rows])
-        return lines[0], lines[1:]
-
-    def _to_nodes(self, values: Floats, line: Ints) -> Floats:
-        """Derivatives by the nodes `line` (L,) as derivatives by all pad nodes (P,)."""
-        return np.bincount(line, values, self.pad.nodes.size).astype(float)
+            levels.append(ground + gap + lines @ self.skin.thickness)
+        return place[:, 0], np.stack(levels)
 
     def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
         """Forces (P, 2) of the field at 1 V."""
-        found = self.solve(position, pressing)
-        line = self.seen(position)
-        by_level = [self._to_nodes(row, line) for row in found.by_level]
-        slope = surface_state(self.surface, position).slope
-        up = sum(by_level[2:])
-        along = self._to_nodes(found.by_x, line) + slope * (by_level[0] + by_level[1])
-        return 0.5 * np.stack([along, np.asarray(up)], axis=1)
+        found, lines = self.solve(position, pressing), self.seen(position)
+        slope = surface_state(self.surface, lines @ position).slope
+        along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
+        up = found.by_level[2:].sum(axis=0)
+        return np.asarray(0.5 * (lines.T @ np.stack([along, up], axis=1)))
 
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""
@@ -229,8 +242,12 @@ class FieldAttraction(Attraction):
         skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
         return certificate(x, levels[2] - levels[1], (insulator.thickness, insulator.eps_r), skin)
 
-    def _check(self, x: Floats, levels: Floats, value: float) -> None:
-        bounds = self.bounds(x, levels)
+    def check(self, position: Floats) -> None:
+        """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its
+        bounds.
+        """
+        bounds = self.bounds(*self.outline(position, self.seen(position)))
+        value = self.solve(position).value
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
             raise EvfemError(
                 f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds "
