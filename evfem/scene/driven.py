@@ -55,9 +55,11 @@ def skin_thickness(electrical: Any, mesh: Any, nodes: Ints) -> Floats:
                 "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
             )
             raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
-        from evfem.mesh.mesh import layer_thickness
+        from evfem.mesh import faces
+        from evfem.mesh import mesh as edges
 
-        thickness = layer_thickness(mesh, "stratum_corneum", nodes)
+        kind = faces if mesh.dim == 3 else edges
+        thickness = kind.layer_thickness(mesh, "stratum_corneum", nodes)
     return np.broadcast_to(thickness, nodes.shape).astype(float)
 
 

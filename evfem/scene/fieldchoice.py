@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.contact.pad import make_pad
 from evfem.electrostatics.laws import StrongTroxel
+from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.driven import skin_thickness
 from evfem.scene.motion import Hover
@@ -28,6 +29,10 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
     """The choice of a scene whose `field` is not `local`, from the bounds at first touch, or at the
     smallest gap of a finger that only hovers.
     """
+    if mesh.dim == 3:
+        if scene.field == "full":
+            raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")
+        return FieldChoice(False, "column by column: a solid has no other")
     if type(scene.law) is not StrongTroxel:
         return FieldChoice(False, f"column by column: {type(scene.law).__name__} is no law of a field")
     bounds, gap = field_bounds(scene, mesh)
