@@ -115,17 +115,22 @@ class FieldAttraction(Attraction):
     skin: Any = None
     solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
 
+    @property
+    def _plane(self) -> Pad:
+        assert isinstance(self.pad, Pad)
+        return self.pad
+
     @cached_property
     def flanks(self) -> Attraction:
         """The column law on the other edges."""
-        others = np.setdiff1d(np.arange(len(self.pad.edges)), self.edges)
-        pad = replace(self.pad, edges=self.pad.edges[others])
+        others = np.setdiff1d(np.arange(len(self._plane.edges)), self.edges)
+        pad = replace(self._plane, edges=self._plane.edges[others])
         return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
 
     @cached_property
     def _lines(self) -> Any:
         """Sparse (L, P): from values of the pad nodes to those of the lines, from left to right."""
-        ends = self.pad.edges[self.edges]
+        ends = self._plane.edges[self.edges]
         if ends.shape[1] == 2:
             node = np.append(ends[:, 0], ends[-1, 1])
             return sparse.csr_matrix(
