@@ -21,6 +21,9 @@ from evfem.contact.textures import SelfAffine as SelfAffine
 from evfem.electrostatics import encoding as encoding
 from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
+from evfem.electrostatics.dielectrics import Dielectric as Dielectric
+from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
+from evfem.electrostatics.drive import Drive as Drive
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
@@ -28,6 +31,9 @@ from evfem.electrostatics.laws import Layer as Layer
 from evfem.electrostatics.laws import Layers as Layers
 from evfem.electrostatics.laws import StrongTroxel as StrongTroxel
 from evfem.electrostatics.laws import eps_0 as eps_0
+from evfem.electrostatics.roughness import ConstantRoughness as ConstantRoughness
+from evfem.electrostatics.roughness import ExponentialRoughness as ExponentialRoughness
+from evfem.electrostatics.roughness import PowerRoughness as PowerRoughness
 from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal
@@ -37,6 +43,7 @@ from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine
+from evfem.electrostatics.timesignals import Square as Square
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
@@ -47,6 +54,8 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.finger.fingerprint import HeightMap as HeightMap
+from evfem.finger.fingertip import Fingertip as Fingertip
 from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file

@@ -22,17 +22,24 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics drag body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
-    "electrostatics": ({"numpy", "scipy"}, "laws forces signals wav timesignals encoding hjif signalfile"),
+    "finger": (
+        {"numpy", "PIL"},
+        "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
+    ),
+    "electrostatics": (
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals drive encoding hjif signalfile",
+    ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "surfaces textures own pad edge charging attraction signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -41,7 +48,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "timescales plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},

@@ -9,6 +9,17 @@ and the voltage ``U``::
     StrongTroxel   p = e eps_0 U^2 / (2 (g + e s)^2)            equations (3), (6), (8a), (9a)
     Kaczmarek      p = e eps_0 U^2 / (2 (g + e s) (g + D))      equations (5), (7), (8b), (9b)
 
+Under a sine of the effective voltage U, layers and gap that conduct make the reduced thickness
+complex, ``z/e = (1 + sigma_g / (i w eps_0 e)) * sum of d / eps*`` (`Layers.of` with a frequency). Its
+real part takes the place of s, its imaginary part is `Layers.loss`, below ``l``, and the mean over the
+cycle is::
+
+    StrongTroxel   p = e eps_0 U^2 / (2 ((g + e s)^2 + (e l)^2))
+    Kaczmarek      p = e eps_0 U^2 (g + e s) / (2 ((g + e s)^2 + (e l)^2) (g + D))
+
+The second is our definition, which follows the law's derivation: nobody has defined it for
+alternating voltage in print. Without losses, l = 0, both are what stands above, bit for bit.
+
 `StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers
 stretch with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
 positive where they attract. Equation numbers are those of the paper on modelling and validating
@@ -24,8 +35,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Values, at_least, plain
-from evfem.errors import InputError
+from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.errors import ABSENT, InputError
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
 
@@ -50,7 +61,7 @@ __all__ = [
 @dataclass(frozen=True)
 class Layer:
     """A solid dielectric: `thickness` in mm and relative permittivity `eps_r` >= 1, numbers or
-    arrays.
+    arrays; or an `evfem.Dielectric` as `eps_r`, whose permittivity depends on the frequency.
 
     >>> Layer(thickness=0.09, eps_r=3.35)
     Layer(thickness=0.09, eps_r=3.35)
@@ -61,9 +72,22 @@ class Layer:
 
     def __post_init__(self) -> None:
         thickness = at_least("layer thickness", self.thickness, 0.0, "a finite length in mm, not negative")
-        eps_r = at_least("layer eps_r", self.eps_r, 1.0, "a relative permittivity of at least 1")
         object.__setattr__(self, "thickness", thickness)
-        object.__setattr__(self, "eps_r", eps_r)
+        if not callable(getattr(self.eps_r, "permittivity", None)):
+            eps_r = at_least("layer eps_r", self.eps_r, 1.0, "a relative permittivity of at least 1")
+            object.__setattr__(self, "eps_r", eps_r)
+
+    def permittivity(self, frequency: Values | None) -> Values:
+        """Relative permittivity at `frequency` (Hz): complex if the layer is a dielectric that
+        depends on it. Raises InputError if that is asked without a frequency.
+        """
+        of: Any = getattr(self.eps_r, "permittivity", None)
+        if of is None:
+            return self.eps_r
+        if frequency is None:
+            allowed = "a frequency in Hz, where the permittivity of a layer depends on it"
+            raise InputError("frequency", ABSENT, allowed)
+        return of(frequency)
 
 
 #: insulators of displays: the film of the paper's Table 2, driven with 1 to 2 kV, and a touchscreen, driven
@@ -79,7 +103,8 @@ class Layers:
     """A stack of solid layers as the laws see it: `reduced` = sum d / eps_r, `thickness` = sum d,
     in mm.
 
-    Both are numbers or arrays per node. `Layers.of` adds up any number of layers.
+    Both are numbers or arrays per node. `Layers.of` adds up any number of layers. `loss` (mm) is the
+    imaginary part of the reduced thickness under alternating voltage, 0 without losses.
 
     >>> stack = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(stack.thickness, 9), round(stack.reduced, 9)
@@ -88,18 +113,41 @@ class Layers:
 
     reduced: Values
     thickness: Values
+    loss: Values = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "loss", finite("layers.loss", self.loss, "a length in mm"))
         for name in ("reduced", "thickness"):
             value = at_least(f"layers.{name}", getattr(self, name), 0.0, "a length in mm, not negative")
             object.__setattr__(self, name, value)
 
     @classmethod
-    def of(cls, *layers: Layer) -> Layers:
-        """The stack of these layers, in any order; without layers both sums are zero."""
-        return cls(
-            sum(layer.thickness / layer.eps_r for layer in layers), sum(layer.thickness for layer in layers)
-        )
+    def of(
+        cls,
+        *layers: Layer,
+        frequency: Values | None = None,
+        gap_conductivity: Values = 0.0,
+        gap_eps_r: Values = 1.0,
+    ) -> Layers:
+        """The stack of these layers, in any order; without layers both sums are zero.
+
+        At a `frequency` (Hz) with what conducts: dielectrics among the layers, and the gap with
+        `gap_conductivity` (S/m) and the permittivity `gap_eps_r` of the law.
+
+        >>> screen = Layers.of(Layer(0.001, 3.9), frequency=1000.0, gap_conductivity=1e-8)
+        >>> round(1e6 * screen.reduced, 3), round(1e6 * screen.loss, 3)      # nm
+        (256.41, -46.09)
+        """
+        thickness = sum(layer.thickness for layer in layers)
+        if frequency is None and not np.any(gap_conductivity):
+            return cls(sum(layer.thickness / layer.permittivity(None) for layer in layers), thickness)
+        if frequency is None:
+            raise InputError("frequency", ABSENT, "a frequency in Hz, with a gap that conducts")
+        f = above("frequency", frequency, 0.0, "a frequency in Hz above 0")
+        sigma = at_least("gap_conductivity", gap_conductivity, 0.0, "a conductivity in S/m, not negative")
+        leak = 1.0 - 1j * np.asarray(sigma) / (2.0 * np.pi * np.asarray(f) * eps_0 * np.asarray(gap_eps_r))
+        sums = leak * sum(layer.thickness / np.asarray(layer.permittivity(f)) for layer in layers)
+        return cls(plain(sums.real), thickness, plain(sums.imag))
 
 
 def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Values]:
@@ -142,17 +190,23 @@ class StrongTroxel:
         infinite.
         """
         near, _ = _lengths(gap, layers, self.gap_eps_r)
+        if np.any(layers.loss):
+            near = np.sqrt(near**2 + (self.gap_eps_r * layers.loss) ** 2)
         return plain(0.5 * self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2)
 
     def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """dp/dg in MPa/mm (negative)."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
+        if np.any(layers.loss):
+            square = near**2 + (self.gap_eps_r * layers.loss) ** 2
+            return plain(-self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 * near / square**2)
         return plain(-self.gap_eps_r * eps_0 * (np.asarray(voltage) / near) ** 2 / near)
 
     def potential(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """Pi in N/mm (= N mm per mm^2), zero at infinite gap."""
         near, _ = _lengths(gap, layers, self.gap_eps_r)
-        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near)
+        angle = _atan_ratio(self.gap_eps_r * layers.loss / near) if np.any(layers.loss) else 1.0
+        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * angle)
 
 
 def _log1p_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -170,6 +224,13 @@ def _log1p_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return np.where(small, series, logarithm / r)
 
 
+def _atan_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """atan(r) / r, with the limit 1 at r = 0; complex-safe."""
+    zero = np.asarray(ratio) == 0.0
+    r = np.where(zero, 1.0, ratio)
+    return np.where(zero, 1.0, np.arctan(r) / r)
+
+
 @dataclass(frozen=True)
 class Kaczmarek:
     """Attraction of layers that stretch with the gap, equations (5) and (7).
@@ -177,7 +238,9 @@ class Kaczmarek:
     ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
     ``Pi = -e eps_0 U^2 / (2 (D - e s)) ln((g + D) / (g + e s))`` with ``p = dPi/dg``; for
     ``D -> e s`` both become those of `StrongTroxel`. `gap_eps_r` is ``e``, for what fills the gap:
-    1 for air.
+    1 for air. With losses under alternating voltage (`Layers.loss`) the law is our own definition:
+    ``p = e eps_0 U^2 a / (2 (a^2 + c^2)(a + d))`` with a = g + e s, c = e l, d = D - e s and ``Pi = -e
+    eps_0 U^2 ((d/2) ln((a + d)^2 / (a^2 + c^2)) + c atan(c/a)) / (2 (c^2 + d^2))``.
 
     >>> layers = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))
     >>> round(1e3 * Kaczmarek().traction(0.0, 2000.0, layers), 2)         # kPa, touching skin
@@ -194,11 +257,17 @@ class Kaczmarek:
         infinite.
         """
         near, far = _lengths(gap, layers, self.gap_eps_r)
+        if np.any(layers.loss):
+            near = near + (self.gap_eps_r * layers.loss) ** 2 / near
         return plain(0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far))
 
     def traction_derivative(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """dp/dg in MPa/mm (negative)."""
         near, far = _lengths(gap, layers, self.gap_eps_r)
+        if np.any(layers.loss):
+            square = (self.gap_eps_r * layers.loss) ** 2
+            steepness = (near**2 - square) / (near * (near**2 + square)) + 1.0 / far
+            return plain(-np.asarray(self.traction(gap, voltage, layers)) * steepness)
         traction = 0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / (near * far)
         return plain(-traction * (1.0 / near + 1.0 / far))
 
@@ -208,7 +277,12 @@ class Kaczmarek:
         """
         near, _ = _lengths(gap, layers, self.gap_eps_r)
         ratio = np.asarray((layers.thickness - self.gap_eps_r * layers.reduced) / near)
-        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * _log1p_ratio(ratio))
+        share = _log1p_ratio(ratio)
+        if np.any(layers.loss):
+            q, r = ratio**2, np.asarray(self.gap_eps_r * layers.loss / near) ** 2
+            lossy = q * share - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
+            share = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
+        return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * share)
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:

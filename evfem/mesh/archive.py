@@ -29,7 +29,7 @@ def mesh_of(arrays: Mapping[str, np.ndarray]) -> Mesh:
     prefix = "mesh/set/"
     sets = {key.removeprefix(prefix): a for key, a in arrays.items() if key.startswith(prefix)}
     names = json.loads(str(arrays["mesh/region_names"]))
-    if points.ndim != 2 or points.shape[1] != 2 or points.dtype.kind != "f":
+    if points.ndim != 2 or points.shape[1] != CELLS[kind].dimension or points.dtype.kind != "f":
         raise ValueError("points of the mesh")
     if region.ndim != 1 or cells.shape != (len(region), CELLS[kind].nodes) or region.dtype.kind not in "iu":
         raise ValueError("cells of the mesh")

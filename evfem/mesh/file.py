@@ -79,7 +79,7 @@ def _parts(path: Path) -> Parts:
 
 def _one_kind(path: Path, kinds: list[str]) -> str:
     found = sorted(set(kinds))
-    if len(found) == 1 and found[0] in KINDS:
+    if len(found) == 1 and found[0] in KINDS and _dimension(found[0]) == BODY:
         return found[0]
     allowed = "cells of one kind: quad, quad9, triangle or triangle6"
     if "quad8" in found:

@@ -1,13 +1,13 @@
 """The finite element mesh: points, cells of one kind, named regions and named sets of nodes.
 
-Nodes keep the order of the file they came from; cells are in VTK order, counter-clockwise. Lengths
-in mm.
+Nodes keep the order of the file they came from; cells are in VTK order, counter-clockwise in the
+plane (hexahedra: `evfem.mesh.hexahedron`). Lengths in mm.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
+from evfem.mesh.hexahedron import EDGES, FACES, face_nodes
 
 
 class CellKind(NamedTuple):
@@ -44,9 +45,11 @@ CELLS: Mapping[str, CellKind] = {
     "quad9": CellKind(2, 4, 9, 2, vtk=28, gmsh=10),
     "tetra": CellKind(3, 4, 4, 1, vtk=10, gmsh=4),
     "hexahedron": CellKind(3, 8, 8, 1, vtk=12, gmsh=5),
+    "hexahedron20": CellKind(3, 8, 20, 2, vtk=25, gmsh=17),
+    "hexahedron27": CellKind(3, 8, 27, 2, vtk=29, gmsh=12),
 }
-#: the kinds that a finger can be made of
-KINDS = ("quad", "quad9", "triangle", "triangle6")
+#: the kinds that a finger can be made of, in the plane and in space
+KINDS = ("quad", "quad9", "triangle", "triangle6", "hexahedron", "hexahedron27")
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,7 @@ class Mesh:
 
     @property
     def dim(self) -> int:
-        """Number of coordinates of a point: 2 in the plane."""
+        """Number of coordinates of a point: 2 in the plane, 3 in space."""
         return self.points.shape[1]
 
     @property
@@ -81,7 +84,7 @@ class Mesh:
 
     @property
     def corners(self) -> int:
-        """Number of corners of a cell: 3 or 4."""
+        """Number of corners of a cell: 3, 4 or 8."""
         return CELLS[self.kind].corners
 
     def cells_of(self, name: str) -> Ints:
@@ -116,16 +119,60 @@ class Mesh:
 
     def edges_of(self, name: str) -> Ints:
         """Outer edges all of whose nodes are in the set `name`, same columns as `outer_edges`."""
+        return self._within(self.outer_edges, name)
+
+    def _within(self, facets: Ints, name: str) -> Ints:
         inside = np.zeros(len(self.points), dtype=bool)
         inside[self.node_sets[name]] = True
-        return self.outer_edges[inside[self.outer_edges].all(axis=1)]
+        return facets[inside[facets].all(axis=1)]
+
+    # -- in space
+    # ----------------------------------------------------------------------------------------------------
+
+    @property
+    def cell_faces(self) -> Ints:
+        """The faces of each hexahedron, (E, 6, 4) or (E, 6, 9): quads or quad9s that are seen
+        counter-clockwise from outside.
+        """
+        return self.cells[:, face_nodes(self.order)]
+
+    @cached_property
+    def faces(self) -> tuple[Ints, Ints]:
+        """All faces of hexahedra once, (K, 4) corner nodes in rising order, and the faces of each
+        cell, (E, 6).
+        """
+        return _once(self.cells[:, FACES])
+
+    @cached_property
+    def outer_faces(self) -> Ints:
+        """Faces of one cell only, (K, 4) or (K, 9), their normals outwards."""
+        _, of_cell = self.faces
+        alone = np.bincount(of_cell.ravel())[of_cell] == 1
+        return self.cell_faces[alone]
+
+    def faces_of(self, name: str) -> Ints:
+        """Outer faces all of whose nodes are in the set `name`, same columns as `outer_faces`."""
+        return self._within(self.outer_faces, name)
+
+
+def _once(parts: Ints) -> tuple[Ints, Ints]:
+    """Edges or faces (E, m, k) of cells once, (K, k) corners in rising order, and their numbers in
+    each cell, (E, m).
+    """
+    ordered = np.sort(parts, axis=2).reshape(-1, parts.shape[2])
+    order = np.lexsort(ordered.T[::-1])
+    new = np.concatenate([[True], (np.diff(ordered[order], axis=0) != 0).any(axis=1)])
+    number = np.empty(len(ordered), dtype=np.int64)
+    number[order] = np.cumsum(new) - 1
+    return ordered[order[new]], number.reshape(parts.shape[:2])
 
 
 def raised(mesh: Mesh) -> Mesh:
     """The quadratic mesh on the same cells: straight edges, new nodes halfway.
 
     New nodes are numbered after the old ones. The new node of an outer edge belongs to every set
-    that holds both ends of that edge; other new nodes belong to none.
+    that holds both ends of that edge, those of an outer face to every set that holds its corners;
+    other new nodes belong to none.
 
     >>> square = Mesh(np.array([[0., 0.], [1., 0.], [1., 1.], [0., 1.]]), np.array([[0, 1, 2, 3]]), "quad",
     ...               np.zeros(1, int), {"skin": 0}, {"pad": np.array([0, 1])})
@@ -134,6 +181,8 @@ def raised(mesh: Mesh) -> Mesh:
     """
     if mesh.order == 2:
         return mesh
+    if mesh.dim == 3:
+        return _raised_hexahedra(mesh)
     edges, of_cell = mesh.edges
     first = len(mesh.points)
     points = [mesh.points, mesh.points[edges].mean(axis=1)]
@@ -145,6 +194,22 @@ def raised(mesh: Mesh) -> Mesh:
     sets = {name: _with_middles(nodes, edges, outer, first) for name, nodes in mesh.node_sets.items()}
     kind = "quad9" if mesh.corners == 4 else "triangle6"
     return Mesh(np.vstack(points), np.hstack(columns), kind, mesh.region, mesh.region_names, sets)
+
+
+def _raised_hexahedra(mesh: Mesh) -> Mesh:
+    """The same in space: new nodes in the middles of edges, faces and cells."""
+    edges, edges_of_cell = _once(mesh.cells[:, EDGES])
+    faces, faces_of_cell = mesh.faces
+    starts = len(mesh.points) + np.cumsum([0, len(edges), len(faces)])
+    points = [mesh.points] + [mesh.points[part].mean(axis=1) for part in (edges, faces, mesh.cells)]
+    columns = [mesh.cells, starts[0] + edges_of_cell, starts[1] + faces_of_cell]
+    columns.append(starts[2] + np.arange(len(mesh.cells))[:, None])
+    solid = Mesh(np.vstack(points), np.hstack(columns), "hexahedron27", mesh.region, mesh.region_names)
+    outer = solid.outer_faces
+    for name, nodes in mesh.node_sets.items():
+        whole = np.isin(outer[:, :4], nodes).all(axis=1)
+        solid = replace(solid, node_sets={**solid.node_sets, name: np.union1d(nodes, outer[whole])})
+    return solid
 
 
 def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> Ints:

@@ -25,6 +25,7 @@ from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
+    ROUGHNESS,
     SURFACES,
     ElectricalTable,
     ElectrostaticsTable,
@@ -44,7 +45,7 @@ from evfem.scene.keys import (
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
-from evfem.scene.voltage import voltage_of
+from evfem.scene.voltage import drive_of, voltage_of
 from evfem.scene.written import FORCE_LAWS, TEXTURES, VERSION, dump
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import from_table
@@ -202,8 +203,21 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
     with at("electrostatics"):
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
+    voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
     same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
-    return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
+    same["roughness_gap"] = _roughness(table.roughness_gap)
+    return {"law": law, "voltage": voltage, "drive": drive, **same}
+
+
+def _roughness(given: float | Mapping[str, Any]) -> Any:
+    """The gap between rough faces: a length, or a law by its name."""
+    key = "electrostatics.roughness_gap"
+    if not isinstance(given, Mapping):
+        return given
+    model, cls = ROUGHNESS[kind_of(given, key, ROUGHNESS, "law")]
+    parsed: Any = parse(model, given, key)
+    with at(key):
+        return cls(**parsed.model_dump(exclude={"law"}))
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:

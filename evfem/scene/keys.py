@@ -12,7 +12,11 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
+from evfem.electrostatics.dielectrics import SKINS
+from evfem.electrostatics.drive import WAVEFORMS
 from evfem.electrostatics.laws import INSULATORS
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
+from evfem.electrostatics.timesignals import FASTEST
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
@@ -136,6 +140,12 @@ class ElectrostaticsTable(Table):
 
     law: Literal["strong_troxel", "kaczmarek"] = required("strong_troxel | kaczmarek")
     voltage: float | None = optional("a voltage in V")
+    amplitude: float | None = optional("a peak voltage in V, not negative")
+    frequency: float | None = optional(f"a frequency in Hz, above 0, up to {FASTEST:g}")
+    waveform: Literal[WAVEFORMS] = optional(" | ".join(WAVEFORMS), WAVEFORMS[0])  # type: ignore[valid-type]
+    skin: str | None = optional(f"{' | '.join(SKINS)} | the path of a csv file")
+    gap_conductivity: float = optional("a conductivity in S/m, not negative", 0.0)
+    drive: Literal["mean", "resolved"] = optional("mean | resolved", "mean")
     voltage_file: str | None = optional(
         "the path of a csv file (header: position,voltage or time,voltage) or of a .wav"
     )
@@ -148,12 +158,18 @@ class ElectrostaticsTable(Table):
     air_layer: bool = optional("true | false", True)
     direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
     coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
+    roughness_gap: float | dict[str, Any] = optional(
+        "a length in mm from 0 to 1, or a table [electrostatics.roughness_gap] with a law", 0.0
+    )
 
 
 SolverTable = derived(Solver, strategy=(dict[str, Any], optional("a table [solver.strategy]", {})))
 StrategyTable = derived(Strategy)
 OutputTable = derived(Output)
 
+ROUGHNESS: Mapping[str, tuple[type[Table], type]] = {
+    name: (derived(cls, law=(Literal[name], required("a law"))), cls) for name, cls in ROUGHNESS_LAWS.items()
+}
 SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
     "sinusoid": SinusoidTable,
@@ -214,12 +230,12 @@ def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]
     return [row[0] for row in rows], [row[1] for row in rows]
 
 
-def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any]) -> str:
-    """The kind that a table says it is, one of `kinds`."""
-    kind = table.get("kind", ABSENT)
+def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any], key: str = "kind") -> str:
+    """The kind that a table says it is by its `key`, one of `kinds`."""
+    kind = table.get(key, ABSENT)
     if not isinstance(kind, str) or kind not in kinds:
         given = ABSENT if kind is ABSENT else shown(kind)
-        raise InputError(f"{prefix}.kind", given, " | ".join(kinds))
+        raise InputError(f"{prefix}.{key}", given, " | ".join(kinds))
     return kind
 
 

@@ -26,9 +26,12 @@ from evfem.common.checks import (
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
+from evfem.electrostatics.drive import Drive
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.protocols import CompleteSurface, ForceLaw, Surface, TimeSignal
+from evfem.protocols import CompleteSurface, ForceLaw, RoughnessLaw, Surface, TimeSignal
+from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
@@ -71,9 +74,9 @@ class Finger(Protocol):
 class Solver:
     """How a scene is solved; the defaults are the recommended ones.
 
-    `element` None means q2p1 on quads and p2 on triangles. `tolerance` is the largest free
-    residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties (N/mm3) go
-    with `contact="penalty"` alone. `strategy` says how hard steps are tried.
+    `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
+    largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
+    (N/mm3) go with `contact="penalty"` alone. `strategy` says how hard steps are tried.
     """
 
     element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
@@ -97,7 +100,7 @@ class Solver:
             raise InputError("penalty_normal", ABSENT, allowed)
 
     def element_on(self, corners: int) -> str:
-        """The element used on cells with that many corners (3 or 4).
+        """The element used on cells with that many corners (3, 4 or 8).
 
         >>> Solver().element_on(4), Solver().element_on(3), Solver(element="q1").element_on(4)
         ('q2p1', 'p2', 'q1')
@@ -107,9 +110,9 @@ class Solver:
         """
         names = elements_on(corners)
         if self.element is None:
-            return "p2" if corners == 3 else "q2p1"
+            return {3: "p2", 4: "q2p1", 8: "hex27p1"}[corners]
         if self.element not in names:
-            cells = "triangles" if corners == 3 else "quads"
+            cells = {3: "triangles", 4: "quads", 8: "hexahedra"}[corners]
             raise InputError("solver.element", f"{self.element} on a mesh of {cells}", " | ".join(names))
         return self.element
 
@@ -146,11 +149,12 @@ class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
-    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
-    `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. `depth` (mm) is how deep the plane finger is meant to
-    be; it changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything
-    that does not fit together.
+    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
+    alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
+    surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
+    or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
+    `depth` (mm) is how deep the plane finger is meant to be; it changes no number but adds
+    `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -161,6 +165,8 @@ class Scene:
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
     coupling: str = field(default="monolithic", kw_only=True)
+    drive: Drive | None = field(default=None, kw_only=True)
+    roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
@@ -171,7 +177,7 @@ class Scene:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        for check in (_check_electrostatics, _check_motion, _check_time, _check_dynamics):
+        for check in (_check_electrostatics, check_drive, _check_motion, _check_time, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
         mistakes.report()
@@ -236,6 +242,8 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("solver", quoted(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
         raise InputError("output", quoted(scene.output), "an Output")
+    if not isinstance(scene.drive, Drive | None):
+        raise InputError("electrostatics.drive", quoted(scene.drive), "a Drive, or None")
     if scene.depth is not None:
         set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
@@ -254,6 +262,7 @@ def _check_electrostatics(scene: Scene) -> None:
     choice("electrostatics.coupling", scene.coupling, COUPLINGS)
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
+    _check_roughness(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
@@ -271,6 +280,18 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _check_roughness(scene: Scene) -> None:
+    if isinstance(scene.roughness_gap, (int, float)) and not isinstance(scene.roughness_gap, bool):
+        set_frozen(scene, roughness_gap=float(scene.roughness_gap))
+    try:
+        rough = roughness_of(scene.roughness_gap)
+    except InputError as error:
+        raise InputError("electrostatics.roughness_gap", error.given, error.allowed) from error
+    if rough is not None and scene.law is None:
+        allowed = "only with a law of attraction: without one it changes nothing"
+        raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
 
 
 def _check_motion(scene: Scene) -> None:
@@ -291,7 +312,8 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _check_time(scene: Scene) -> None:
-    if isinstance(scene.voltage, TimeSignal) and not any(takes_time(motion) for motion in scene.motion):
+    timed = isinstance(applied(scene), TimeSignal) or (scene.drive is not None and scene.drive.resolved)
+    if timed and not any(takes_time(motion) for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 

@@ -18,7 +18,7 @@ from pydantic import Field as Default
 from pydantic import create_model
 
 from evfem.common.checks import Within
-from evfem.electrostatics.timesignals import Carrier, Sine
+from evfem.electrostatics.timesignals import Carrier, Sine, Square
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, FingerPad
 from evfem.scene import keys, meanings
 from evfem.scene.keys import Table
@@ -31,7 +31,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 SPOKEN = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
 SPOKEN |= {"object": "table", "array": "list"}
 #: signals whose fields know their limits
-CLASSES: Mapping[str, type | None] = {"sine": Sine, "carrier": Carrier, "sampled": None}
+CLASSES: Mapping[str, type | None] = {"sine": Sine, "square": Square, "carrier": Carrier, "sampled": None}
 #: a key of [finger] that belongs to the scene
 DEPTH: Any = (float | None, Default(default=None))
 Schema = dict[str, Any]
@@ -223,11 +223,20 @@ def sections() -> list[Section]:
         *surfaces,
         section("electrostatics", keys.ElectrostaticsTable, meanings.ELECTROSTATICS),
         *signals,
+        *_roughness(),
         section("solver", keys.SolverTable, meanings.SOLVER, origin=keys.Solver),
         section("solver.strategy", keys.StrategyTable, meanings.STRATEGY, origin=keys.Strategy),
         section("output", keys.OutputTable, meanings.OUTPUT, origin=keys.Output),
         *motions,
     ]
+
+
+def _roughness() -> list[Section]:
+    found = []
+    for name, (model, cls) in keys.ROUGHNESS.items():
+        one = section("electrostatics.roughness_gap", model, meanings.ROUGHNESS, name, cls)
+        found.append(_kind_first(one, "law", name))
+    return found
 
 
 def schema() -> Schema:
@@ -252,7 +261,10 @@ def schema() -> Schema:
         version={"const": 1, "description": meanings.SCENE["version"].meaning},
         finger={"anyOf": fingers},
         surface=one_of["surface"],
-        electrostatics=tables["electrostatics"][0].schema(signal={"$ref": "#/definitions/signal"}),
+        electrostatics=tables["electrostatics"][0].schema(
+            signal={"$ref": "#/definitions/signal"},
+            roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
+        ),
         solver=tables["solver"][0].schema(strategy=strategy),
         output=tables["output"][0].schema(),
         motion={"type": "array", "minItems": 1, "items": one_of["motion"]},

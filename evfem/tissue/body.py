@@ -1,7 +1,7 @@
 """The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
 
-The bone is rigid and translates, so all its nodes share two unknowns and the reduced unknowns are
-(free nodes' displacements, bone x, bone y); forces of the bone's nodes add up to the reaction.
+The bone is rigid and translates, so all its nodes share dim unknowns and the reduced unknowns are
+(free nodes' displacements, bone x, y[, z]); forces of the bone's nodes add up to the reaction.
 User forms (`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the
 internal forces.
 """
@@ -59,7 +59,7 @@ class Body:
             self.drag.begin(u, rate)
 
     def drag_dissipation(self, u: Floats) -> float:
-        """What drag dissipates in the step that ends at u, N mm per mm of depth."""
+        """What drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
         return self.drag.dissipation(u) if self.drag_rate > 0.0 else 0.0
 
     def reduce(self, nodal: Floats) -> Floats:
@@ -105,5 +105,5 @@ class Body:
         return np.zeros_like(u) if self.dynamics is None else self.dynamics.velocity(u)
 
     def energy(self, u: Floats) -> float:
-        """Stored energy (N mm per mm of depth) of the tissue."""
+        """Stored energy of the tissue: N mm, in the plane per mm of depth."""
         return self.tissue.energy(u)

@@ -46,7 +46,7 @@ class Drag:
         self._terms.begin(u, np.zeros_like(u), 1.0 / rate)
 
     def forces(self, u: Floats) -> Floats:
-        """Nodal forces (N, dim) in N per mm of depth."""
+        """Nodal forces (N, dim)."""
         return self._terms.forces(u)
 
     def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
@@ -54,6 +54,6 @@ class Drag:
         self._terms.add_tangent(u, pattern, data)
 
     def dissipation(self, u: Floats) -> float:
-        """What the drag dissipates in the step that ends at u, N mm per mm of depth."""
+        """What the drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
         moving = self._terms.kinetic_energy(self._terms.velocity(u))
         return self._terms.dissipation(u) + 2.0 * moving

@@ -45,14 +45,14 @@ class Dynamics:
         self.viscosity = viscosity
         self.mass = None if density is None else Componentwise(mass_matrices(space) * density[:, None, None])
         self._inertia = None if self.mass is None else assembled(space, self.mass.matrices)
-        self.loops = loops() if viscosity is not None else None
+        self.loops = loops() if viscosity is not None and space.dim == 2 else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
         self._strain0: Any = None
 
     def begin(self, u: Floats, velocity: Floats, step: float) -> None:
         """Start a step of `step` seconds (0: no time passes) from displacements and velocities (N,
-        2).
+        dim).
         """
         self.step, self._u0, self._v0 = step, u, velocity
         if step > 0.0 and self.viscosity is not None:
@@ -74,11 +74,11 @@ class Dynamics:
 
     @property
     def beginning(self) -> tuple[Floats, float]:
-        """Displacements (N, 2) that the step began with, and its seconds."""
+        """Displacements (N, dim) that the step began with, and its seconds."""
         return self._u0, self.step
 
     def forces(self, u: Floats) -> Floats:
-        """Nodal forces (N, 2) in N per mm of depth."""
+        """Nodal forces (N, dim)."""
         total = np.zeros_like(u)
         if self.step == 0.0:
             return total
@@ -102,11 +102,11 @@ class Dynamics:
             data += self.mass.data(pattern) / self.step**2
 
     def velocity(self, u: Floats) -> Floats:
-        """Nodal velocities (N, 2) in mm/s at the end of the step; zero when no time passes."""
+        """Nodal velocities (N, dim) in mm/s at the end of the step; zero when no time passes."""
         return (u - self._u0) / self.step if self.step > 0.0 else np.zeros_like(u)
 
     def dissipation(self, u: Floats) -> float:
-        """What the viscous stress dissipates in the step, N mm per mm of depth."""
+        """What the viscous stress dissipates in the step: N mm, in the plane per mm of depth."""
         if self.step == 0.0 or self.viscosity is None:
             return 0.0
         if self.loops is not None:
@@ -116,7 +116,7 @@ class Dynamics:
         return float(np.sum(power * damping.points.weight))
 
     def kinetic_energy(self, velocity: Floats) -> float:
-        """Kinetic energy of nodal velocities (N, 2), N mm per mm of depth."""
+        """Kinetic energy of nodal velocities (N, dim): N mm, in the plane per mm of depth."""
         if self._inertia is None:
             return 0.0
         return float(0.5 * np.sum(velocity * (self._inertia @ velocity)))
@@ -151,7 +151,7 @@ def assembled(space: Space, matrices: Floats) -> Any:
 
 
 def mass_matrices(space: Space) -> Floats:
-    """Consistent mass matrices per unit density (E, n, n) in mm2."""
+    """Consistent mass matrices per unit density (E, n, n) in mm^dim."""
     dim = space.dim
     cells = np.arange(len(space.nodes))
     w = SimpleNamespace(density=1.0)
@@ -169,7 +169,7 @@ def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, inert
         own = getattr(law, "viscosity", None)
         tau = viscosity if own is None else own
         if tau:
-            eta[cells] = tau * split(law).shear_modulus
+            eta[cells] = tau * split(law, space.dim).shear_modulus
         density[cells] = getattr(law, "density", 1e-9)
     if not eta.any() and not inertia:
         return None

@@ -16,23 +16,24 @@ ELEMENTS: Mapping[str, tuple[str, int, str]] = {
     "q2": ("quad9", 5, "point"),
     "q2p1": ("quad9", 5, "linear"),
     "p2": ("triangle6", 4, "point"),
+    "hex8": ("hexahedron", 3, "mean"),
+    "hex27p1": ("hexahedron27", 5, "linear"),
 }
 
 
 def elements_on(corners: int) -> tuple[str, ...]:
-    """Names of the elements on cells with that many corners (3 or 4).
+    """Names of the elements on cells with that many corners (3, 4 or 8).
 
-    >>> elements_on(3), elements_on(4)
-    (('p2',), ('q1', 'q1_fbar', 'q2', 'q2p1'))
+    >>> elements_on(3), elements_on(4), elements_on(8)
+    (('p2',), ('q1', 'q1_fbar', 'q2', 'q2p1'), ('hex8', 'hex27p1'))
     """
-    cells = {3: "triangle", 4: "quad"}[corners]
-    return tuple(name for name, (kind, *_) in ELEMENTS.items() if kind.startswith(cells))
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].corners == corners)
 
 
 def elements_of_order(order: int) -> tuple[str, ...]:
     """Names of the elements with cells of that order (1 or 2).
 
     >>> elements_of_order(1)
-    ('q1', 'q1_fbar')
+    ('q1', 'q1_fbar', 'hex8')
     """
     return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].order == order)

@@ -3,20 +3,19 @@
 Public form: `psi(F)` in MPa (energy per reference volume), `P(F) = dpsi/dF` (3, 3, ...) and
 `tangent(F) = dP/dF` (3, 3, 3, 3, ...) for a deformation gradient F (3, 3, ...).
 
-Split form, for plane strain (F33 = 1) alone and for elements whose volume change is a field of its
-own. F is the in-plane gradient (2, 2, ...), and `theta` (...) stands for ln J wherever the law
-uses the volume change:
+Split form, for elements whose volume change is a field of its own. F (d, d, ...) is the whole
+deformation gradient, d = 3, or its part in the plane of plane strain (F33 = 1), d = 2, and `theta`
+(...) stands for ln J wherever the law uses the volume change:
 
     split_energy(F, theta)      W(F, theta), W = psi where theta = ln det F
-    split_stress(F, theta)      S = dW/dF at fixed theta (2, 2, ...), q = dW/dtheta at fixed F (...)
-    split_tangent(F, theta)     A = dS/dF (2, 2, 2, 2, ...), c = dS/dtheta (2, 2, ...), k = dq/dtheta (...)
+    split_stress(F, theta)      S = dW/dF at fixed theta (d, d, ...), q = dW/dtheta at fixed F (...)
+    split_tangent(F, theta)     A = dS/dF (d, d, d, d, ...), c = dS/dtheta (d, d, ...), k = dq/dtheta (...)
     split_sigma_zz(F, theta)    Cauchy stress out of the plane
 
-Where theta = ln det F, S + q F^-T is the in-plane part of P. The arrays of a tangent that do not
-depend on the state are read-only views without memory of their own. Laws that work with the
-small-strain volume change have `volume_measure = "trace"`: there theta stands for tr(F) - 2 (in
-the plane), and S + q I is the stress. All functions accept complex F and theta (for
-`tensor.complex_step`).
+Where theta = ln det F, S + q F^-T is P, or its part in the plane. The arrays of a tangent that do
+not depend on the state are read-only views without memory of their own. Laws that work with the
+small-strain volume change have `volume_measure = "trace"`: there theta stands for tr(F) - d, and S
++ q I is the stress. All functions accept complex F and theta (for `tensor.complex_step`).
 """
 
 from __future__ import annotations
@@ -36,15 +35,21 @@ from evfem.tissue.splitlaw import SplitLaw, split
 
 __all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "from_table", "split"]
 
-EYE = np.eye(2)
-UNIT_TANGENT = np.einsum("ik,jl->ijkl", EYE, EYE)
-SYMMETRIC_TANGENT = UNIT_TANGENT + np.einsum("il,jk->ijkl", EYE, EYE)
+#: d F_ij / d F_kl and d (F_ij + F_ji) / d F_kl in two and in three dimensions
+UNIT_TANGENT = {d: np.einsum("ik,jl->ijkl", np.eye(d), np.eye(d)) for d in (2, 3)}
+SYMMETRIC_TANGENT = {d: unit + np.einsum("ijkl->ijlk", unit) for d, unit in UNIT_TANGENT.items()}
 
 
 def _spread(constant: Array, like: Array) -> Array:
     """A constant tensor at every point of the trailing shape of `like`, as a read-only view."""
     shaped = constant.reshape(constant.shape + (1,) * like.ndim)
     return np.broadcast_to(shaped, constant.shape + like.shape)
+
+
+def _first_invariant(F: Array) -> Array:
+    """I1 = tr(F^T F) (...) in three dimensions of F (d, d, ...); F33 = 1 in the plane."""
+    squares = ddot(F, F)
+    return squares + 1.0 if len(F) == 2 else squares
 
 
 class _InvariantLaw:
@@ -83,23 +88,23 @@ class _InvariantLaw:
         return A + 2.0 * w_It * (outer(F, G) + outer(G, F))
 
     def split_energy(self, F: Array, theta: Array) -> Array:
-        """W(F, theta) (...) at in-plane F (2, 2, ...)."""
-        return self._energy(ddot(F, F) + 1.0, theta)
+        """W(F, theta) (...) at F (d, d, ...)."""
+        return self._energy(_first_invariant(F), theta)
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = dW/dF (2, 2, ...) and q = dW/dtheta (...)."""
-        w_I, w_t, *_ = self._slopes(ddot(F, F) + 1.0, theta)
+        """S = dW/dF (d, d, ...) and q = dW/dtheta (...)."""
+        w_I, w_t, *_ = self._slopes(_first_invariant(F), theta)
         return 2.0 * w_I * F, w_t
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Second derivatives of W: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
-        w_I, _, w_II, w_It, w_tt = self._slopes(ddot(F, F) + 1.0, theta)
-        unit = UNIT_TANGENT.reshape((2,) * 4 + (1,) * theta.ndim)
+        """Second derivatives of W: A (d, d, d, d, ...), c (d, d, ...), k (...)."""
+        w_I, _, w_II, w_It, w_tt = self._slopes(_first_invariant(F), theta)
+        unit = UNIT_TANGENT[len(F)].reshape((len(F),) * 4 + (1,) * theta.ndim)
         return 2.0 * w_I * unit + 4.0 * w_II * outer(F, F), 2.0 * w_It * F, w_tt
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:
         """Cauchy stress (...) out of the plane, (2 w_I + w_t) / det F."""
-        w_I, w_t, *_ = self._slopes(ddot(F, F) + 1.0, theta)
+        w_I, w_t, *_ = self._slopes(_first_invariant(F), theta)
         return (2.0 * w_I + w_t) / det(F)
 
 
@@ -128,13 +133,13 @@ class NeoHookean(Isotropic, _InvariantLaw):
         return np.array(0.5 * self.mu), self.lmbda * theta - self.mu, zero, zero, np.array(self.lmbda)
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = mu F (2, 2, ...) and q = lambda theta - mu (...)."""
+        """S = mu F (d, d, ...) and q = lambda theta - mu (...)."""
         return self.mu * F, self.lmbda * theta - self.mu
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """A = mu (unit), c = 0, k = lambda: constants, as read-only views of the right shapes."""
-        c = _spread(np.zeros((2, 2)), theta)
-        return _spread(self.mu * UNIT_TANGENT, theta), c, _spread(np.array(self.lmbda), theta)
+        c = _spread(np.zeros(F.shape[:2]), theta)
+        return _spread(self.mu * UNIT_TANGENT[len(F)], theta), c, _spread(np.array(self.lmbda), theta)
 
 
 @dataclass(frozen=True)
@@ -197,7 +202,7 @@ class LinearElastic(Isotropic):
 
     E (MPa), nu, mu and lambda as in `NeoHookean`, `viscosity` and `density` too. Not objective:
     rotations of more than a few degrees strain it. Its volume change is tr e: in the split form
-    theta stands for tr(F) - 2 and S + q I is the stress.
+    theta stands for tr(F) - d and S + q I is the stress.
 
     >>> LinearElastic(E=2.6, nu=0.3).mu
     1.0
@@ -231,8 +236,8 @@ class LinearElastic(Isotropic):
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
         """A = mu (unit + transposed unit), c = 0, k = lambda: constants, as read-only views."""
-        c = _spread(np.zeros((2, 2)), theta)
-        return _spread(self.mu * SYMMETRIC_TANGENT, theta), c, _spread(np.array(self.lmbda), theta)
+        c = _spread(np.zeros(F.shape[:2]), theta)
+        return _spread(self.mu * SYMMETRIC_TANGENT[len(F)], theta), c, _spread(np.array(self.lmbda), theta)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:
         """Stress (...) out of the plane, lambda theta."""

@@ -100,15 +100,15 @@ class Ogden:
         return complex_step(self.P, F, rank=2)
 
     def split_energy(self, F: Array, theta: Array) -> Array:
-        """W(F, theta) (...) at in-plane F (2, 2, ...)."""
-        return self._energy(mul(transpose(F), F), theta, 1.0)
+        """W(F, theta) (...) at F (d, d, ...)."""
+        return self._energy(mul(transpose(F), F), theta, 3.0 - len(F))
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = dW/dF (2, 2, ...) and q = dW/dtheta (...)."""
-        return self._stress(F, theta, 1.0)
+        """S = dW/dF (d, d, ...) and q = dW/dtheta (...)."""
+        return self._stress(F, theta, 3.0 - len(F))
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Second derivatives of W at real F and theta: A (2, 2, 2, 2, ...), c (2, 2, ...), k
+        """Second derivatives of W at real F and theta: A (d, d, d, d, ...), c (d, d, ...), k
         (...).
         """
         return stepped_tangent(self.split_stress, F, theta)

@@ -12,7 +12,13 @@ q1 q2 p2   ln J of that point                                    yes (q1), mild 
 q1_fbar    ln J at the centroid, which is F-bar with             no
            Fbar = (J0/J)^(1/2) F (10.1016/0020-7683(95)00259-6)
 q2p1       L2 projection of ln J onto {1, X, Y} of the cell      no
+hex8       ln det of the mean of F over the cell                 no
+hex27p1    L2 projection of ln J onto {1, X, Y, Z} of the cell   no
 =========  ====================================================  =============================
+
+On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test: there
+:math:`F^{-T}:\nabla v` of a constant F does not integrate to its value at the centroid. The mean
+deformation gradient does, by definition; on quads the two are the same.
 
 `theta = Pi ln J(samples)` is linear in ln J, hence
 :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent is symmetric
@@ -30,6 +36,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
+from evfem.mesh.hexahedron import EDGES, FACES, PLACES
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det
 from evfem.tissue.elements import ELEMENTS
@@ -40,24 +47,31 @@ def scikit_mesh(mesh: Mesh) -> Any:
     """The same mesh as a scikit-fem mesh, its nodes where ours are (curved mid-nodes included)."""
     import skfem
 
-    linear = {4: skfem.MeshQuad, 3: skfem.MeshTri}[mesh.corners]
+    linear = {3: skfem.MeshTri, 4: skfem.MeshQuad, 8: skfem.MeshHex}[mesh.corners]
     vertices, t = np.unique(mesh.cells[:, : mesh.corners], return_inverse=True)
-    base = linear(
-        np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t.reshape(-1, mesh.corners).T)
-    )
+    t = t.reshape(-1, mesh.corners).T
+    if mesh.corners == 8:  # scikit-fem has its own order of the corners
+        t = t[[int(np.flatnonzero((PLACES[:8] == 2 * p - 1).all(axis=1))[0]) for p in linear.elem.refdom.p.T]]
+    base = linear(np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t))
     if mesh.order == 1:
         return base
-    quadratic = {4: skfem.MeshQuad2, 3: skfem.MeshTri2}[mesh.corners].from_mesh(base)
+    raised = {3: skfem.MeshTri2, 4: skfem.MeshQuad2, 8: skfem.MeshHex2}[mesh.corners]
+    quadratic = raised.from_mesh(base)
     ours = nodes_at(straight_points(mesh), quadratic.doflocs.T)
     return type(quadratic)(np.ascontiguousarray(mesh.points[ours].T), quadratic.t)
 
 
 def straight_points(mesh: Mesh) -> Floats:
-    """Where the nodes would be if every edge were straight, (N, 2); tells nodes apart whatever the
-    curvature.
+    """Where the nodes would be if every edge were straight, (N, dim); tells nodes apart whatever
+    the curvature.
     """
     points = mesh.points.copy()
-    if mesh.order == 2:
+    if mesh.order == 2 and mesh.corners == 8:
+        corner = mesh.points[mesh.cells[:, :8]]
+        points[mesh.cells[:, 8:20]] = corner[:, EDGES].mean(axis=2)
+        points[mesh.cells[:, 20:26]] = corner[:, FACES].mean(axis=2)
+        points[mesh.cells[:, 26]] = corner.mean(axis=1)
+    elif mesh.order == 2:
         m = mesh.corners
         corner = mesh.points[mesh.cells[:, :m]]
         points[mesh.cells[:, m : 2 * m]] = 0.5 * (corner + np.roll(corner, -1, axis=1))
@@ -104,6 +118,19 @@ class Gradients:
         """Gradients with respect to the reference configuration (E, Q, n, dim)."""
         return np.matmul(self.reference, self.inverse)
 
+    @property
+    def count(self) -> int:
+        """Number of points in a cell."""
+        return len(self.reference)
+
+
+@dataclass(frozen=True, eq=False)
+class MeanGradients:
+    """Means of the shape gradients over every cell, `of_mesh` (E, 1, n, dim), as if at one point."""
+
+    of_mesh: Floats
+    count: int = 1
+
 
 @dataclass(frozen=True, eq=False)
 class Space:
@@ -111,7 +138,8 @@ class Space:
     weights, and the element's measure of volume.
 
     `nodes` (E, n); `points` (dim, E, Q) the quadrature points; `value` (Q, n); `weight` (E, Q);
-    `at` the gradients there; `sampled` those where ln J is, the same object if it is there.
+    `at` the gradients there; `sampled` those where ln J is, the same object if it is there, or
+    their means if ln J is that of the mean deformation gradient.
     Without `modes` theta is simply ln J of the quadrature point; else theta = `modes` `psi` ln J
     with M functions `modes` (E, Q, M), orthonormal in each cell, and `psi` (E, M, S).
     """
@@ -123,7 +151,7 @@ class Space:
     value: Floats
     weight: Floats
     at: Gradients
-    sampled: Gradients
+    sampled: Gradients | MeanGradients
     modes: Floats | None = None
     psi: Floats | None = None
 
@@ -140,7 +168,7 @@ class Space:
     @property
     def samples(self) -> int:
         """Number of points in a cell where ln J is sampled."""
-        return len(self.sampled.reference)
+        return self.sampled.count
 
     @property
     def gradient(self) -> Floats:
@@ -168,6 +196,7 @@ def cells_of(space: Space) -> Cells:
     pointwise = space.modes is None or space.psi is None
     E, n = space.nodes.shape
     sampled = space.sampled
+    assert isinstance(sampled, Gradients), "loops of the plane"
     reference = sampled.reference[:0] if pointwise else sampled.reference
     inverse = sampled.inverse[:, :0] if pointwise else sampled.inverse
     psi = np.zeros((E, 0, 0)) if space.psi is None else space.psi
@@ -202,10 +231,14 @@ def make_space(mesh: Mesh, element: str) -> Space:
     check_orientation(mesh, determinant)
     weight = np.abs(determinant) * W
     points = np.ascontiguousarray(mapping.F(X))
-    at = sampled = _gradients(shape, mapping, X)
+    at = _gradients(shape, mapping, X)
+    sampled: Gradients | MeanGradients = at
     modes = psi = None
     if sampling == "centroid":
         sampled = _gradients(shape, mapping, np.array([[0.5], [0.5]]))
+        modes, psi = _constant(weight)
+    elif sampling == "mean":
+        sampled = MeanGradients(_mean(at.of_mesh, weight))
         modes, psi = _constant(weight)
     elif sampling == "linear":
         modes = _linear(points, weight)
@@ -231,7 +264,14 @@ def shape_functions(kind: str) -> Any:
     """scikit-fem's shape functions on cells of a kind."""
     import skfem
 
-    return {"quad": skfem.ElementQuad1, "quad9": skfem.ElementQuad2, "triangle6": skfem.ElementTriP2}[kind]()
+    shapes = {
+        "quad": skfem.ElementQuad1,
+        "quad9": skfem.ElementQuad2,
+        "triangle6": skfem.ElementTriP2,
+        "hexahedron": skfem.ElementHex1,
+        "hexahedron27": skfem.ElementHex2,
+    }
+    return shapes[kind]()
 
 
 def scatter(nodes: Ints, fe: Floats, size: int) -> Floats:
@@ -259,10 +299,10 @@ def check_orientation(mesh: Mesh, determinant: Floats) -> None:
     sign = np.sign(determinant)
     bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
     if bad.size:
-        centre = mesh.points[mesh.cells[bad[0]]].mean(axis=0)
+        centre = ", ".join(f"{x:.3g}" for x in mesh.points[mesh.cells[bad[0]]].mean(axis=0))
         raise InputError(
             "finger.mesh",
-            f"{bad.size} tangled cells, the first near ({centre[0]:.3g}, {centre[1]:.3g})",
+            f"{bad.size} tangled cells, the first near ({centre})",
             "cells with a positive Jacobian at every quadrature point",
         )
 
@@ -271,6 +311,12 @@ def _constant(weight: Floats) -> tuple[Floats, Floats]:
     """The constant as the only mode (E, Q, 1) and its psi (E, 1, 1), for one sample in each cell."""
     root = np.sqrt(weight.sum(axis=1))[:, None, None]
     return np.broadcast_to(1.0 / root, (*weight.shape, 1)), root
+
+
+def _mean(gradient: Floats, weight: Floats) -> Floats:
+    """Means (E, 1, n, dim) of gradients (E, Q, n, dim) over the cells."""
+    share = weight / weight.sum(axis=1, keepdims=True)
+    return np.einsum("eq,eqnd->end", share, gradient)[:, None]
 
 
 def _linear(x: Floats, weight: Floats) -> Floats:

@@ -2,11 +2,11 @@
 lack it.
 
 `split(law)` returns a law that has the form already, and wraps an object that only has `P(F)` or
-`psi(F)` on F (3, 3, ...): its energy at in-plane F and theta is psi(Fbar) with Fbar = exp((theta -
-ln det F)/2) F in the plane and Fbar33 = 1, so that det Fbar = exp(theta). Derivatives come by
-complex step; where the second derivative of an energy is needed, by central differences of sixth
-order of the complex-step stress. A weak form of grad u and theta can be a law too. All of it is
-for plane strain.
+`psi(F)` on F (3, 3, ...): its energy at F (d, d, ...) and theta is psi(Fbar) with Fbar =
+exp((theta - ln det F)/d) F, d = 3, or in the plane of plane strain, d = 2, with Fbar33 = 1, so that
+det Fbar = exp(theta). Derivatives come by complex step; where the second derivative of an energy is
+needed, by central differences of sixth order of the complex-step stress. A weak form of grad u and
+theta can be a law too.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from evfem.tensor import (
     det,
     difference,
     identity,
+    inv,
     mul,
     symmetric_power,
     transpose,
@@ -37,10 +38,9 @@ from evfem.tissue.forms import Form
 
 #: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3
-#: what a form that stands for a law may use
-PARTS = Parts(2, grad=True, theta=True)
 
 Stress = Callable[[Array, Array], tuple[Array, Array]]
+Turn = Callable[[float], tuple[Array, Array]]
 
 
 @runtime_checkable
@@ -58,11 +58,14 @@ class SplitLaw(Protocol):
 
 
 def embed(F: Array) -> Array:
-    """In-plane F (2, 2, ...) as a plane-strain deformation gradient (3, 3, ...) with F33 = 1.
+    """In-plane F (2, 2, ...) as a plane-strain deformation gradient (3, 3, ...) with F33 = 1; a
+    whole F (3, 3, ...) as it is.
 
     >>> embed(np.array([[2.0, 0.0], [0.5, 1.0]])).tolist()
     [[2.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.0, 0.0, 1.0]]
     """
+    if len(F) == 3:
+        return F
     out = np.zeros((3, 3, *F.shape[2:]), dtype=F.dtype)
     out[:2, :2] = F
     out[2, 2] = 1.0
@@ -81,7 +84,7 @@ class UserLaw:
 
     @cached_property
     def shear_modulus(self) -> float:
-        """Initial shear modulus in MPa: dP12/dF12 at rest."""
+        """Initial shear modulus in MPa: dP12/dF12 at rest, in the plane or in space."""
         F = np.eye(2)
         return float(self.split_tangent(F, np.zeros(()))[0][0, 1, 0, 1])
 
@@ -98,17 +101,21 @@ class UserLaw:
         Fbar = _scaled(F, theta)
         if hasattr(self.law, "psi"):
             return np.asarray(self.law.psi(embed(Fbar)))
-        return _work(lambda F, _: (self._stress(embed(F))[:2, :2], np.zeros(())), Fbar, np.zeros(()))
+        return _work(lambda F, _: (self._within(F), np.zeros(())), Fbar, np.zeros(()))
+
+    def _within(self, Fbar: Array) -> Array:
+        """P (d, d, ...) of the user's law at Fbar (d, d, ...)."""
+        return self._stress(embed(Fbar))[: len(Fbar), : len(Fbar)]
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S = e^a (P - (P : F) F^-T / 2) and q = e^a P : F / 2, with P at Fbar = e^a F."""
+        """S = e^a (P - (P : F) F^-T / d) and q = e^a P : F / d, with P at Fbar = e^a F."""
         scale = _scale(F, theta)
-        P = scale * self._stress(embed(scale * F))[:2, :2]
-        q = 0.5 * ddot(P, F)
+        P = scale * self._within(scale * F)
+        q = 1.0 / len(F) * ddot(P, F)
         return P - q / det(F) * cofactor(F), q
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Second derivatives of W: A (2, 2, 2, 2, ...), c (2, 2, ...), k (...)."""
+        """Second derivatives of W: A (d, d, d, d, ...), c (d, d, ...), k (...)."""
         if hasattr(self.law, "P"):
             return stepped_tangent(self.split_stress, F, theta)
         return stepped_tangent(self.split_stress, F, theta, DIFFERENCE_STEP)
@@ -122,23 +129,25 @@ class FormLaw:
     """A weak form of grad u and theta in the split form: its fluxes are S and q.
 
     Its energy is the work along a path from rest; what it does out of the plane is unknown, so
-    nan. `w` is the form's context; without one the place is the origin.
+    nan. `w` is the form's context, whose place `x` (d, C, Q) says in how many dimensions it is
+    taken.
     """
 
     volume_measure: Literal["log", "trace"] = "log"
     viscosity: float | None = None
     density: float = 1e-9
 
-    def __init__(self, form: Form, w: Any = None) -> None:
+    def __init__(self, form: Form, w: Any) -> None:
         self.form = form
-        self.w = w or SimpleNamespace(x=np.zeros((2, 1, 1)), n=None, law=None)
+        self.w = w
+        self.parts = Parts(len(w.x), grad=True, theta=True)
 
     @cached_property
     def shear_modulus(self) -> float:
         """Initial shear modulus in MPa: dS12/dF12 at rest. Raises `InputError` for a form of u
         itself.
         """
-        rest = identity(2, 2), np.zeros((1, 1))
+        rest = identity(self.parts.dim, 2), np.zeros((1, 1))
         A, c, k = self.split_tangent(*rest)
         if not all(np.isfinite(part).all() for part in (A, c, k, *self.split_stress(*rest))):
             allowed = "as a material a form of grad(u), u.theta, grad(v) and v.theta that is finite at rest"
@@ -150,12 +159,13 @@ class FormLaw:
         return _work(self.split_stress, F, theta)
 
     def split_stress(self, F: Array, theta: Array) -> tuple[Array, Array]:
-        """S (2, 2, C, Q) and q (C, Q)."""
-        s = fluxes(self.form, PARTS, PARTS.stacked(F - identity(2, F.ndim - 2), theta), self.w)
-        return transpose(s[:4].reshape(F.shape)), s[4]
+        """S (d, d, C, Q) and q (C, Q)."""
+        H = F - identity(len(F), F.ndim - 2)
+        s = fluxes(self.form, self.parts, self.parts.stacked(H, theta), self.w)
+        return transpose(s[:-1].reshape(F.shape)), s[-1]
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Derivatives of S and q: A (2, 2, 2, 2, C, Q), c (2, 2, C, Q), k (C, Q)."""
+        """Derivatives of S and q: A (d, d, d, d, C, Q), c (d, d, C, Q), k (C, Q)."""
         return stepped_tangent(self.split_stress, F, theta)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:
@@ -163,23 +173,23 @@ class FormLaw:
         return np.full(theta.shape, np.nan)
 
 
-def split(law: Any) -> SplitLaw:
-    """The law itself if it has the split form, else a `FormLaw` around a form or a `UserLaw`
-    around `P(F)` or `psi(F)`.
+def split(law: Any, dim: int = 2) -> SplitLaw:
+    """The law itself if it has the split form, else a `FormLaw` around a form, in `dim` dimensions
+    at the origin, or a `UserLaw` around `P(F)` or `psi(F)`.
 
     Raises `InputError` for an object that has none of them.
     """
     if isinstance(law, SplitLaw):
         return law
     if isinstance(law, Form):
-        return cast(SplitLaw, FormLaw(law))
+        return cast(SplitLaw, FormLaw(law, SimpleNamespace(x=np.zeros((dim, 1, 1)), n=None, law=None)))
     if not (hasattr(law, "P") or hasattr(law, "psi")):
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
         raise InputError("material", quoted(law), allowed)
     return cast(SplitLaw, UserLaw(law))
 
 
-def nearly_incompressible(law: SplitLaw) -> bool:
+def nearly_incompressible(law: SplitLaw, dim: int = 2) -> bool:
     """Whether a law is at rest so much stiffer against a change of volume than in shear,
     d2W/dtheta2 / mu, that its pressure is worth an unknown of its own (`evfem.solver.pressure`).
 
@@ -192,7 +202,7 @@ def nearly_incompressible(law: SplitLaw) -> bool:
     """
     if law.volume_measure == "trace":
         return False
-    *_, k = law.split_tangent(identity(2, 2), np.zeros((1, 1)))
+    *_, k = law.split_tangent(identity(dim, 2), np.zeros((1, 1)))
     return float(np.mean(k)) > INCOMPRESSIBLE * law.shear_modulus
 
 
@@ -202,16 +212,18 @@ def stepped_tangent(
     """A, c, k of a law by its split stress: by complex steps, or by differences over `step`."""
 
     def stacked(x: Array) -> Array:
-        S, q = stress(x[:4].reshape(2, 2, *x.shape[1:]), x[4])
-        return np.concatenate([S.reshape(4, *x.shape[1:]), q[None]])
+        S, q = stress(x[:-1].reshape(d, d, *x.shape[1:]), x[-1])
+        return np.concatenate([S.reshape(d * d, *x.shape[1:]), q[None]])
 
-    x = np.concatenate([F.reshape(4, *F.shape[2:]), theta[None]])
+    d = len(F)
+    x = np.concatenate([F.reshape(d * d, *F.shape[2:]), theta[None]])
     D = complex_step(stacked, x, rank=1) if step is None else difference(stacked, x, step, rank=1)
-    return D[:4, :4].reshape(2, 2, *F.shape), D[:4, 4].reshape(F.shape), D[4, 4]
+    return D[:-1, :-1].reshape(d, d, *F.shape), D[:-1, -1].reshape(F.shape), D[-1, -1]
 
 
 def _scale(F: Array, theta: Array) -> Array:
-    return np.exp(0.5 * theta) / np.sqrt(det(F))
+    root = np.sqrt(det(F)) if len(F) == 2 else det(F) ** (1.0 / 3.0)
+    return np.exp(1.0 / len(F) * theta) / root
 
 
 def _scaled(F: Array, theta: Array) -> Array:
@@ -220,18 +232,43 @@ def _scaled(F: Array, theta: Array) -> Array:
 
 def _work(stress: Stress, F: Array, theta: Array) -> Array:
     """Integral of S : dF + q dtheta from rest along R(t phi) (I + t (U - I)) and t theta, 0 <= t
-    <= 1.
+    <= 1, where F = R(phi) U.
     """
     U = symmetric_power(mul(transpose(F), F), 0.5)
-    phi = np.arctan2(F[1, 0] - F[0, 1], F[0, 0] + F[1, 1])
-    eye = identity(2, phi.ndim)
-    work = np.zeros(phi.shape)
+    turn = _turn_in_plane(F) if len(F) == 2 else _turn_in_space(mul(F, inv(U)))
+    eye = identity(len(F), F.ndim - 2)
+    work = np.zeros(F.shape[2:])
     for node, weight in zip(*np.polynomial.legendre.leggauss(12), strict=True):
         t = 0.5 * (node + 1.0)
-        c, s = np.cos(t * phi), np.sin(t * phi)
-        R, turned = np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]]) * phi
+        R, turned = turn(t)
         V = eye + t * (U - eye)
         rate = mul(turned, V) + mul(R, U - eye)
         S, q = stress(mul(R, V), t * theta)
         work += 0.5 * weight * (ddot(S, rate) + q * theta)
     return work
+
+
+def _turn_in_plane(F: Array) -> Turn:
+    """The part t of the rotation (2, 2, ...) in F, and its derivative by t."""
+    phi = np.arctan2(F[1, 0] - F[0, 1], F[0, 0] + F[1, 1])
+
+    def turn(t: float) -> tuple[Array, Array]:
+        c, s = np.cos(t * phi), np.sin(t * phi)
+        return np.array([[c, -s], [s, c]]), np.array([[-s, -c], [c, -s]]) * phi
+
+    return turn
+
+
+def _turn_in_space(R: Array) -> Turn:
+    """The same of a rotation (3, 3, ...) by less than half a turn, about its axis (Rodrigues)."""
+    skew = 0.5 * (R - transpose(R))
+    sine = np.sqrt(0.5 * ddot(skew, skew))
+    phi = np.arctan2(sine, 0.5 * (np.trace(R) - 1.0))
+    K = skew / np.where(sine > 0.0, sine, 1.0)
+    square = mul(K, K)
+
+    def turn(t: float) -> tuple[Array, Array]:
+        c, s = np.cos(t * phi), np.sin(t * phi)
+        return identity(3, phi.ndim) + s * K + (1.0 - c) * square, phi * (c * K + s * square)
+
+    return turn

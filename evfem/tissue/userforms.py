@@ -24,13 +24,13 @@ from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.fields import Field, Integrand, Parts, fluxes
 from evfem.tissue.space import Space, scikit_mesh, shape_functions, shape_gradients, shape_values
 
-#: cells or edges that a form is tried on, size of the trial's random displacements and gradients
+#: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1
 
 
 def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any = None) -> UserIntegral:
-    """A form over the region, or over the outer edges of the boundary, called `on`; `law` is the
-    region's.
+    """A form over the region, or over the outer edges (in space: faces) of the boundary, called
+    `on`; `law` is the region's.
     """
     parts = tried(space.mesh, form, on, boundary, law).parts
     points = facet_points(space, on) if boundary else points_of(space, space.mesh.cells_of(on))
@@ -71,7 +71,7 @@ def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None)
     """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown
     one.
     """
-    x, n = _edge_places(mesh, on) if boundary else _cell_places(mesh, on)
+    x, n = _facet_places(mesh, on) if boundary else _cell_places(mesh, on)
     w = SimpleNamespace(x=x, n=n, law=law)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
     random = np.random.default_rng(1).uniform(-SIZE, SIZE, (2, all_parts.size, *x.shape[1:]))
@@ -101,12 +101,16 @@ def _cell_places(mesh: Mesh, name: str) -> tuple[Floats, None]:
     return centres.T[..., None], None
 
 
-def _edge_places(mesh: Mesh, name: str) -> tuple[Floats, Floats]:
-    """Middles and outward normals (2, C, 1) of a few outer edges of a boundary."""
-    ends = mesh.points[_few(named_edges(mesh, name))[:, :2]]
-    tangent = ends[:, 1] - ends[:, 0]
-    normal = np.stack([tangent[:, 1], -tangent[:, 0]]) / np.linalg.norm(tangent, axis=1)
-    return ends.mean(axis=1).T[..., None], normal[..., None]
+def _facet_places(mesh: Mesh, name: str) -> tuple[Floats, Floats]:
+    """Middles and outward normals (dim, C, 1) of a few outer edges or faces of a boundary."""
+    corner = mesh.points[_few(named_facets(mesh, name))]
+    if mesh.dim == 3:
+        normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]).T
+    else:
+        tangent = corner[:, 1] - corner[:, 0]
+        normal = np.stack([tangent[:, 1], -tangent[:, 0]])
+    normal = normal / np.linalg.norm(normal, axis=0)
+    return corner.mean(axis=1).T[..., None], normal[..., None]
 
 
 def _few(rows: Ints) -> Ints:
@@ -118,23 +122,24 @@ def _few(rows: Ints) -> Ints:
 # --------------------------------------------------------------------------------------------------------
 
 
-def named_edges(mesh: Mesh, name: str) -> Ints:
-    """Outer edges of a boundary; raises `InputError` for an unknown name, and for one without an
-    edge.
+def named_facets(mesh: Mesh, name: str) -> Ints:
+    """Corners of the outer edges (K, 2), in space faces (K, 4), of a boundary; raises `InputError`
+    for an unknown name, and for one without an edge or face.
     """
     if name not in mesh.node_sets:
         allowed = f"one of the mesh's boundaries: {', '.join(sorted(mesh.node_sets))}"
         raise InputError("boundary", quoted(name), allowed)
-    edges = mesh.edges_of(name)
-    if not len(edges):
-        raise InputError("boundary", quoted(name), "a boundary with at least one outer edge")
-    return edges
+    facets = mesh.faces_of(name)[:, :4] if mesh.dim == 3 else mesh.edges_of(name)[:, :2]
+    if not len(facets):
+        facet = "face" if mesh.dim == 3 else "edge"
+        raise InputError("boundary", quoted(name), f"a boundary with at least one outer {facet}")
+    return facets
 
 
 def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | None = None) -> Points:
-    """Quadrature points on the outer edges of a boundary, in the order of scikit-fem's facets;
-    `quadrature` gives places (1, Q) in [0, 1] along an edge with their weights (Q,) instead of the
-    element's own.
+    """Quadrature points on the outer edges (in space: faces) of a boundary, in the order of
+    scikit-fem's facets; `quadrature` gives places (dim - 1, Q) in [0, 1] along an edge with their
+    weights (Q,) instead of the element's own.
     """
     import skfem
 
@@ -155,9 +160,9 @@ def facet_points(space: Space, name: str, quadrature: tuple[Floats, Floats] | No
 
 
 def _facets(space: Space, grid: Any, name: str) -> Ints:
-    """scikit-fem facets of a named boundary: outer edges all of whose nodes belong to it."""
-    ends = np.sort(named_edges(space.mesh, name)[:, :2], axis=1)
+    """scikit-fem facets of a named boundary: outer edges or faces all of whose nodes belong to it."""
+    named = np.sort(named_facets(space.mesh, name), axis=1)
     vertices = np.unique(space.mesh.cells[:, : space.mesh.corners])
     ours = vertices[np.sort(grid.facets, axis=0)].T
-    size = space.size
-    return np.flatnonzero(np.isin(ours[:, 0] * size + ours[:, 1], ends[:, 0] * size + ends[:, 1]))
+    number = np.unique(np.vstack([named, ours]), axis=0, return_inverse=True)[1].ravel()
+    return np.flatnonzero(np.isin(number[len(named) :], number[: len(named)]))

@@ -1,4 +1,5 @@
-r"""The tissue: internal forces, tangent, energy and stresses of plane-strain hyperelasticity.
+r"""The tissue: internal forces, tangent, energy and stresses of hyperelasticity, in plane strain or
+in space.
 
 For the energy density :math:`W(F, \theta)`, where :math:`\theta` stands for :math:`\ln J` wherever
 the law uses the volume change and is the measure of the element (`evfem.tissue.space`),
@@ -7,7 +8,7 @@ the law uses the volume change and is the measure of the element (`evfem.tissue.
           S = \partial_F W,\; q = \partial_\theta W .
 
 Each region is an integral of one form: `neo_hookean` for that law, `hyperelastic` for every other,
-or the user's own. For the plane: the laws are in plane strain.
+or the user's own. In the plane forces are per mm of depth, in N/mm, and energies in N.
 """
 
 from __future__ import annotations
@@ -31,8 +32,9 @@ from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter
 from evfem.tissue.splitlaw import nearly_incompressible
 
-#: what the tissue's forms use: F, S by the gradient, and the volume measure
-PARTS = Parts(2, grad=True, theta=True)
+#: rows and columns of a Cauchy stress as it is stored: in the plane without those to z, which are 0
+PLANE_STRESS = ((0, 0), (1, 1), (2, 2), (0, 1))
+STRESS = (*PLANE_STRESS, (1, 2), (0, 2))
 
 
 class Tissue:
@@ -47,10 +49,10 @@ class Tissue:
 
         self.space = space
         self.groups: list[tuple[Any, Ints]] = [
-            (split(law), space.mesh.cells_of(name)) for name, law in laws.items()
+            (split(law, space.dim), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.loops = loops() if self.mu is not None else None
+        self.loops = loops() if self.mu is not None and space.dim == 2 else None
 
     @cached_property
     def regions(self) -> list[tuple[Any, Integral]]:
@@ -60,7 +62,7 @@ class Tissue:
     @cached_property
     def nearly_incompressible(self) -> bool:
         """Whether the pressure of a region is worth an unknown of its own."""
-        return any(nearly_incompressible(law) for law, _ in self.groups)
+        return any(nearly_incompressible(law, self.space.dim) for law, _ in self.groups)
 
     def smallest_J(self, u: Floats) -> float:
         """Smallest volume ratio over all sample points."""
@@ -69,7 +71,7 @@ class Tissue:
         return min(integral.smallest_J(u) for _, integral in self.regions)
 
     def forces(self, u: Floats) -> Floats:
-        """Internal nodal forces (N, 2) in N per mm of depth; nan where a cell is inverted."""
+        """Internal nodal forces (N, dim); nan where a cell is inverted."""
         if self.loops is not None:
             return self._looped(self.loops, u)[0]
         fe = np.empty((*self.space.nodes.shape, self.space.dim))
@@ -101,7 +103,7 @@ class Tissue:
         return q
 
     def pressure_change(self, u: Floats, du: Floats) -> Floats:
-        """Derivative (E, Q) of `pressure` at u along du (N, 2)."""
+        """Derivative (E, Q) of `pressure` at u along du (N, dim)."""
         if self.loops is not None:
             return self.lmbda[:, None] * self._theta(self.loops, u, np.ascontiguousarray(du))
         change = np.empty(self.space.weight.shape)
@@ -110,7 +112,7 @@ class Tissue:
         return change
 
     def pressure_forces(self, u: Floats, q: Floats) -> Floats:
-        """Nodal forces (N, 2) of q (E, Q) alone: the integral of q dtheta(v) at u."""
+        """Nodal forces (N, dim) of q (E, Q) alone: the integral of q dtheta(v) at u."""
         if self.loops is not None:
             out = np.zeros_like(u)
             self.loops.volume_forces(
@@ -124,7 +126,7 @@ class Tissue:
         return scatter(self.space.nodes, fe, self.space.size)
 
     def energy(self, u: Floats) -> float:
-        """Stored energy in N mm per mm of depth."""
+        """Stored energy: N mm, in the plane per mm of depth."""
         if self.loops is not None:
             return self._looped(self.loops, u)[1]
         total = 0.0
@@ -135,10 +137,11 @@ class Tissue:
         return total
 
     def cell_stress(self, u: Floats) -> tuple[Floats, Floats]:
-        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, and of J
-        (E,).
+        """Means over the reference cells of the Cauchy stress (E, 4) as xx, yy, zz, xy, in space
+        (E, 6) with yz, xz, and of J (E,).
         """
-        sigma, J = np.empty((len(self.space.nodes), 4)), np.empty(len(self.space.nodes))
+        E = len(self.space.nodes)
+        sigma, J = np.empty((E, 4 if self.space.dim == 2 else 6)), np.empty(E)
         for law, integral in self.regions:
             cells, weight = integral.points.cells, integral.points.weight
             mean = weight / weight.sum(axis=1, keepdims=True)
@@ -157,13 +160,13 @@ class Tissue:
         return padded(self.mu), padded(self.lmbda)
 
     def _looped(self, loops: Any, u: Floats) -> tuple[Floats, float]:
-        """Nodal forces (N, 2) and stored energy by the compiled loops."""
+        """Nodal forces (N, dim) and stored energy by the compiled loops."""
         out = np.zeros_like(u)
         energy, _ = loops.forces(*self._request(u), out)
         return out, energy
 
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
-        """theta (E, Q) at u by the compiled loops, or its change along du (N, 2)."""
+        """theta (E, Q) at u by the compiled loops, or its change along du (N, dim)."""
         cells = self.space.cells
         sampled = np.empty((len(cells.nodes), self.space.samples, LANES))
         loops.log_volumes(cells, np.ascontiguousarray(u), du, sampled)
@@ -187,14 +190,15 @@ def make_region(space: Space, law: Any, cells: Ints) -> tuple[Any, Integral]:
     from evfem.tissue.splitlaw import FormLaw
 
     points = points_of(space, cells, small_strain=law.volume_measure == "trace")
+    parts = Parts(space.dim, grad=True, theta=True)  # F, S by the gradient, and the volume measure
     if isinstance(law, FormLaw):
         w = SimpleNamespace(x=points.x, n=None, law=None)
-        return FormLaw(law.form, w), UserIntegral(law.form, points, PARTS, w)
+        return FormLaw(law.form, w), UserIntegral(law.form, points, parts, w)
     if type(law) is NeoHookean:
         w = SimpleNamespace(law=law, mu=law.mu, lmbda=law.lmbda)
-        return law, Integral(neo_hookean, points, PARTS, w, law_moduli, at_once=True)
+        return law, Integral(neo_hookean, points, parts, w, law_moduli, at_once=True)
     w = SimpleNamespace(law=law)
-    return law, Integral(hyperelastic, points, PARTS, w, law_moduli, at_once=True)
+    return law, Integral(hyperelastic, points, parts, w, law_moduli, at_once=True)
 
 
 def law_moduli(u: Field, w: Any) -> Floats:
@@ -210,15 +214,20 @@ def law_moduli(u: Field, w: Any) -> Floats:
 
 
 def cauchy_stress(law: Any, u: Field) -> Floats:
-    """Cauchy stress (4, C, Q) as xx, yy, zz, xy."""
+    """Cauchy stress as xx, yy, zz, xy (4, C, Q) in the plane, with yz, xz (6, C, Q) in space."""
     F, small = deformation_gradient(u), law.volume_measure == "trace"
     S, q = law.split_stress(F, u.theta)
-    push, volume = (identity(2, 2), 1.0) if small else (F, det(F))
-    xx, yy, xy = (
-        (S[a, 0] * push[b, 0] + S[a, 1] * push[b, 1] + q * (a == b)) / volume
-        for a, b in ((0, 0), (1, 1), (0, 1))
-    )
-    return np.stack([xx, yy, law.split_sigma_zz(F, u.theta), xy])
+    push, volume = (identity(len(F), 2), 1.0) if small else (F, det(F))
+
+    def component(a: int, b: int) -> Floats:
+        if a == len(F):
+            return np.asarray(law.split_sigma_zz(F, u.theta))
+        total = S[a, 0] * push[b, 0]
+        for k in range(1, len(F)):
+            total = total + S[a, k] * push[b, k]
+        return np.asarray((total + q * (a == b)) / volume)
+
+    return np.stack([component(a, b) for a, b in (PLANE_STRESS if len(F) == 2 else STRESS)])
 
 
 def _neo_hookean_moduli(space: Space, laws: Mapping[str, Any]) -> tuple[Any, Any]:

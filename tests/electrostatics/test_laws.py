@@ -158,3 +158,65 @@ def test_importing_the_formulas_stays_light():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+# -- losses under alternating voltage ------------------------------------------------------------------------
+
+LOSSES = [0.3, -0.3, 1e-3, 1e-9, 7.0, np.array([0.0, 1e-6, 0.1, 0.0, 2.0, 30.0])]
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("loss", LOSSES)
+def test_attraction_with_losses_is_the_derivative_of_its_potential(law, loss):
+    step = 1e-30
+    for reduced, thickness in ((0.0271, 0.47), (0.3, 0.3), (0.3, 0.3 + 1e-9), (0.3, 0.2), (1e-4, 2.0)):
+        layers = Layers(reduced, thickness, loss)
+        slope = law.potential(GAPS + 1j * step, 700.0, layers).imag / step
+        # near the surface a large loss leaves a potential that hardly depends on the gap
+        rounding = 1e-14 * np.abs(law.potential(GAPS, 700.0, layers)) / (GAPS + reduced)
+        wrong = np.abs(slope - law.traction(GAPS, 700.0, layers))
+        assert (wrong <= 2e-12 * np.abs(slope) + rounding).all()
+        steep = law.traction(GAPS + 1j * step, 700.0, layers).imag / step
+        own = law.traction_derivative(GAPS, 700.0, layers)
+        np.testing.assert_allclose(own, steep, rtol=1e-12, atol=1e-12 * np.abs(steep).max())
+        assert (law.potential(GAPS, 700.0, layers) < 0.0).all()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_potential_with_losses_is_minus_the_work_to_far_away(law):
+    from scipy.integrate import quad
+
+    layers = Layers(0.02, 0.3, 0.05)
+    work, _ = quad(lambda t: law.traction(0.1 + t / (1 - t), 700.0, layers) / (1 - t) ** 2, 0.0, 1.0)
+    assert law.potential(0.1, 700.0, layers) == pytest.approx(-work, rel=1e-8)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_without_losses_every_bit_is_as_before(law):
+    """0 is today's formula, and the limit of small losses is its value."""
+    none = Layers(0.0271, 0.47, np.zeros_like(GAPS))
+    for method in (law.traction, law.traction_derivative, law.potential):
+        before = method(GAPS, 700.0, Layers(0.0271, 0.47))
+        np.testing.assert_array_equal(method(GAPS, 700.0, none), before)
+        mixed = method(GAPS, 700.0, Layers(0.0271, 0.47, np.full_like(GAPS, 1e-12)))
+        np.testing.assert_allclose(mixed, before, rtol=1e-13)
+
+
+def test_kaczmareks_mean_pressure_as_it_is_defined():
+    """p = (eps_0 U^2 / 2)(g + z') / (|g + z|^2 (g + D)), our own definition."""
+    z, D, g = 0.02 + 0.05j, 0.3, 0.1
+    expected = 0.5 * eps_0 * 700.0**2 * (g + z.real) / (abs(g + z) ** 2 * (g + D))
+    found = Kaczmarek().traction(g, 700.0, Layers(z.real, D, z.imag))
+    assert found == pytest.approx(expected, rel=1e-14)
+    exact = StrongTroxel().traction(g, 700.0, Layers(z.real, D, z.imag))
+    assert exact == pytest.approx(0.5 * eps_0 * 700.0**2 / abs(g + z) ** 2, rel=1e-14)
+
+
+def test_gap_that_conducts_and_is_filled():
+    """With the permittivity e of the gap, E = U / (g + (e + sigma / (i w eps_0)) s*)."""
+    film, sigma, f, e = Layer(0.001, 3.9), 1e-7, 50.0, 2.5
+    leak = sigma / (2j * np.pi * f * eps_0)
+    field = 100.0 / abs(0.002 + (e + leak) * 0.001 / 3.9)
+    layers = Layers.of(film, frequency=f, gap_conductivity=sigma, gap_eps_r=e)
+    pressure = StrongTroxel(gap_eps_r=e).traction(0.002, 100.0, layers)
+    assert pressure == pytest.approx(0.5 * e * eps_0 * field**2, rel=1e-13)

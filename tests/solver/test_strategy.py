@@ -1,12 +1,14 @@
 """How hard steps are tried: limits of the numbers, and what each of them changes."""
 
 from dataclasses import dataclass, field
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from tools.builders import finger
 from tools.meshes import block
 
+from evfem.common.constants import STAGGERED_LIMIT
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
@@ -163,3 +165,43 @@ def test_patience_trades_factorisations_for_iterations():
     assert few < factorisations
     assert fewer < iterations
     assert force == pytest.approx(same, rel=1e-7)
+
+
+class Unsettling(Steps):
+    """Equilibria that are found all at once alone: rounds fail, or go to and fro."""
+
+    attraction = "some"
+    tolerance = 1e-8
+
+    def __init__(self, fails):
+        super().__init__(Strategy(), 1.0)
+        self.fails, self.rounds = fails, 0
+
+    def attraction_at(self, old, new, voltage):
+        self.rounds += 1
+        return np.array([float(self.rounds % 2)])
+
+    def step(self, old, target, frozen=None, start=None):
+        if frozen is not None and self.fails:
+            raise StepFailed("rounds fail", [1.0])
+        return SimpleNamespace(attraction=frozen, reaction=np.ones(1), together=frozen is None)
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails):
+    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
+    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    solver = Unsettling(fails)
+    stepper = Stepper(solver, "staggered")
+    assert stepper.solve(rest, target).together
+    assert stepper.unsettled == 1
+    assert solver.rounds == (1 if fails else STAGGERED_LIMIT)
+
+
+def test_one_round_is_all_there_is_where_one_was_asked_for():
+    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
+    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    stepper = Stepper(Unsettling(True), "staggered_once")
+    with pytest.raises(StepFailed, match="rounds fail"):
+        stepper.solve(rest, target)
+    assert stepper.unsettled == 0

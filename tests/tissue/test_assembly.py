@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import skfem
-from tools.grids import rectangle, tangent_of
+from tools.grids import CELLS, rectangle, tangent_of
 
 import evfem as ev
 from evfem.errors import InputError
@@ -16,7 +16,6 @@ from evfem.tensor import det
 from evfem.tissue import forms
 from evfem.tissue.assembly import Integral, Points, VolumeMeasure, points_of, volume_change
 from evfem.tissue.dynamics import Dynamics
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.fields import Parts, fluxes, fluxes_at_once
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 from evfem.tissue.space import nodes_at, shape_gradients, shape_values
@@ -31,7 +30,7 @@ LAWS = {
     "ogden": Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=2.0),
     "linear_elastic": LinearElastic(E=0.8, nu=0.3),
 }
-every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+every_element = pytest.mark.parametrize("element", list(CELLS))
 rng = np.random.default_rng(4)
 
 

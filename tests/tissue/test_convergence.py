@@ -8,18 +8,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import newton
-from tools.grids import fine_points, l2_error, order, quarter_ring, rectangle, solve
+from tools.grids import CELLS, fine_points, l2_error, order, quarter_ring, rectangle, solve
 from tools.laws import StressOnly, neo_hookean_stress
 
 from evfem.reference import tube_pressure
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.weakform import Tissue
 
 #: element -> least order in L2 (the theory's 2 and 3, less what coarse meshes cost)
 RATES = {"q1": 1.9, "q1_fbar": 1.9, "q2": 2.8, "q2p1": 2.8, "p2": 2.8}
 QUADRATIC = ("q2", "q2p1", "p2")
-every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+every_element = pytest.mark.parametrize("element", list(CELLS))
 
 
 def bend(x, y):

@@ -4,17 +4,16 @@ in time.
 
 import numpy as np
 import pytest
-from tools.grids import fine_points, rectangle, solve, tangent_of
+from tools.grids import CELLS, fine_points, rectangle, solve, tangent_of
 
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
-every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+every_element = pytest.mark.parametrize("element", list(CELLS))
 STEP = 2e-3
 
 

@@ -7,12 +7,11 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
-from tools.grids import mixed_tangent_of, quarter_ring, rectangle, tangent_of
+from tools.grids import CELLS, mixed_tangent_of, quarter_ring, rectangle, tangent_of
 from tools.laws import EnergyOnly, StressOnly
 
 from evfem.reference import tube_pressure
 from evfem.tensor import ddot
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.forms import form, grad
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh, split
 from evfem.tissue.splitlaw import nearly_incompressible
@@ -39,7 +38,7 @@ LAWS = {
     "P_only": StressOnly(MU, LMBDA),
     "form": as_form,
 }
-every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+every_element = pytest.mark.parametrize("element", list(CELLS))
 every_law = pytest.mark.parametrize("law", list(LAWS))
 
 

@@ -45,7 +45,7 @@ LAWS = {
     "psi_only": EnergyOnly(),
     "P_only": StressOnly(MU, LMBDA),
 }
-every_element = pytest.mark.parametrize("element", list(ELEMENTS))
+every_element = pytest.mark.parametrize("element", list(CELLS))
 every_law = pytest.mark.parametrize("law", list(LAWS))
 STRETCH = np.array([[0.12, 0.2], [-0.07, -0.05]])
 

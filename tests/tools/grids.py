@@ -81,7 +81,7 @@ def assembled(space, cells, numbers=None):
 
 def tangent_of(space, u, *terms):
     """Tangent of the terms as one sparse matrix, unknowns (node, component)."""
-    pattern = Pattern(space.nodes, 2)
+    pattern = Pattern(space.nodes, space.dim)
     data = pattern.zeros()
     for term in terms:
         term.add_tangent(u, pattern, data)
@@ -97,7 +97,7 @@ def mixed_tangent_of(tissue, u, q):
 
 
 def solve(tissue, u, free, load=0.0, iterations=14):
-    """Equilibrium f_int(u) = load of the `free` unknowns (N, 2) by Newton's method from u; all
+    """Equilibrium f_int(u) = load of the `free` unknowns (N, dim) by Newton's method from u; all
     else stays.
     """
     u, free = u.copy(), free.ravel()
@@ -106,9 +106,9 @@ def solve(tissue, u, free, load=0.0, iterations=14):
         step = np.zeros(u.size)
         step[free] = spsolve(K.tocsc(), (load - tissue.forces(u)).ravel()[free])
         length = 1.0
-        while not tissue.smallest_J(u + length * step.reshape(-1, 2)) > 0.05:
+        while not tissue.smallest_J(u + length * step.reshape(u.shape)) > 0.05:
             length *= 0.5
-        u += length * step.reshape(-1, 2)
+        u += length * step.reshape(u.shape)
         size = np.abs(step).max()
         if size <= max(1e-11 * np.abs(u).max(), 1e-14):
             return u

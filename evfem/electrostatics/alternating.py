@@ -1,0 +1,182 @@
+r"""Closed forms of a plate under alternating, stepped and square voltage, with layers that conduct.
+
+Under a sine of the effective voltage U and the angular frequency w, every layer j has the complex
+length :math:`d_j / \varepsilon_j^*(\omega)` (`evfem.electrostatics.dielectrics`), and with the gap's
+:math:`\varepsilon_g^* = 1 + \sigma_g / (i\omega\varepsilon_0)`
+
+.. math:: z = \varepsilon_g^* \sum_j \frac{d_j}{\varepsilon_j^*} = z' + i z'', \qquad
+          E_g = \frac{U}{g + z}, \qquad
+          \bar p = \frac{\varepsilon_0 U^2}{2\,[(g + z')^2 + z''^2]} .
+
+The pressure itself swings around its mean with twice the frequency,
+:math:`p(t) = \bar p\,[1 + \cos(2\omega t + 2 \arg E_g)]`. After a step from no charge the field
+decays with two rates (`evfem.electrostatics.charges`). A square wave +-U, slow enough for the skin
+to be a conductor, leaks through the gap with :math:`\tau = (\varepsilon_0 / \sigma_g)(1 + g
+\varepsilon_i / d_i)`, so that with a = 1 / (2 f tau)
+
+.. math:: \bar p = p_0 \Big[\frac{2}{1 + e^{-a}}\Big]^2 \frac{1 - e^{-2a}}{2a}, \qquad
+          p_0 = \frac{\varepsilon_0 U^2}{2 (g + d_i/\varepsilon_i)^2} .
+
+Pressures in MPa, lengths in mm, V, Hz, s, S/m. All arguments broadcast; scalars give a number.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.dielectrics import dielectric
+from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0
+from evfem.errors import InputError, quoted
+
+_GAP, _SIGMA = "an air gap in mm, not negative", "a conductivity in S/m, not negative"
+
+
+def complex_length(
+    frequency: Values, *, skin: Any, skin_thickness: Values, insulator: Layer, gap_conductivity: Values = 0.0
+) -> Values:
+    """z in mm at `frequency` (Hz): what skin, insulator and a conducting gap add to the gap.
+
+    `skin` is a name (`evfem.electrostatics.dielectrics.SKINS`), a file, a `Dielectric` or a number;
+    `insulator` a `Layer`. Raises InputError for anything that is none of these.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> skin = {"skin": "gabriel_dry", "skin_thickness": 0.3}
+    >>> z = complex_length(1000.0, **skin, insulator=TOUCHSCREEN, gap_conductivity=1e-8)
+    >>> f"{1e3 * z:.4f} um"
+    '0.2940+0.0255j um'
+    """
+    layers = _layers(frequency, Layer(skin_thickness, dielectric(skin)), insulator, gap_conductivity)
+    return plain(np.asarray(layers.reduced) + 1j * np.asarray(layers.loss))
+
+
+def alternating_pressure(
+    gap: Values, voltage: Values, frequency: Values, *, skin: Any, skin_thickness: Values,
+    insulator: Layer, gap_conductivity: Values = 0.0,
+) -> Values:  # fmt: skip
+    """Mean pressure in MPa on a plate over `gap` (mm) under a sine of the effective (rms) `voltage`
+    in V at `frequency` in Hz.
+
+    `skin`, `skin_thickness` (mm), `insulator` and `gap_conductivity` (S/m) as in `complex_length`.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> given = {"skin": "gabriel_dry", "skin_thickness": 0.3, "insulator": TOUCHSCREEN}
+    >>> round(1e6 * alternating_pressure(0.001, 100 / 2**0.5, 1000.0, **given), 1)     # Pa
+    13455.5
+    """
+    gap = at_least("gap", gap, 0.0, _GAP)
+    voltage = finite("voltage", voltage, "a voltage in V")
+    layers = _layers(frequency, Layer(skin_thickness, dielectric(skin)), insulator, gap_conductivity)
+    return StrongTroxel().traction(gap, voltage, layers)
+
+
+def _layers(frequency: Values, skin: Layer, insulator: Layer, gap_conductivity: Values) -> Layers:
+    return Layers.of(skin, _layer(insulator), frequency=frequency, gap_conductivity=gap_conductivity)
+
+
+def _layer(insulator: Any) -> Layer:
+    if not isinstance(insulator, Layer):
+        raise InputError("insulator", quoted(insulator), "a Layer(thickness, eps_r)")
+    return insulator
+
+
+def step_pressure(
+    time: Values, gap: Values, voltage: Values, *, skin_eps_r: Values, skin_conductivity: Values,
+    skin_thickness: Values, insulator: Layer, gap_conductivity: Values,
+) -> Values:  # fmt: skip
+    """Pressure in MPa on a plate over `gap` (mm), `time` seconds after a step from no charge to the
+    direct `voltage` in V.
+
+    It rises while the skin becomes a conductor, and decays while charge crosses the gap.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> skin = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": 0.3}
+    >>> p = step_pressure([0.0, 1e-4, 1e-3], 0.001, 100.0, **skin, insulator=TOUCHSCREEN,
+    ...                   gap_conductivity=1e-8)
+    >>> (1e6 * p).round(1).tolist()                                                    # Pa
+    [19149.1, 24709.9, 17508.2]
+    """
+    time = np.asarray(at_least("time", time, 0.0, "a time in s, not negative"))
+    gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
+    voltage = np.asarray(finite("voltage", voltage, "a voltage in V"))
+    stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
+    layers = Layers(stack.skin + stack.insulator, np.asarray(skin_thickness) + insulator.thickness)
+    return StrongTroxel().traction(gap, voltage * stack.step_response(gap, time), layers)
+
+
+def step_rates(
+    gap: Values, *, skin_eps_r: Values, skin_conductivity: Values, skin_thickness: Values,
+    insulator: Layer, gap_conductivity: Values,
+) -> tuple[Values, Values]:  # fmt: skip
+    """The two rates in 1/s, the faster first, with which a step is followed at a fixed `gap` (mm).
+
+    >>> from evfem import TOUCHSCREEN
+    >>> skin = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": 0.3}
+    >>> rates = step_rates(0.001, **skin, insulator=TOUCHSCREEN, gap_conductivity=1e-8)
+    >>> [round(rate, 3) for rate in rates]
+    [16588.778, 228.292]
+    """
+    gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
+    stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
+    slow, fast = stack.eigenvalues(gap)
+    return plain(np.asarray(-fast)), plain(np.asarray(-slow))
+
+
+def _sandwich(
+    eps_r: Values, conductivity: Values, thickness: Values, insulator: Layer, gap_conductivity: Values
+) -> Sandwich:
+    """Skin by its constants, gap and insulator."""
+    eps_r = np.asarray(at_least("skin_eps_r", eps_r, 1.0, "a relative permittivity of at least 1"))
+    sigma = np.asarray(at_least("skin_conductivity", conductivity, 0.0, _SIGMA))
+    leak = np.asarray(at_least("gap_conductivity", gap_conductivity, 0.0, _SIGMA))
+    thickness = np.asarray(at_least("skin_thickness", thickness, 0.0, "a thickness in mm, not negative"))
+    film = Sandwich.of(Layer(0.0, 1.0), _layer(insulator), frequency=None, gap_conductivity=leak)
+    return Sandwich(thickness / eps_r, film.insulator, (sigma / (eps_0 * eps_r), *film.rates[1:]))
+
+
+def square_wave_pressure(
+    frequency: Values, gap: Values, voltage: Values, *, insulator: Layer, gap_conductivity: Values
+) -> Values:
+    """Mean pressure in MPa over the cycle of a square wave of +-`voltage` (V), the skin a conductor
+    and the insulator none.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> film = {"insulator": TOUCHSCREEN, "gap_conductivity": 1e-8}
+    >>> full = square_wave_pressure(1e9, 0.001, 100.0, **film)
+    >>> round(square_wave_pressure(60.0, 0.001, 100.0, **film) / full, 6)
+    0.775157
+    """
+    f = np.asarray(above("frequency", frequency, 0.0, "a frequency in Hz above 0"))
+    gap = at_least("gap", gap, 0.0, _GAP)
+    voltage = finite("voltage", voltage, "a voltage in V")
+    leak = np.asarray(at_least("gap_conductivity", gap_conductivity, 0.0, _SIGMA))
+    film = Layers.of(_layer(insulator))
+    a = leak / (2.0 * f * eps_0 * (1.0 + np.asarray(gap) / film.reduced))
+    charged = (2.0 / (1.0 + np.exp(-a))) ** 2
+    safe = np.where(a > 0.0, a, 1.0)
+    held = np.where(a > 0.0, -np.expm1(-2.0 * safe) / (2.0 * safe), 1.0)
+    return plain(StrongTroxel().traction(gap, voltage, film) * charged * held)
+
+
+def corner_frequencies(
+    gap: Values, *, skin_eps_r: Values, skin_conductivity: Values, skin_thickness: Values,
+    insulator: Layer, gap_conductivity: Values,
+) -> tuple[Values, Values]:  # fmt: skip
+    """Frequencies in Hz below which the gap leaks, and below which the skin is a conductor, each
+    with the other layers as capacitors beside it.
+
+    >>> from evfem import TOUCHSCREEN
+    >>> skin = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": 0.3}
+    >>> corners = corner_frequencies(0.001, **skin, insulator=TOUCHSCREEN, gap_conductivity=1e-8)
+    >>> [round(f, 3) for f in corners]
+    [36.684, 2614.987]
+    """
+    gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
+    stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
+    skin, leak, _ = stack.rates
+    of_gap = leak / (1.0 + gap / stack.insulator)
+    of_skin = skin / (1.0 + stack.skin / (gap + stack.insulator))
+    return plain(np.asarray(of_gap / (2.0 * np.pi))), plain(np.asarray(of_skin / (2.0 * np.pi)))

@@ -1,0 +1,363 @@
+"""Hexahedra: patch test, derivatives, rigid motion, convergence, and plane strain as a special
+case.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from tools.grids import order, rectangle, solve, tangent_of
+from tools.laws import StressOnly, neo_hookean_stress
+from tools.solids import box
+
+from evfem.tensor import det
+from evfem.tissue.body import Body
+from evfem.tissue.dynamics import Dynamics, mass_matrices
+from evfem.tissue.forms import form
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
+from evfem.tissue.splitlaw import embed
+from evfem.tissue.userforms import make_term
+from evfem.tissue.weakform import Tissue
+
+MU, LMBDA = 0.7, 1.9
+YOUNG = MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU)
+POISSON = LMBDA / (2 * (LMBDA + MU))
+
+
+class EnergyOnly:
+    """A user's law, energy only."""
+
+    def psi(self, F):
+        J = det(F)
+        volume = LMBDA / 16.0 * (J**2 - J**-2) ** 2
+        return 0.5 * MU * (np.sum(F * F, axis=(0, 1)) - 3.0 - 2.0 * np.log(J)) + volume
+
+
+@form
+def neo_hookean_form(u, v, w):
+    """The neo-Hookean law as a user's form."""
+    F = np.eye(3)[:, :, None, None] + u.grad
+    return MU * np.sum(F * v.grad, axis=(0, 1)) + (LMBDA * u.theta - MU) * v.theta
+
+
+LAWS = {
+    "neo_hookean": NeoHookean(E=YOUNG, nu=POISSON),
+    "yeoh": Yeoh(c1=0.35, c2=0.1, c3=0.02, nu=0.4),
+    "ogden": Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=2.0),
+    "linear_elastic": LinearElastic(E=YOUNG, nu=POISSON),
+    "psi_only": EnergyOnly(),
+    "P_only": StressOnly(MU, LMBDA),
+    "form": neo_hookean_form,
+}
+#: the plane element that each hexahedron is, extruded
+PLANE = {"hex8": "q1_fbar", "hex27p1": "q2p1"}
+every_element = pytest.mark.parametrize("element", list(PLANE))
+every_law = pytest.mark.parametrize("law", list(LAWS))
+STRETCH = np.array([[0.12, 0.2, 0.05], [-0.07, -0.05, 0.1], [0.03, -0.08, 0.06]])
+
+
+def bend(x, y, z):
+    """A warp that curves every edge and twists every face."""
+    return (
+        x + 0.06 * np.sin(2.0 * y + x - z),
+        y + 0.08 * np.sin(2.5 * x + 0.7 * z),
+        z + 0.07 * np.sin(2.0 * x * y + 1.5 * z),
+    )
+
+
+def wavy(points, size=0.06):
+    """A smooth displacement field, far from affine."""
+    x, y, z = points.T
+    waves = np.sin(2 * x + y - z) + y * z, np.cos(3 * x - y) + x * z, np.sin(2 * z - x) + x * y
+    return size * np.column_stack(waves)
+
+
+def stress_of(law, F):
+    """P (3, 3) at F (3, 3): the law's own, or the neo-Hookean law's for those that are it."""
+    if isinstance(law, EnergyOnly):
+        J, G = np.linalg.det(F), np.linalg.inv(F).T
+        return MU * (F - G) + LMBDA / 4.0 * (J**2 - J**-2) * (J**2 + J**-2) * G
+    return law.P(F) if hasattr(law, "P") else neo_hookean_stress(F, MU, LMBDA)
+
+
+# -- patch test -----------------------------------------------------------------------------------------
+
+
+@every_law
+@every_element
+@pytest.mark.parametrize("shape", ["distorted", "curved"])
+def test_patch(element, law, shape):
+    """Affine displacements give the law's own stress in every cell and no force on an inner node.
+
+    ln J at the centroid leaves forces of 1e-4 here (see the next test). Curved cells map affine
+    fields exactly too, but 27 points do not integrate their Jacobian exactly.
+    """
+    distortion = {"jitter": 0.25} if shape == "distorted" else {"warp": bend}
+    space = box(element, (3, 2, 2), **distortion)
+    tissue = Tissue(space, {"lower": LAWS[law]})
+    points, outside = space.mesh.points, space.mesh.node_sets["outside"]
+    u = points @ STRETCH.T
+    F = np.eye(3) + STRETCH
+    J, P = np.linalg.det(F), stress_of(LAWS[law], F)
+    forces = tissue.forces(u)
+    inner = np.setdiff1d(np.arange(space.size), outside)
+    if shape == "distorted" or element == "hex8":
+        assert np.abs(forces[inner]).max() < 1e-14
+    np.testing.assert_allclose(forces.T @ points, P * space.weight.sum(), atol=1e-12)
+    stress, volume = tissue.cell_stress(u)
+    np.testing.assert_allclose(volume, J, rtol=1e-12)
+    sigma = P if law == "linear_elastic" else P @ F.T / J
+    expected = np.tile(sigma[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], (len(stress), 1))
+    np.testing.assert_allclose(stress, expected, atol=1e-12)
+
+
+def test_patch_sees_the_centroid():
+    """ln J at the centroid, as on quads, fails: what the mean deformation gradient is for."""
+    from dataclasses import replace
+
+    import skfem
+
+    from evfem.tissue.space import _gradients, scikit_mesh, shape_functions
+
+    space = box("hex8", (3, 3, 3), jitter=0.25)
+    centre = np.full((3, 1), 0.5)
+    grid = scikit_mesh(space.mesh)
+    assert isinstance(grid, skfem.MeshHex)
+    sampled = _gradients(shape_functions("hexahedron"), grid.mapping(), centre)
+    inner = np.setdiff1d(np.arange(space.size), space.mesh.node_sets["outside"])
+    u = space.mesh.points @ STRETCH.T
+    forces = Tissue(replace(space, sampled=sampled), {"lower": LAWS["yeoh"]}).forces(u)
+    assert np.abs(forces[inner]).max() > 1e-5
+
+
+# -- derivatives ----------------------------------------------------------------------------------------
+
+
+@every_law
+@every_element
+def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(element, law):
+    """Central differences along random directions; two regions, so groups mix."""
+    space = box(element, (2, 1, 1), warp=bend, split=lambda x, y, z: x > 0.5)
+    tissue = Tissue(space, {"lower": LAWS[law], "upper": Yeoh(c1=0.3, c2=0.2, nu=0.3)})
+    u = wavy(space.mesh.points)
+    f, K = tissue.forces(u), tangent_of(space, u, tissue)
+    scale = abs(K).max()
+    for direction in np.random.default_rng(3).normal(size=(3, *u.shape)):
+        h = 1e-4
+        ends = [tissue.energy(u + s * h * direction) for s in (1, -1, 2, -2)]
+        slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+        assert slope == pytest.approx(np.sum(f * direction), rel=2e-8)
+        ends = [tissue.forces(u + s * h * direction) for s in (1, -1, 2, -2)]
+        slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+        np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=2e-9 * scale)
+    cells = tissue.regions[0][1].cell_tangents(u)
+    assert np.abs(cells - np.swapaxes(cells, 1, 2)).max() < 1e-9 * np.abs(cells).max()
+
+
+@every_element
+def test_rigid_motion_costs_nothing(element):
+    """A turn by 50 degrees about an oblique axis and a shift: no energy, no forces."""
+    space = box(element, (2, 2, 1), warp=bend)
+    axis, angle = np.array([1.0, -2.0, 2.0]) / 3.0, 0.87
+    K = np.cross(np.eye(3), -axis)
+    R = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-15)
+    u = space.mesh.points @ (R - np.eye(3)).T + [0.3, -2.0, 1.0]
+    for law in ("neo_hookean", "yeoh", "ogden", "psi_only", "P_only", "form"):
+        tissue = Tissue(space, {"lower": LAWS[law]})
+        assert np.abs(tissue.forces(u)).max() < 1e-13
+        assert abs(tissue.energy(u)) < 1e-13
+        stress, J = tissue.cell_stress(u)
+        assert np.abs(stress).max() < 1e-13
+        np.testing.assert_allclose(J, 1.0, rtol=1e-13)
+
+
+# -- convergence ----------------------------------------------------------------------------------------
+
+
+def swell(x, y, z):
+    """A smooth displacement with volume changes, and F: (3, ...), (3, 3, ...)."""
+    s = [np.sin(2 * x + y + z), np.cos(3 * y - z), np.sin(x - 2 * z)]
+    c = [np.cos(2 * x + y + z), -np.sin(3 * y - z), np.cos(x - 2 * z)]
+    zero = np.zeros_like(x)
+    H = np.array([[2 * c[0], c[0], c[0]], [zero, 3 * c[1], -c[1]], [c[2], zero, -2 * c[2]]])
+    return 0.06 * np.array(s), 0.06 * H + np.eye(3).reshape((3, 3) + (1,) * np.ndim(x))
+
+
+def isochoric(x, y, z):
+    """Three shears, one after the other: J = 1 everywhere."""
+    X = x + 0.15 * np.sin(2.0 * y)
+    Y = y + 0.12 * np.sin(2.0 * z + X)
+    Z = z + 0.15 * np.sin(2.5 * X)
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    dX = np.array([one, 0.3 * np.cos(2.0 * y), zero])
+    slope = 0.12 * np.cos(2.0 * z + X)
+    dY = np.array([zero, one, zero]) + slope * (dX + np.array([zero, zero, 2.0 * one]))
+    dZ = np.array([zero, zero, one]) + 0.375 * np.cos(2.5 * X) * dX
+    return np.array([X - x, Y - y, Z - z]), np.array([dX, dY, dZ])
+
+
+@cache
+def manufactured_error(element, field, nu, n):
+    """L2 error on n x n x n cells for the load int P(F) : grad v of `field` and its values
+    outside.
+    """
+    law = NeoHookean(E=1.0, nu=nu)
+    space = box(element, (n, n, n), warp=bend)
+    exact = field(*space.mesh.points.T)[0].T
+    _, F = field(*space.points)
+    P = neo_hookean_stress(F, law.mu, law.lmbda)
+    load = np.zeros((space.size, 3))
+    np.add.at(load, space.nodes, np.einsum("ijeq,eqaj,eq->eai", P, space.gradient, space.weight))
+    free = np.ones_like(exact, dtype=bool)
+    free[space.mesh.node_sets["outside"]] = False
+    u = solve(Tissue(space, {"lower": law}), exact, free, load)
+    difference = np.einsum("qa,eai->ieq", space.value, u[space.nodes]) - field(*space.points)[0]
+    return float(np.sqrt(np.sum(difference**2 * space.weight)))
+
+
+def errors_of(element, field, nu):
+    return [manufactured_error(element, field, nu, n) for n in ((4, 8) if element == "hex8" else (2, 4))]
+
+
+@every_element
+def test_order_of_convergence_and_no_locking(element):
+    """2 and 3 (less what coarse meshes cost), and at nu = 0.4999 nearly the same errors as at 0.3."""
+    assert order(errors_of(element, swell, 0.3)) >= (1.75 if element == "hex8" else 2.6)
+    soft, stiff = (errors_of(element, isochoric, nu)[-1] for nu in (0.3, 0.4999))
+    assert stiff == pytest.approx(soft, rel=0.25)
+
+
+# -- plane strain as a special case ---------------------------------------------------------------------
+
+
+@every_element
+def test_strip_between_fixed_sides_is_plane_strain(element):
+    """Half as deep as wide, z held: displacements and forces per depth are the plane element's."""
+
+    def flat(x, y):
+        return x + 0.06 * np.sin(2.0 * y + x), y + 0.08 * np.sin(2.5 * x)
+
+    plane = rectangle(PLANE[element], (4, 3), warp=flat)
+    depth = 0.5
+    strip = box(element, (4, 3, 1), (1.0, 1.0, depth), warp=lambda x, y, z: (*flat(x, y), z))
+    law = {"lower": NeoHookean(E=0.05, nu=0.48)}
+    found = []
+    for space in (plane, strip):
+        sets, tissue = space.mesh.node_sets, Tissue(space, law)
+        u = np.zeros((space.size, space.dim))
+        u[:, :2] = space.mesh.points[:, :2] @ [[0.17, 0.0], [0.1, -0.15]]
+        free = np.ones_like(u, dtype=bool)
+        free[np.union1d(sets["top"], sets["bottom"])] = False
+        free[:, 2:] = False
+        u = solve(tissue, u, free)
+        found.append((u, tissue.forces(u), tissue))
+    (u2, f2, tissue2), (u3, f3, tissue3) = found
+    distance = np.linalg.norm(strip.mesh.points[:, None, :2] - plane.mesh.points[None], axis=2)
+    below = distance.argmin(axis=1)
+    np.testing.assert_allclose(u3[:, :2], u2[below], atol=1e-12)
+    summed = np.stack([np.bincount(below, f3[:, i], plane.size) for i in range(2)], axis=1)
+    np.testing.assert_allclose(summed, depth * f2, atol=1e-12)
+    assert tissue3.energy(u3) == pytest.approx(depth * tissue2.energy(u2), rel=1e-10)
+    stress, J = tissue3.cell_stress(u3)
+    assert np.abs(stress[:, 4:]).max() < 1e-12
+    assert sorted(J) == pytest.approx(sorted(tissue2.cell_stress(u2)[1]), rel=1e-10)
+
+
+@pytest.mark.parametrize("law", ["neo_hookean", "yeoh", "ogden"])
+def test_laws_of_the_plane_are_those_of_space_in_plane_strain(law):
+    """W, S and q of F in the plane are those of the same F embedded (laws of a user, whose stress
+    is split by the dimension, are so only where theta = ln J)."""
+    flat = np.array([[1.1, 0.2], [-0.1, 0.9]])
+    theta = np.array(0.03)
+    W, (S, q) = LAWS[law].split_energy(flat, theta), LAWS[law].split_stress(flat, theta)
+    in_space = LAWS[law].split_stress(embed(flat), theta)
+    assert LAWS[law].split_energy(embed(flat), theta) == pytest.approx(W, rel=1e-13)
+    np.testing.assert_allclose(in_space[0][:2, :2], S, rtol=1e-12)
+    assert in_space[1] == pytest.approx(q, rel=1e-12)
+
+
+# -- time, user's forms, the body ------------------------------------------------------------------------
+
+
+@every_element
+def test_mass_and_momentum(element):
+    """Cell masses add up to the volume; a body that moves as a whole has mass times velocity."""
+    space = box(element, (2, 2, 2), warp=bend)
+    assert mass_matrices(space).sum() == pytest.approx(space.weight.sum(), rel=1e-13)
+    term = Dynamics(space, None, np.full(len(space.nodes), 2.0))
+    velocity = np.broadcast_to([1.0, 2.0, -2.0], (space.size, 3)).copy()
+    assert term.kinetic_energy(velocity) == pytest.approx(9.0 * space.weight.sum(), rel=1e-13)
+    term.begin(np.zeros_like(velocity), np.zeros_like(velocity), 0.5)
+    forces = term.forces(0.5 * velocity)
+    np.testing.assert_allclose(forces.sum(axis=0), 4.0 * space.weight.sum() * velocity[0], rtol=1e-12)
+
+
+@every_element
+def test_viscosity_dissipates_and_does_not_resist_rotation(element):
+    """Tangent by differences; power of the viscous force at rest's metric; a turn feels nothing."""
+    space = box(element, (2, 1, 1), warp=bend)
+    term = Dynamics(space, np.linspace(0.1, 0.3, len(space.nodes)), None)
+    start = wavy(space.mesh.points)
+    term.begin(start, 0 * start, 2e-3)
+    R = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+    turned = (space.mesh.points + start) @ R.T - space.mesh.points
+    assert np.abs(term.forces(turned)).max() < 1e-11
+    u = wavy(space.mesh.points, 0.08)
+    direction = np.random.default_rng(3).normal(size=u.shape)
+    h = 1e-4
+    ends = [term.forces(u + s * h * direction) for s in (1, -1, 2, -2)]
+    slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
+    K = tangent_of(space, u, term)
+    np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=1e-8 * abs(K).max())
+    small = start + 1e-6 * (u - start)
+    power = np.sum(term.forces(small) * (small - start))
+    assert term.dissipation(small) == pytest.approx(power, rel=1e-4)
+
+
+@every_element
+def test_traction_on_a_boundary_is_force_per_area(element):
+    """A user's form over faces: a traction along the normal sums to the closed surface's zero, on
+    one flat side to its area.
+    """
+
+    @form
+    def pull(u, v, w):
+        return -2.0 * np.sum(w.n * v, axis=0)
+
+    flat = box(element, (2, 3, 2), (1.0, 2.0, 1.5), jitter=0.2)
+    u = np.zeros((flat.size, 3))
+    side = make_term(flat, pull, "right", boundary=True).forces(u)
+    np.testing.assert_allclose(side.sum(axis=0), [-2.0 * 3.0, 0.0, 0.0], atol=1e-13)
+    pulled = np.flatnonzero(np.abs(side[:, 0]) > 1e-12)
+    assert pulled.tolist() == flat.mesh.node_sets["right"].tolist()
+    bent = box(element, (2, 2, 2), warp=bend)
+    closed = make_term(bent, pull, "outside", boundary=True).forces(np.zeros((bent.size, 3)))
+    assert np.abs(closed).max() > 1e-2
+    # the area vectors of quadratic faces are of higher degree than the quadrature
+    np.testing.assert_allclose(closed.sum(axis=0), 0.0, atol=1e-14 if element == "hex8" else 1e-5)
+
+
+@every_element
+def test_the_bone_translates_as_a_whole(element):
+    """Three unknowns at the end, x, y, z; a shift of the body needs no force, a pull gives one
+    reaction."""
+    space = box(element, (2, 2, 1), jitter=0.2)
+    mesh = space.mesh
+    mesh.node_sets["bone"] = mesh.node_sets["top"]
+    body = Body(space, {"lower": NeoHookean(E=0.05, nu=0.48)})
+    reduced = np.zeros(body.size)
+    reduced[body.bone] = moved = [0.02, -0.04, 0.06]
+    u = body.expand(reduced)
+    bone = u[mesh.node_sets["bone"]]
+    np.testing.assert_array_equal(bone, np.broadcast_to(moved, bone.shape))
+    assert np.flatnonzero(u[:, 1]).tolist() == mesh.node_sets["bone"].tolist()
+    forces = body.forces(u)
+    np.testing.assert_allclose(body.reduce(forces)[body.bone], forces[mesh.node_sets["bone"]].sum(axis=0))
+    K = body.pattern.full(body.tangent(u))
+    direction = np.random.default_rng(3).normal(size=body.size)
+    h = 1e-5
+    ends = [body.reduce(body.forces(body.expand(reduced + s * h * direction))) for s in (1, -1)]
+    np.testing.assert_allclose(K @ direction, (ends[0] - ends[1]) / (2 * h), atol=1e-7 * abs(K).max())
+    shift = np.tile([1.0, 2.0, 3.0], (body.size // 3, 1))
+    assert np.abs(body.forces(body.expand(shift.ravel()))).max() < 1e-14
