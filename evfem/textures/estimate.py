@@ -63,8 +63,8 @@ def reduced(texture: Texture) -> Reduced:
 
     >>> from evfem.textures.generate import Knobs, make
     >>> found = reduced(make("sinusoids", Knobs(0.5, 0.02, second=0.3)))
-    >>> f"{found.wavelength:.4f} {found.amplitude:.4f} {found.in_phase:.3f} {found.explain:.4f}"
-    '2.0000 0.0200 0.300 1.0000'
+    >>> f"{found.wavelength:.4f} {found.amplitude:.4f} {found.in_phase:.2f} {found.explain:.3f}"
+    '2.0000 0.0200 0.30 1.000'
     """
     if texture.quantity != "height":
         raise InputError("texture", f"{texture.name}, {texture.quantity}", "a texture of heights")
