@@ -9,6 +9,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.plotting.colours import REGIONS
 from evfem.plotting.fields import rounds
 from evfem.plotting.figures import axes_or_new, whole_figure
+from evfem.plotting.finger import check_plane
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,6 +21,7 @@ def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
     """
     from matplotlib.collections import PolyCollection
 
+    check_plane(mesh)
     own, ax = ax is None, axes_or_new(ax)
     if own:  # a legend beside axes in true proportions is cut off otherwise
         whole_figure(ax).set_layout_engine("compressed")
