@@ -39,8 +39,8 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb sweeps "
-        "disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb "
+        "sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},

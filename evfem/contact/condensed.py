@@ -65,9 +65,11 @@ class Candidates:
     along normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes
     over x (c,) in 1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0
     for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
-    needs no other solver. The attraction weakens with a node's gap by `negative_stiffness` (c,)
-    N/mm per mm and is stronger by `gain_on_closing` (c,) N/mm where the gap is closed;
-    `roughness` says how it depends on the contact force.
+    needs no other solver. A law of friction other than Coulomb's gives its derivative by the
+    contact force as the coefficient, and beside it `cohesion` (c,) in N/mm and how much friction
+    grows with the slip of the step, `slip_stiffness` (c,) in N/mm per mm. The attraction weakens
+    with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
+    (c,) N/mm where the gap is closed; `roughness` says how it depends on the contact force.
     """
 
     surface: SurfaceState
@@ -80,6 +82,8 @@ class Candidates:
     gain_on_closing: Floats
     friction_slope: Floats
     roughness: Roughness | None = None
+    cohesion: Floats | None = None
+    slip_stiffness: Floats | None = None
 
     @cached_property
     def axes(self) -> Floats:
@@ -101,6 +105,8 @@ class Candidates:
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
         growth = sign * self.friction_slope * self.force[:, 0]
+        if self.slip_stiffness is not None:
+            growth = growth - (self.status >= FORWARD) * self.slip_stiffness * self.surface.stretch
         growth = np.where(growth * own < STABLE, growth, 0.0)
         return turned + growth[:, None] * axes[:, 1]
 
@@ -296,7 +302,8 @@ class LinearContactStep:
         if known.interface_compliance.any():
             compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
-        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns)
+        cohesion = None if known.cohesion is None else known.cohesion[near]
+        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns, cohesion=cohesion)
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
             known.surface.normal_gap[near],

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.contact.friction import Coulomb
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
@@ -211,11 +212,13 @@ def _contact(scene: Scene) -> Term:
 
 
 def _friction(scene: Scene) -> Term:
-    return Term(
-        "friction",
-        bool(scene.ground.has_friction),
-        "Coulomb" if scene.ground.has_friction else "friction coefficient is 0 everywhere",
-    )
+    if not scene.has_friction:
+        return Term("friction", False, "friction coefficient is 0 everywhere")
+    law = scene.friction_law
+    if isinstance(law, Coulomb):
+        return Term("friction", True, "Coulomb")
+    timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
+    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}")
 
 
 def _electricity(scene: Scene) -> Term:

@@ -13,6 +13,7 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
+from evfem.contact.friction import Coulomb
 from evfem.contact.pad import Pad, make_pad
 from evfem.contact.skin import Skin, make_skin
 from evfem.electrostatics.laws import Layers
@@ -83,6 +84,8 @@ def make_model(scene: Scene) -> Model:
     body = Body(space, laws, terms, dynamics)
     limits = Limits(solver.tolerance, solver.strategy, solver.threads)
     interface = make_interface(scene, mesh, pad, surface)
+    if not isinstance(scene.friction_law, Coulomb):
+        interface.law = scene.friction_law
     equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
     if needed.has("tissue"):
         factorised = FactorisedBody(body, interface, attraction, limits)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -123,7 +124,7 @@ class Run:
     """A scene on its way: the model, the present state, the rows and frames so far."""
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
-        self.scene, self.voltage = scene, applied(scene)
+        self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
@@ -133,6 +134,11 @@ class Run:
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         if resume is not None:
             self._restore(resume)
+
+    @cached_property
+    def voltage(self) -> Any:
+        """The voltage that the run follows: the scene's own, or that of the moment of its drive."""
+        return applied(self.scene)
 
     def voltage_at(self, position: float, time: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""

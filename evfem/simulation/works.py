@@ -16,7 +16,8 @@ The history has
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
-- ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` over the slip s along the profile, with
+- ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
+  friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
@@ -271,8 +272,10 @@ class Part:
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
         way = SLIDE[:, None]
         normal = (1.0 - way) * before + way * after
-        mu = np.array([self._coefficient(x) for x in x0 + way * (x1 - x0)])
-        return float(PART @ np.sum(mu * normal * length, axis=1))
+        part, places = (self.old, self.new), x0 + way * (x1 - x0)
+        resists = self.model.equilibrium.interface.resistance
+        limit = np.array([resists(part, *each, slip) for each in zip(places, normal, strict=True)])
+        return float(PART @ np.sum(limit * length, axis=1))
 
     @cached_property
     def _x(self) -> tuple[Floats, Floats]:
