@@ -43,7 +43,7 @@ ROOMS = {
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface linearisation pressure anderson findings "
+        "strategy state hand control condensation interface linearisation pressure anderson findings "
         "equilibrium factorised relaxation stepping",
     ),
     "scene": (

@@ -35,6 +35,7 @@ from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw
 from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
+from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
 from evfem.tissue.forms import Form
@@ -155,9 +156,10 @@ class Scene:
     surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
     or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
     `friction_law` says what the surface's coefficient of friction means (`Coulomb`,
-    `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`, `AgeingFriction` or one's own). `depth`
-    (mm) is how deep the plane finger is meant to be; it changes no number but adds `Result.total`,
-    in N and mm2. Raises InputError for anything that does not fit together.
+    `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`, `AgeingFriction` or one's own). A
+    `hand` is between drive and bone: motions then say where the drive goes. `depth` (mm) is how
+    deep the plane finger is meant to be; it changes no number but adds `Result.total`, in N and
+    mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -171,6 +173,7 @@ class Scene:
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
+    hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
@@ -181,7 +184,14 @@ class Scene:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        checks = (_check_electrostatics, check_drive, _check_friction, _check_motion, _check_time)
+        checks = (
+            _check_electrostatics,
+            check_drive,
+            _check_friction,
+            _check_hand,
+            _check_motion,
+            _check_time,
+        )
         for check in (*checks, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
@@ -290,6 +300,20 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _check_hand(scene: Scene) -> None:
+    hand = scene.hand
+    if hand is None:
+        return
+    if not isinstance(hand, Hand):
+        raise InputError("hand", quoted(hand), "a Hand, or None")
+    if isinstance(scene.voltage, FollowForce):
+        raise InputError("hand", "a hand beside a wished friction force", "one of the two")
+    for i, motion in enumerate(scene.motion if hand.timed else ()):
+        if isinstance(motion, Slide) and motion.speed is None:
+            allowed = "a speed in mm/s, needed with a hand that has a damping or a mass"
+            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
 
 
 def _check_roughness(scene: Scene) -> None:

@@ -43,6 +43,7 @@ from evfem.solver.control import (
     Target,
     VoltageControl,
 )
+from evfem.solver.hand import AT_REST, Grip
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
@@ -129,6 +130,8 @@ class Run:
         self.frames: list[Frame] = []
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
+        if scene.hand is not None:
+            self.state = replace(self.state, hand=AT_REST)
         if resume is not None:
             self._restore(resume)
 
@@ -177,7 +180,17 @@ class Run:
                 "voltage": self.voltage_at(0.0, 0.0),
             }
         row = self.rows[rows_before - 1]
-        return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+        start = {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+        return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
+
+    def _driven(self, rows_before: int) -> float:
+        """x of the drive (mm) at the end of the motions of so many rows; the bone's is another one."""
+        x, done = 0.0, 0
+        for motion in self.scene.motion:
+            done += motion.steps
+            if done <= rows_before and isinstance(motion, Slide):
+                x = x + motion.distance
+        return x
 
     def _target(self, motion: Motion, start: dict[str, float], fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
@@ -208,7 +221,11 @@ class Run:
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
-        return Target(position, height, drive)
+        return Target(position, height, drive, hand=self._grip)
+
+    @property
+    def _grip(self) -> Grip | None:
+        return None if self.scene.hand is None else Grip(self.scene.hand)
 
     @staticmethod
     def _following(wish: FollowForce, position: float) -> FollowFriction:
@@ -224,7 +241,8 @@ class Run:
             if fraction == 1.0:
                 return replace(end, duration=duration)
             x = start.x + fraction * (end.x - start.x)
-            return Target(x, start.height.towards(end.height, fraction), drive(x, fraction), duration)
+            height = start.height.towards(end.height, fraction)
+            return Target(x, height, drive(x, fraction), duration, end.hand)
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage

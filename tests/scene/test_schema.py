@@ -42,6 +42,8 @@ penalty_normal = 1.0
 penalty_tangential = 1.0
 [solver.strategy]
 [output]
+[hand]
+stiffness = 1.0
 [[motion]]
 kind = "press"
 indentation = 0.1
@@ -78,6 +80,7 @@ def test_every_key_of_the_models_has_its_row():
     found = {(one.name, one.kind): {key.name for key in one.keys} for one in scenes.sections()}
     models = {
         ("", ""): keys.SceneTable,
+        ("hand", ""): keys.HandTable,
         ("finger.electrical", ""): keys.ElectricalTable,
         ("electrostatics", ""): keys.ElectrostaticsTable,
         ("solver", ""): keys.SolverTable,
@@ -120,6 +123,7 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
     written += [
         meanings.FRICTION,
+        meanings.HAND,
         meanings.ROUGHNESS,
         *meanings.MOTION.values(),
         meanings.SIGNAL,
