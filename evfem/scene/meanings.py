@@ -214,6 +214,7 @@ MOTION = {
         "steps": _STEPS,
         "speed": Text("mm/s", "needed with dynamics other than quasistatic"),
         "hold": _HOLD,
+        "angle": Text("degrees", "from +x, of a fingertip; 90 is along the finger"),
     },
     "hover": {"gap": Text("mm", "of the undeformed outline to the surface"), "steps": _STEPS},
     "voltage": {"voltage": Text("V", "at the end, from the present one"), "steps": _STEPS, "hold": _HOLD},

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -86,6 +87,8 @@ def simulate(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
+    import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
+
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
@@ -122,7 +125,7 @@ class Run:
     """A scene on its way: the model, the present state, the rows and frames so far."""
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
-        self.scene, self.voltage = scene, applied(scene)
+        self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
@@ -134,6 +137,11 @@ class Run:
             self.state = replace(self.state, hand=AT_REST)
         if resume is not None:
             self._restore(resume)
+
+    @cached_property
+    def voltage(self) -> Any:
+        """The voltage that the run follows: the scene's own, or that of the moment of its drive."""
+        return applied(self.scene)
 
     def voltage_at(self, position: float, time: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
@@ -175,12 +183,14 @@ class Run:
         if rows_before == 0:
             return {
                 "position": 0.0,
+                "position_z": 0.0,
                 "indentation": 0.0,
                 "applied_force": 0.0,
                 "voltage": self.voltage_at(0.0, 0.0),
             }
-        row = self.rows[rows_before - 1]
-        start = {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+        row = {"position_z": 0.0} | self.rows[rows_before - 1]
+        names = ("position", "position_z", "indentation", "applied_force", "voltage")
+        start = {name: row[name] for name in names}
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
 
     def _driven(self, rows_before: int) -> float:
@@ -198,7 +208,8 @@ class Run:
         def towards(name: str, end: float) -> float:
             return end if fraction == 1.0 else start[name] + fraction * (end - start[name])
 
-        position, indentation, force = start["position"], start["indentation"], None
+        position, position_z = start["position"], start["position_z"]
+        indentation, force = start["indentation"], None
         voltage = start["voltage"]
         if isinstance(motion, Press) and motion.force is not None:
             force = towards("applied_force", motion.force)
@@ -207,7 +218,9 @@ class Run:
         elif isinstance(motion, Hover):
             indentation = towards("indentation", -motion.gap)
         elif isinstance(motion, Slide):
-            position = towards("position", start["position"] + motion.distance)
+            x, z = motion.way
+            position = towards("position", start["position"] + x)
+            position_z = towards("position_z", start["position_z"] + z)
             force = start["applied_force"] if motion.hold == "force" else None
         elif isinstance(motion, VoltageRamp):
             voltage = towards("voltage", motion.voltage)
@@ -216,12 +229,13 @@ class Run:
             force = start["applied_force"] if motion.hold == "force" else None
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
-        bone = self.model.bone(position, indentation)
+        bone = self.model.bone(position, indentation, position_z)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
-        return Target(position, height, drive, hand=self._grip)
+        along = position_z if bone.size == 3 else None
+        return Target(position, height, drive, z=along, hand=self._grip)
 
     @property
     def _grip(self) -> Grip | None:
@@ -241,8 +255,11 @@ class Run:
             if fraction == 1.0:
                 return replace(end, duration=duration)
             x = start.x + fraction * (end.x - start.x)
+            z = None
+            if start.z is not None and end.z is not None:
+                z = start.z + fraction * (end.z - start.z)
             height = start.height.towards(end.height, fraction)
-            return Target(x, height, drive(x, fraction), duration, end.hand)
+            return Target(x, height, drive(x, fraction), duration, z, end.hand)
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage

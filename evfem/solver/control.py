@@ -93,7 +93,7 @@ class Force:
         return float(-self.force - reaction[1])
 
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
-        return (ExtraUnknown(-tangent.schur[:, -1], 1, -self.force),)
+        return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
     def towards(self, end: HeightControl, fraction: float) -> Force:
         assert isinstance(end, Force)
@@ -250,31 +250,35 @@ def sticks(state: State) -> bool:
 @dataclass(frozen=True)
 class Target:
     """Where a step goes: x of the bone (mm), what settles its height and the voltage, its seconds,
-    and the `hand` between drive and bone: x is then that of the drive, and the bone's an unknown.
+    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x is then that of
+    the drive, and the bone's an unknown.
     """
 
     x: float
     height: HeightControl
     drive: VoltageControl
     duration: float = 0.0
+    z: float | None = None
     hand: Grip | None = None
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
-        """The bone at a given translation (2,), under a given voltage.
+        """The bone at a given translation (dim,), under a given voltage.
 
-        >>> Target.held(np.array([0.5, -0.1]), 100.0)
-        Target(x=0.5, height=Indentation(height=-0.1), drive=GivenVoltage(voltage=100.0), ...
+        >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
+        [0.5, -0.1, 2.0]
         """
-        return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage))
+        z = float(bone[2]) if len(bone) == 3 else None
+        return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
 
     def bone(self, present: Floats) -> Floats:
-        """Translation of the bone (2,) as far as it is known; the `present` one where it is not."""
+        """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
         x = self.x if self.hand is None else float(present[0])
-        return np.array([x, self.height.known(float(present[1]))])
+        along = [] if self.z is None else [self.z]
+        return np.array([x, self.height.known(float(present[1])), *along])
 
     def way(self, present: Floats) -> Floats:
-        """How far the bone is likely to go from its `present` translation (2,)."""
+        """How far the bone is likely to go from its `present` translation (dim,)."""
         way = self.bone(present) - present
         if self.hand is not None:
             way[0] = self.hand.way

@@ -191,10 +191,12 @@ class FactorisedBody:
             after = self._linear_step(old, state, target, balance, search=True)
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
-        height = mixed.bone[1] if target.height.free else after.bone[1]
+        bone = after.bone.copy()
+        bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
-        x = after.bone[0] if target.hand is None else mixed.bone[0]
-        return replace(mixed, bone=np.array([x, height]), voltage=voltage)
+        if target.hand is not None:
+            bone[0] = mixed.bone[0]
+        return replace(mixed, bone=bone, voltage=voltage)
 
     def _linear_step(
         self, old: State, state: State, target: Target, balance: Balance, search: bool = False
@@ -232,7 +234,7 @@ class FactorisedBody:
         known = self.interface.candidates(old, state, c, weakening, gain)
         if rough is not None:
             known = replace(known, roughness=rough.of(c))
-        return LinearContactStep(
+        return self.interface.contact_step(
             body=linearisation.tangent,
             candidates=known,
             residual=residual,
@@ -244,9 +246,11 @@ class FactorisedBody:
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
         """Travels of the bone that are not given: first along y, then along x."""
-        tangent, (x, y) = self.linearisation.tangent, state.bone.tolist()
-        height = target.height.unknowns(tangent, y)
-        return height if target.hand is None else (*height, target.hand.unknown(tangent, x, state.bone.size))
+        tangent = self.linearisation.tangent
+        height = target.height.unknowns(tangent, float(state.bone[1]))
+        if target.hand is None:
+            return height
+        return (*height, target.hand.unknown(tangent, float(state.bone[0]), state.bone.size))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
@@ -274,7 +278,7 @@ class FactorisedBody:
     def _limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,), shortened where it is too long for a linear
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear
         step.
         """
         if not step.unknowns:
@@ -303,7 +307,7 @@ class FactorisedBody:
         return float(np.clip(2.0 * gap, least, self.largest_bone_increment))
 
     def _searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,) at which the bone lacks least force, where no
+        """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
         travel settles it: an attraction that is extrapolated over a long way has none, for
         example.
 
@@ -363,10 +367,12 @@ class FactorisedBody:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
-    def verge(self, state: State, target: Target) -> Verge:
+    def verge(self, state: State, target: Target) -> Verge | None:
         """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
-        where the way leads to, for the curvature of a profile may jump.
+        where the way leads to, for the curvature of a profile may jump. None in three dimensions.
         """
+        if state.bone.size == 3:
+            return None
         ahead = self.begin(state, target, frozen=False, start=state)
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))

@@ -16,7 +16,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CHANGES, HAIR, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
-from evfem.contact.condensed import Candidates
+from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
@@ -94,7 +94,13 @@ def steps_of_friction(surface: Any, short: float) -> Floats:
 
 
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
+    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
+
+    `contact_step` is the linear step in which its contact is solved.
+    """
+
+    contact_step = LinearContactStep
+    pad: Any
 
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance

@@ -76,9 +76,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,),
-    whether the attraction was frozen, the time step's displacements at its beginning (N, 2) and
-    its seconds, and the pressure (E, Q) if that is an unknown.
+    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
+    when the step began, whether the attraction was frozen, the time step's displacements at its
+    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
+    that is an unknown.
     """
 
     u: Floats
@@ -87,6 +88,7 @@ class TangentPoint:
     frozen: bool
     begin: Floats
     duration: float
+    status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
 
 
