@@ -218,7 +218,7 @@ def test_sweeps_have_their_schema():
     schema = sweeps.schema()
     jsonschema.Draft7Validator.check_schema(schema)
     inner = SLIDE.replace("version = 1", "").replace("[[motion]]", "[[scene.motion]]")
-    for table in ("finger", "surface", "electrostatics", "solver", "output"):
+    for table in ("finger", "surface", "electrostatics", "hand", "solver", "output"):
         inner = inner.replace(f"\n[{table}", f"\n[scene.{table}")
     grid = "[grid]\nsurface.friction = [0.1, 0.2]\n"
     samples = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\nsurface.y = { normal = [-9.0, 0.1] }\n"
