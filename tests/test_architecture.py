@@ -37,13 +37,13 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
-        "forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges alternating "
+        "roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb "
-        "sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield signorini follower "
+        "condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -53,7 +53,7 @@ ROOMS = {
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "timescales spatial plan",
+        "fieldchoice timescales spatial plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
