@@ -32,6 +32,8 @@ GROWTH_GRACE            but not before so many iterations
 SPARE                   candidates are chosen so many times more than needed, as every new        A
                         choice costs an analysis of the matrix
 REACH                   a gap below so many times the step's travel makes a candidate             A
+FAR                     so many times as high as the scene's deepest indentation, nodes of the    A
+                        undeformed outline become candidates with the first ones
 NEIGHBOURS              and so does one below so many node distances once any is chosen           B
 STEEP                   an attraction whose negative stiffness exceeds this fraction of the       thin
                         softest shear modulus per height of the body makes its node a candidate   insulators
@@ -98,6 +100,7 @@ GROWTH_LIMIT = 1e3
 GROWTH_GRACE = 8
 SPARE = 1.5
 REACH = 1.2
+FAR = 1.3
 NEIGHBOURS = 4.0
 STEEP = 0.02
 FAINT = 0.01

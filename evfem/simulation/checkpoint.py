@@ -50,6 +50,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
         "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
         "factor_pressure": NO_PRESSURE if at is None else at.pressure,
         "duration": np.array(carried.duration),
+        "factor_single": np.array(carried.single),
     }
 
 
@@ -66,7 +67,8 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             duration=float(arrays["factor_duration"]),
             pressure=arrays["factor_pressure"],
         )
-    return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
+    candidates, single = arrays["candidates"].astype(np.int64), bool(arrays["factor_single"])
+    return Reusable(candidates, at, float(arrays["duration"]), single)
 
 
 def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:
