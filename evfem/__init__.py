@@ -32,6 +32,7 @@ _NAMES = {
         "TOUCHSCREEN",
         "eps_0",
     ),
+    "electrostatics.roughness": ("ConstantRoughness", "ExponentialRoughness", "PowerRoughness"),
     "electrostatics.signalfile": ("Playback", "read_signal", "write_signal"),
     "electrostatics.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
     "electrostatics.timesignals": ("Carrier", "Sampled", "Sine"),
@@ -53,6 +54,8 @@ _NAMES = {
     "sweeps.run": ("SweepResult", "sweep"),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
+    "textures.texture": ("Texture",),
+    "textures.touch": ("Touch",),
     "tissue.forms": ("form", "grad"),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
 }

@@ -30,6 +30,9 @@ from evfem.electrostatics.laws import Layer as Layer
 from evfem.electrostatics.laws import Layers as Layers
 from evfem.electrostatics.laws import StrongTroxel as StrongTroxel
 from evfem.electrostatics.laws import eps_0 as eps_0
+from evfem.electrostatics.roughness import ConstantRoughness as ConstantRoughness
+from evfem.electrostatics.roughness import ExponentialRoughness as ExponentialRoughness
+from evfem.electrostatics.roughness import PowerRoughness as PowerRoughness
 from evfem.electrostatics.signalfile import Playback as Playback
 from evfem.electrostatics.signalfile import read_signal as read_signal
 from evfem.electrostatics.signalfile import write_signal as write_signal
@@ -88,6 +91,8 @@ from evfem.tensor import mul as mul
 from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
+from evfem.textures.texture import Texture as Texture
+from evfem.textures.touch import Touch as Touch
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form
 from evfem.tissue.forms import grad as grad

@@ -8,6 +8,7 @@ import argparse
 import importlib
 import re
 import sys
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -63,6 +64,7 @@ def parser() -> argparse.ArgumentParser:
         ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
         ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options),
+        ("texture", "list, make, import, slide over and estimate textures", _texture_options),
         ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
     ):
         options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
@@ -157,6 +159,102 @@ def _signal_options(voltage: argparse.ArgumentParser) -> None:
     voltage.add_argument("--rate", type=int, default=48_000, metavar="HZ", help="of the .wav; default: 48000")
     voltage.add_argument("--carrier", type=float, metavar="HZ", help="sine that the .wav modulates")
     voltage.add_argument("--pixel", type=float, default=0.1, metavar="MM", help="of the .png; default: 0.1")
+
+
+def _texture_options(texture: argparse.ArgumentParser) -> None:
+    commands = texture.add_subparsers(dest="what", metavar="WHAT", required=True, parser_class=_Parser)
+    for name, does, options in (
+        ("list", "list the reference textures", lambda command: None),
+        ("show", "say what a texture is and where it is from", _texture_argument),
+        ("make", "make a texture by a generator", _make_options),
+        ("import", "make a texture from a csv file, a WAV, an image or a scan", _import_options),
+        ("simulate", "slide a finger over a texture by the full model", _touch_options),
+        ("database", "compute the database of the estimators", _database_options),
+    ):
+        options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
+
+
+def _texture_argument(command: argparse.ArgumentParser) -> None:
+    name = command.add_argument("name", metavar="NAME", help="a reference texture, a .json or a folder")
+    _complete(name, FILES)
+
+
+def _about_texture(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--name", help="what it is called; default: as its file")
+    out = command.add_argument(
+        "--out",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="a .json, whose .csv lies beside it, or a folder",
+    )
+    _complete(out, FILES)
+
+
+def _numbers(command: argparse.ArgumentParser, options: Mapping[str, tuple[float | None, str, str]]) -> None:
+    for name, (default, unit, help) in options.items():
+        said = help if default is None else f"{help}; default: {default:g}"
+        command.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=said)
+
+
+def _make_options(make: argparse.ArgumentParser) -> None:
+    make.add_argument("kind", choices=("grating", "sinusoids", "self_affine", "spectral"))
+    _about_texture(make)
+    make.add_argument("--licence", default="CC0-1.0", help="what others may do with it; default: CC0-1.0")
+    options = {
+        "frequency": (0.5, "1/MM", "of the first wave, or the lowest"),
+        "amplitude": (0.02, "MM", "of the sine with the same root mean square"),
+        "irregularity": (0.0, "I", "0 to 1"),
+        "second": (0.0, "SHARE", "of the second harmonic of sinusoids"),
+        "phase": (0.0, "RAD", "of the second harmonic"),
+        "hurst": (None, "H", "Hurst exponent of self_affine, instead of the irregularity"),
+        "beta": (None, "BETA", "exponent of the spectrum of spectral, instead of the irregularity"),
+    }
+    _numbers(make, options)
+    make.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn; default: 0")
+
+
+def _import_options(command: argparse.ArgumentParser) -> None:
+    file = command.add_argument("file", type=Path, metavar="FILE", help=".csv, .wav, an image or a scan")
+    _complete(file, FILES)
+    _about_texture(command)
+    command.add_argument("--licence", required=True, help="what others may do with it")
+    command.add_argument("--note", help="where it is from, a sentence")
+    command.add_argument("--unit", help="of lengths: mm, um, nm or m; default: mm, or what a scan names")
+    command.add_argument("--level", help="none, mean, line or parabola; default: line")
+    options = {
+        "start": (None, "MM", "where to begin"),
+        "stop": (None, "MM", "where to end"),
+        "smooth": (None, "MM", "cut-off wavelength of a Gaussian profile filter"),
+        "row": (None, "SHARE", "which line of an image or scan, 0 to 1; default: 0.5"),
+        "pixel": (None, "MM", "width of a pixel of an image"),
+        "depth": (None, "MM", "how deep black lies below white in an image"),
+        "speed": (None, "MM/S", "at which something slid while it was recorded"),
+    }
+    _numbers(command, options)
+
+
+def _touch_options(command: argparse.ArgumentParser) -> None:
+    _texture_argument(command)
+    command.add_argument("--smooth-finger", action="store_true", help="a finger without ridges")
+    options = {
+        "friction": (0.3, "MU", "coefficient of the texture's material"),
+        "load": (0.05, "N/MM", "on the finger"),
+        "speed": (20.0, "MM/S", "of the slide"),
+        "length": (8.0, "MM", "of the slide"),
+    }
+    _numbers(command, options)
+    out = command.add_argument("--out", type=Path, metavar="FILE", help="csv file for the friction curve")
+    _complete(out, FILES)
+
+
+def _database_options(command: argparse.ArgumentParser) -> None:
+    out = command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for its points")
+    _complete(out, FOLDERS)
+    command.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+    command.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
+    )
 
 
 def _init_options(init: argparse.ArgumentParser) -> None:

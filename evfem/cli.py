@@ -133,6 +133,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
         "sweep": _sweep,
         "mesh": _mesh,
         "signal": _signal,
+        "texture": _texture,
         "schema": _schema,
     }[name]
 
@@ -330,6 +331,13 @@ def _signal(given: argparse.Namespace) -> int:
     start, stop = profile.position[0], profile.position[-1]
     largest = max(abs(profile.voltage))
     print(f"{plus(start):g} to {plus(stop):g} mm, at most {largest:g} V; in {given.out}", flush=True)
+    return DONE
+
+
+def _texture(given: argparse.Namespace) -> int:
+    from evfem.textures.commands import run
+
+    run(given)
     return DONE
 
 

@@ -9,10 +9,10 @@ from typing import Any
 from evfem.common.storage import format_of
 from evfem.errors import InputError
 
-Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep or Mesh
+Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep, Mesh or Texture
 ALLOWED = (
     "the folder of a run, a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene "
-    "or a sweep (.toml), a mesh (.vtu, .msh)"
+    "or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
 )
 
 
@@ -20,7 +20,7 @@ def load(path: str | Path) -> Found:
     """What is in a file or folder: the `Result` that `evfem run` left in its folder, a `Result` or a
     `FastModel` (as their `save` wrote them, under any name), a `FitResult` (.json), a
     `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a
-    `Mesh` (.vtu, .msh).
+    `Mesh` (.vtu, .msh), a `Texture` (.json with its .csv, or their folder).
 
     Raises InputError for any other or a damaged file, StorageError when the disk refuses.
 
@@ -41,6 +41,10 @@ def load(path: str | Path) -> Found:
 
 
 def _run(path: Path) -> Found:
+    from evfem.textures import texture
+
+    if (path / texture.NAME).is_file():
+        return texture.read(path)
     from evfem.runfolder import result_in
 
     return result_in(path)
@@ -79,8 +83,9 @@ def _tables(path: Path) -> Found:
 
 def _fit(path: Path) -> Found:
     from evfem.calibration.result import load
+    from evfem.textures import texture
 
-    return load(path)
+    return texture.read(path) if texture.is_texture(path) else load(path)
 
 
 def _mesh(path: Path) -> Found:

@@ -9,6 +9,7 @@ numbers gets exact derivatives (`evfem.tensor.complex_step`), another one differ
 part                   goes to                                   needs
 =====================  ========================================  =======================================
 electrostatic law      ``Scene(law=...)``                        `ForceLaw`
+rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
 voltage over time      ``Scene(voltage=...)``                    `TimeSignal`
@@ -37,6 +38,19 @@ class ForceLaw(Protocol):
 
         `layers.reduced` is the sum of thickness / permittivity of the solid layers,
         `layers.thickness` that of their thicknesses, in mm. Complex-safe, or it is differenced.
+        """
+
+
+@runtime_checkable
+class RoughnessLaw(Protocol):
+    """How far rough faces stay apart where they touch.
+
+    Optional: `separation_derivative` (mm/MPa) of the same argument.
+    """
+
+    def separation(self, pressure: Any) -> Any:
+        """Mean separation in mm at contact pressures in MPa, 0 for a node that is open. It falls with
+        the pressure, and is finite at none. Complex-safe, or it is differenced.
         """
 
 

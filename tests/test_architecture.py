@@ -31,7 +31,8 @@ ROOMS = {
     "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
     "electrostatics": (
         {"numpy", "scipy"},
-        "laws dielectrics charges alternating forces signals wav timesignals encoding hjif signalfile",
+        "laws dielectrics charges alternating roughness forces signals wav timesignals encoding hjif "
+        "signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
@@ -56,6 +57,10 @@ ROOMS = {
         "samples file schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
+    "textures": (
+        {"numpy", "scipy", "PIL", "SurfaceTopography"},
+        "texture generate library cleaning importing scans parametric touch estimators database commands",
+    ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
@@ -74,7 +79,18 @@ STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
-LATE = {"skfem", "meshio", "matplotlib", "PIL", "pypardiso", "tqdm", "distributed", "pyarrow", "pandas"}
+LATE = {
+    "skfem",
+    "meshio",
+    "matplotlib",
+    "PIL",
+    "pypardiso",
+    "tqdm",
+    "distributed",
+    "pyarrow",
+    "pandas",
+    "SurfaceTopography",
+}
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450

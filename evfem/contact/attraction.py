@@ -13,6 +13,10 @@ Trial states that penetrate count as touching, g = 0.
   outline; its tangent is symmetric.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
+
+Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
+sees g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
+pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gain_on_pressing`).
 """
 
 from __future__ import annotations
@@ -26,6 +30,7 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats
 from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.laws import traction_derivative
+from evfem.electrostatics.roughness import separation_derivative
 from evfem.tensor import mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
 
@@ -48,7 +53,9 @@ def attraction(u: Any, v: Any, w: Any) -> Any:
 @dataclass(frozen=True, eq=False)
 class Attraction:
     """A force law acting on a pad: `layers` are the solid layers under each pad node, `surface`
-    the electrode's outline.
+    the electrode's outline, `roughness` how far rough faces stay apart in contact (None: not at all).
+
+    `pressing` (P,) are the present contact forces along the normal in N/mm, None for none.
     """
 
     law: Any
@@ -57,22 +64,30 @@ class Attraction:
     surface: Any
     direction: str = "vertical"
     air_layer: bool = True
+    roughness: Any = None
 
-    def forces(self, position: Floats, voltage: float, touching: Any) -> Floats:
+    def forces(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
         """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
         layer.
         """
-        return self.forces_along(position[None], np.array([voltage]), touching)[0]
+        pressed = None if pressing is None else pressing[None]
+        return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 
-    def forces_along(self, positions: Floats, voltages: Floats, touching: Any) -> Floats:
-        """`forces` at W places of a way (W, P, 2), from positions (W, P, 2) and voltages (W,)."""
+    def forces_along(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """`forces` at W places of a way (W, P, 2), from positions (W, P, 2), voltages (W,) and
+        contact forces (W, P).
+        """
         if not voltages.any():
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
-        gaps = np.maximum(frame.gap, 0.0).reshape(len(positions), -1)
+        x = positions[..., 0]
+        gaps = np.maximum(frame.gap, 0.0).reshape(x.shape) + self._separation(x, pressing)
         pairs = list(zip(gaps, voltages.tolist(), strict=True))
         on = 1.0 if self.air_layer else touching.astype(float)
-        x = positions[..., 0]
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.length(x)
         if self.direction == "vertical":
@@ -86,16 +101,48 @@ class Attraction:
         of, moved, value = self.pad.length_gradient(x)
         return np.asarray(-np.bincount(moved, potential[of] * value, x.size), dtype=float)
 
-    def negative_stiffness(self, position: Floats, voltage: float, touching: Any) -> Floats:
+    def _separation(self, x: Floats, pressing: Floats | None) -> Any:
+        """What rough faces keep between them at the nodes at x (..., P), in mm."""
+        if self.roughness is None:
+            return 0.0
+        return self.roughness.separation(self._contact_pressure(x, pressing))
+
+    def _contact_pressure(self, x: Floats, pressing: Floats | None) -> Floats:
+        """Contact pressure in MPa of the nodes at x (..., P)."""
+        if pressing is None:
+            return np.zeros(x.shape)
+        length = self.pad.length(x)
+        facing = length > 0.0
+        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, length, 1.0), 0.0)
+
+    def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
+        """By how much the attraction of a node grows per contact force that presses it (P,): the
+        rough faces come closer. 0 without them.
+        """
+        if self.roughness is None:
+            return np.zeros(len(position))
+        on = 1.0 if self.air_layer else touching.astype(float)
+        p = self._contact_pressure(position[:, 0], pressing)
+        closer = separation_derivative(self.roughness, p)
+        rate = traction_derivative(self.law, self.roughness.separation(p), voltage, self.layers)
+        return np.asarray(on * rate * closer)
+
+    def negative_stiffness(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
         """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm
         per mm; 0 where it touches: there contact holds the gap.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
-        rate = traction_derivative(self.law, np.maximum(gap, 0.0), voltage, self.layers)
-        return np.where(gap > TOUCHING, -on * rate * self.pad.length(position[:, 0]), 0.0)
+        x = position[:, 0]
+        apart = np.maximum(gap, 0.0) + self._separation(x, pressing)
+        rate = traction_derivative(self.law, apart, voltage, self.layers)
+        return np.where(gap > TOUCHING, -on * rate * self.pad.length(x), 0.0)
 
-    def stiffness(self, position: Floats, voltage: float, touching: Any) -> Any:
+    def stiffness(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Any:
         """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
         component).
         """
@@ -103,8 +150,9 @@ class Attraction:
         frame = surface_state(self.surface, position)
         length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
-        p = on * self.law.traction(np.maximum(frame.gap, 0.0), voltage, self.layers)
-        dp = -self.negative_stiffness(position, voltage, touching)
+        apart = np.maximum(frame.gap, 0.0) + self._separation(position[:, 0], pressing)
+        p = on * self.law.traction(apart, voltage, self.layers)
+        dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)
         rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]

@@ -45,6 +45,7 @@ from evfem.contact.signorini import (
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    Roughness,
     Unstable,
     lost_stability,
     solve_with_attraction,
@@ -63,7 +64,8 @@ class Candidates:
     over x (c,) in 1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0
     for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
     needs no other solver. The attraction weakens with a node's gap by `negative_stiffness` (c,)
-    N/mm per mm and is stronger by `gain_on_closing` (c,) N/mm where the gap is closed.
+    N/mm per mm and is stronger by `gain_on_closing` (c,) N/mm where the gap is closed;
+    `roughness` says how it depends on the contact force.
     """
 
     surface: SurfaceState
@@ -75,6 +77,7 @@ class Candidates:
     negative_stiffness: Floats
     gain_on_closing: Floats
     friction_slope: Floats
+    roughness: Roughness | None = None
 
     @cached_property
     def axes(self) -> Floats:
@@ -277,7 +280,10 @@ class LinearContactStep:
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
         problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns)
         attraction = AttractionStiffness(
-            known.negative_stiffness[near], known.surface.normal_gap[near], known.gain_on_closing[near]
+            known.negative_stiffness[near],
+            known.surface.normal_gap[near],
+            known.gain_on_closing[near],
+            None if known.roughness is None else known.roughness.of(near),
         )
         try:
             found = solve_with_attraction(problem, attraction, status, self.snap)

@@ -19,7 +19,9 @@ BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
 The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
 has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can.
+only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
+closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
+gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -84,15 +86,30 @@ class ExtraUnknowns:
 
 
 @dataclass(frozen=True)
+class Roughness:
+    """Attraction of nodes between rough faces: stronger by `gain` (k,), below 1, times the contact
+    force, and weaker by `loss_on_opening` (k,) N/mm where a node opens that touched.
+    """
+
+    gain: Floats
+    loss_on_opening: Floats
+
+    def of(self, nodes: Ints) -> Roughness:
+        """Of these nodes alone."""
+        return Roughness(self.gain[nodes], self.loss_on_opening[nodes])
+
+
+@dataclass(frozen=True)
 class AttractionStiffness:
     """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
     per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0.
+    `gain_on_closing` (k,) at g = 0, without a contact force. `roughness` says how it depends on that.
     """
 
     negative_stiffness: Floats
     reference_gap: Floats
     gain_on_closing: Floats
+    roughness: Roughness | None = None
 
 
 @dataclass(frozen=True)
@@ -203,7 +220,7 @@ def solve_with_attraction(
     `STABLE` of the critical value, which goes the right way in small steps; with `snap` the nodes
     that are being lost close instead.
     """
-    if not attraction.negative_stiffness.any():
+    if not attraction.negative_stiffness.any() and attraction.roughness is None:
         return solve_contact(problem, status)
     attracted = replace(problem, attraction=attraction)
     root = np.sqrt(attraction.negative_stiffness)
@@ -269,6 +286,11 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
     rows = np.concatenate([active, k + stick, attracted])
     matrix = C[np.ix_(rows, rows)]
+    gain = np.zeros(active.size)
+    rough = None if problem.attraction is None else problem.attraction.roughness
+    if rough is not None:
+        gain = rough.gain[active]
+        matrix[:, : active.size] *= 1.0 - gain
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
@@ -276,12 +298,15 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     drop = np.zeros(2 * k)
     if problem.attraction is not None:
         drop[active] = -problem.attraction.gain_on_closing[active]
+        if rough is not None:
+            drop[:k] += np.where(status == OPEN, rough.loss_on_opening, 0.0)
         right -= C[rows] @ drop
         own = np.arange(rows.size - attracted.size, rows.size)
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
         right[own] += problem.attraction.reference_gap[attracted]
     if extra is not None:
         row = extra.rows[:, rows]
+        row[:, : active.size] *= 1.0 - gain
         row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
         matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
         right = np.append(right, extra.right - extra.rows @ drop)
@@ -292,7 +317,8 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     force = np.zeros(2 * k)
     contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
-    drop[attracted] = x[contact : rows.size]
+    drop[attracted] += x[contact : rows.size]
+    drop[active] -= gain * x[: active.size]
     force[k:] += ratio * force[:k]
     return force, drop, x[rows.size :]
 

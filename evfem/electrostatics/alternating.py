@@ -116,8 +116,8 @@ def step_rates(
     >>> from evfem import TOUCHSCREEN
     >>> skin = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": 0.3}
     >>> rates = step_rates(0.001, **skin, insulator=TOUCHSCREEN, gap_conductivity=1e-8)
-    >>> [round(rate, 4) for rate in rates]
-    [16588.7776, 228.2918]
+    >>> [round(rate, 3) for rate in rates]
+    [16588.778, 228.292]
     """
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)

@@ -28,6 +28,7 @@ from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.pad import Pad, make_pad
+from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, NotConverged, quoted
 from evfem.fast.error import HeldFinger, stated_error
@@ -243,6 +244,10 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    rough = roughness_of(scene.roughness_gap)
+    if rough is not None and not isinstance(rough, ConstantRoughness):
+        allowed = "a length in mm with the fast model"
+        raise InputError("electrostatics.roughness_gap", type(rough).__name__, allowed)
     if isinstance(scene.voltage, FollowForce):
         raise InputError("voltage", "FollowForce", "a number or a VoltageProfile with the fast model")
 

@@ -25,6 +25,7 @@ from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
     MOTIONS,
+    ROUGHNESS,
     SURFACES,
     ElectricalTable,
     ElectrostaticsTable,
@@ -203,7 +204,19 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
     same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
+    same["roughness_gap"] = _roughness(table.roughness_gap)
     return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
+
+
+def _roughness(given: float | Mapping[str, Any]) -> Any:
+    """The gap between rough faces: a length, or a law by its name."""
+    key = "electrostatics.roughness_gap"
+    if not isinstance(given, Mapping):
+        return given
+    model, cls = ROUGHNESS[kind_of(given, key, ROUGHNESS, "law")]
+    parsed: Any = parse(model, given, key)
+    with at(key):
+        return cls(**parsed.model_dump(exclude={"law"}))
 
 
 def _finger(table: Mapping[str, Any], folder: Path) -> Any:

@@ -13,6 +13,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
 from evfem.electrostatics.laws import INSULATORS
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
@@ -148,12 +149,18 @@ class ElectrostaticsTable(Table):
     air_layer: bool = optional("true | false", True)
     direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
     coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
+    roughness_gap: float | dict[str, Any] = optional(
+        "a length in mm from 0 to 1, or a table [electrostatics.roughness_gap] with a law", 0.0
+    )
 
 
 SolverTable = derived(Solver, strategy=(dict[str, Any], optional("a table [solver.strategy]", {})))
 StrategyTable = derived(Strategy)
 OutputTable = derived(Output)
 
+ROUGHNESS: Mapping[str, tuple[type[Table], type]] = {
+    name: (derived(cls, law=(Literal[name], required("a law"))), cls) for name, cls in ROUGHNESS_LAWS.items()
+}
 SURFACES: Mapping[str, type[Table]] = {
     "flat": FlatTable,
     "sinusoid": SinusoidTable,
@@ -214,12 +221,12 @@ def columns(key: str, rows: list[list[float]]) -> tuple[list[float], list[float]
     return [row[0] for row in rows], [row[1] for row in rows]
 
 
-def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any]) -> str:
-    """The kind that a table says it is, one of `kinds`."""
-    kind = table.get("kind", ABSENT)
+def kind_of(table: Mapping[str, Any], prefix: str, kinds: Mapping[str, Any], key: str = "kind") -> str:
+    """The kind that a table says it is by its `key`, one of `kinds`."""
+    kind = table.get(key, ABSENT)
     if not isinstance(kind, str) or kind not in kinds:
         given = ABSENT if kind is ABSENT else shown(kind)
-        raise InputError(f"{prefix}.kind", given, " | ".join(kinds))
+        raise InputError(f"{prefix}.{key}", given, " | ".join(kinds))
     return kind
 
 

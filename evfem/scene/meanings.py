@@ -127,6 +127,15 @@ ELECTROSTATICS = {
     "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
+    "roughness_gap": Text("mm", "what rough skin keeps between itself and the insulator in contact"),
+}
+ROUGHNESS = {
+    "law": Text("", "how the gap depends on a node's contact pressure", "its name"),
+    "gap": Text("mm", "at that pressure; for a constant gap at every one"),
+    "decay": Text("mm", "by which it falls for every factor e of the pressure"),
+    "pressure": Text("MPa", "contact pressure of that gap; of an exponential one that of full contact"),
+    "exponent": Text("", "gap (p / pressure)^-exponent"),
+    "open_gap": Text("mm", "at no pressure, where the law itself has no bound"),
 }
 SIGNAL = {
     "frequency": Text("Hz", "of the sine, or of the carrier"),

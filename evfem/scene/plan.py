@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
@@ -220,10 +221,19 @@ def _electricity(scene: Scene) -> Term:
     over_time = (
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
-    law = type(scene.law).__name__
-    return Term(
-        "electricity", True, f"{law}, {air}, {scene.direction} traction, {scene.coupling} coupling{over_time}"
-    )
+    how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
+    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}")
+
+
+def _roughness(scene: Scene) -> str:
+    """What rough faces add to the gap, in words; nothing without them."""
+    rough = roughness_of(scene.roughness_gap)
+    if rough is None:
+        return ""
+    if isinstance(rough, ConstantRoughness):
+        return f", rough faces {rough.gap:g} mm apart in contact"
+    apart = float(rough.separation(0.0))
+    return f", rough faces up to {apart:g} mm apart, less with a node's contact pressure"
 
 
 def _time(scene: Scene) -> Term:

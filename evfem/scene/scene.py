@@ -26,9 +26,10 @@ from evfem.common.checks import (
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.protocols import CompleteSurface, ForceLaw, Surface, TimeSignal
+from evfem.protocols import CompleteSurface, ForceLaw, RoughnessLaw, Surface, TimeSignal
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
@@ -148,9 +149,10 @@ class Scene:
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
     position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
     `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. `depth` (mm) is how deep the plane finger is meant to
-    be; it changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything
-    that does not fit together.
+    touching nodes carry electrostatic force. `roughness_gap` (mm, or a `RoughnessLaw`) is what
+    rough skin keeps between itself and the insulator where they touch. `depth` (mm) is how deep the
+    plane finger is meant to be; it changes no number but adds `Result.total`, in N and mm2. Raises
+    InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -161,6 +163,7 @@ class Scene:
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
     coupling: str = field(default="monolithic", kw_only=True)
+    roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
@@ -254,6 +257,7 @@ def _check_electrostatics(scene: Scene) -> None:
     choice("electrostatics.coupling", scene.coupling, COUPLINGS)
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
+    _check_roughness(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
@@ -271,6 +275,18 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _check_roughness(scene: Scene) -> None:
+    if isinstance(scene.roughness_gap, (int, float)) and not isinstance(scene.roughness_gap, bool):
+        set_frozen(scene, roughness_gap=float(scene.roughness_gap))
+    try:
+        rough = roughness_of(scene.roughness_gap)
+    except InputError as error:
+        raise InputError("electrostatics.roughness_gap", error.given, error.allowed) from error
+    if rough is not None and scene.law is None:
+        allowed = "only with a law of attraction: without one it changes nothing"
+        raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
 
 
 def _check_motion(scene: Scene) -> None:

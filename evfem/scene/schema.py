@@ -223,11 +223,20 @@ def sections() -> list[Section]:
         *surfaces,
         section("electrostatics", keys.ElectrostaticsTable, meanings.ELECTROSTATICS),
         *signals,
+        *_roughness(),
         section("solver", keys.SolverTable, meanings.SOLVER, origin=keys.Solver),
         section("solver.strategy", keys.StrategyTable, meanings.STRATEGY, origin=keys.Strategy),
         section("output", keys.OutputTable, meanings.OUTPUT, origin=keys.Output),
         *motions,
     ]
+
+
+def _roughness() -> list[Section]:
+    found = []
+    for name, (model, cls) in keys.ROUGHNESS.items():
+        one = section("electrostatics.roughness_gap", model, meanings.ROUGHNESS, name, cls)
+        found.append(_kind_first(one, "law", name))
+    return found
 
 
 def schema() -> Schema:
@@ -252,7 +261,10 @@ def schema() -> Schema:
         version={"const": 1, "description": meanings.SCENE["version"].meaning},
         finger={"anyOf": fingers},
         surface=one_of["surface"],
-        electrostatics=tables["electrostatics"][0].schema(signal={"$ref": "#/definitions/signal"}),
+        electrostatics=tables["electrostatics"][0].schema(
+            signal={"$ref": "#/definitions/signal"},
+            roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
+        ),
         solver=tables["solver"][0].schema(strategy=strategy),
         output=tables["output"][0].schema(),
         motion={"type": "array", "minItems": 1, "items": one_of["motion"]},

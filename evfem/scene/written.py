@@ -17,6 +17,7 @@ from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
 from evfem.errors import InputError
@@ -125,7 +126,18 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     table |= voltage_keys(scene.voltage)
     insulator = scene.ground.insulator
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
+    if (rough := scene.roughness_gap) != 0.0:
+        table["roughness_gap"] = _roughness_key(rough)
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}
+
+
+def _roughness_key(rough: Any) -> Any:
+    if isinstance(rough, float):
+        return rough
+    if type(rough) not in ROUGHNESS_LAWS.values():
+        allowed = f"a length or {', '.join(cls.__name__ for cls in ROUGHNESS_LAWS.values())}, for a file"
+        raise InputError("electrostatics.roughness_gap", type(rough).__name__, allowed)
+    return {"law": rough.law, **_changed(rough)}
 
 
 def voltage_keys(voltage: Any) -> dict[str, Any]:

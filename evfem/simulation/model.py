@@ -14,6 +14,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
@@ -121,7 +122,8 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attract
         _check_quadratic(scene)
     skin = Layer(np.broadcast_to(thickness, pad.nodes.shape).astype(float), electrical.stratum_corneum_eps_r)
     layers = Layers.of(skin, surface.insulator)
-    return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer)
+    rough = roughness_of(scene.roughness_gap)
+    return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer, rough)
 
 
 def _check_quadratic(scene: Scene) -> None:

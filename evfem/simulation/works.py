@@ -194,7 +194,9 @@ class Part:
         assert attraction is not None
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
         volts = np.sqrt((1.0 - ways) * old.voltage**2 + ways * new.voltage**2)
-        forces = attraction.forces_along(begin + ways[:, None, None] * (end - begin), volts, old.touching)
+        places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
+        pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
+        forces = attraction.forces_along(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:

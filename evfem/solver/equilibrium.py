@@ -162,7 +162,8 @@ class Statics:
         """
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
-        return self.attraction.forces(self.interface.resting(state), voltage, old.touching)
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return self.attraction.forces(place, voltage, old.touching, pressing)
 
 
 class Equilibrium(Statics):

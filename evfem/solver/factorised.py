@@ -225,9 +225,13 @@ class FactorisedBody:
         """The linear contact problem at an iterate."""
         linearisation = self.linearisation
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
+        c, rough = linearisation.candidates, linearisation.roughness(state)
+        known = self.interface.candidates(old, state, c, weakening, gain)
+        if rough is not None:
+            known = replace(known, roughness=rough.of(c))
         return LinearContactStep(
             body=linearisation.tangent,
-            candidates=self.interface.candidates(old, state, linearisation.candidates, weakening, gain),
+            candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=target.height.unknowns(linearisation.tangent, float(state.bone[1])),
@@ -251,7 +255,8 @@ class FactorisedBody:
             nodal = np.zeros_like(state.u)
             touching = self.linearisation.touching
             position = self.interface.resting(state)
-            nodal[self.pad.nodes] = self.attraction.forces(position, KILOVOLT, touching)
+            pressing = state.contact_force[:, 0]
+            nodal[self.pad.nodes] = self.attraction.forces(position, KILOVOLT, touching, pressing)
             return self.linearisation.factor.forward(self.body.reduce(nodal))
 
         squared = (state.voltage / KILOVOLT) ** 2

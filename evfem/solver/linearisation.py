@@ -35,13 +35,14 @@ from evfem.common.constants import (
     SHORTER,
     SLOW,
     SPARE,
+    STABLE,
     STALLED,
     STEEP,
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
-from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
@@ -192,18 +193,38 @@ class Linearisation:
         """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
-        return self.attraction.negative_stiffness(self.interface.resting(state), state.voltage, self.touching)
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
-        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
+        """What the attraction of every pad node gains when its gap closes (P,) in N/mm, at no
+        contact force.
+        """
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
+        pressing = state.contact_force[:, 0]
         now, closed = (
-            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching)[:, 1]
+            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching, pressing)[:, 1]
             for s in (state, everywhere)
         )
-        return np.maximum(now - closed, 0.0)
+        gain, rough = np.maximum(now - closed, 0.0), self.roughness(state)
+        return gain if rough is None else gain - rough.gain * pressing
+
+    def roughness(self, state: State) -> Roughness | None:
+        """How the attraction of every pad node depends on its contact force, where rough faces come
+        closer under it; None without them. What grows faster than the contact force itself would
+        find no equilibrium: it is cut to `STABLE`.
+        """
+        attraction = self.attraction
+        if attraction is None or attraction.roughness is None or state.voltage == 0.0 or self.frozen:
+            return None
+        place, pressing = self.interface.resting(state), state.contact_force[:, 0]
+        unpressed, pressed = (
+            attraction.forces(place, state.voltage, self.touching, each)[:, 1] for each in (None, pressing)
+        )
+        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
+        return Roughness(np.minimum(gain, STABLE), unpressed - pressed)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own
@@ -214,7 +235,8 @@ class Linearisation:
         if self.attraction is None or state.voltage == 0.0 or self.frozen:
             return None
         position, c = self.interface.resting(state), self.candidates
-        whole = self.attraction.stiffness(position, state.voltage, self.touching)
+        pressing = state.contact_force[:, 0]
+        whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
         unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())

@@ -32,6 +32,22 @@ def electrostatics(random: Draw) -> Tables:
     return table
 
 
+def add_roughness(random: Draw, tables: Tables) -> None:
+    """Perhaps rough faces: a gap, or a law of the contact pressure."""
+    if "electrostatics" not in tables or not random.chance(0.25):
+        return
+    law, gap = random.one_of("constant", "power", "exponential"), random.spread(2e-4, 0.01)
+    found: Tables = {"law": law, "gap": gap}
+    if law == "power":
+        found |= {"pressure": random.spread(1e-3, 0.1), "exponent": random.spread(0.05, 1.0)}
+        found["open_gap"] = six_digits(gap * random.between(1.5, 10.0))
+    elif law == "exponential":
+        found = {"law": law, "decay": gap, "pressure": random.spread(0.1, 10.0)}
+        found["open_gap"] = six_digits(gap * random.between(2.0, 10.0))
+    whole = gap if law == "constant" and random.chance(0.5) else found
+    tables["electrostatics"]["roughness_gap"] = whole
+
+
 def largest_voltage(table: Tables) -> float:
     """The voltage below 3000 V with 60 V/um in the insulator (V)."""
     if "insulator" in table:

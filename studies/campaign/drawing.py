@@ -8,7 +8,7 @@ Sizes follow the finger's: `scale` is its width over that of Table 2.
 
 from __future__ import annotations
 
-from .attractions import add_voltage, electrostatics
+from .attractions import add_roughness, add_voltage, electrostatics
 from .bodies import TABLE_2_WIDTH, finger, width
 from .draws import Draw
 from .grounds import surface
@@ -29,6 +29,7 @@ def draw(seed: int, number: int) -> Tables:
     if random.chance(0.1):
         precision = random.one_of("single", "double")
         tables["output"] = {"every": random.whole(1, 5), "precision": precision, "compression": True}
+    add_roughness(random, tables)
     return copied(tables)
 
 

@@ -17,6 +17,7 @@ from evfem.contact.signorini import (
     ContactNotSolved,
     ContactProblem,
     ExtraUnknowns,
+    Roughness,
     solve_contact,
     solve_with_attraction,
 )
@@ -371,3 +372,45 @@ def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_a
     assert found.reduced
     assert found.status.tolist() == [OPEN, OPEN]
     np.testing.assert_allclose(found.state[:2], 1.0 + 0.02 / (1.0 - 0.9), rtol=1e-12)
+
+
+def rough_node(gap, gain, loss=0.0, closing=0.0):
+    """A node of compliance 0.1 mm per N/mm whose attraction grows with its contact force."""
+    problem = ContactProblem(np.array([gap, 0.02]), 0.1 * np.eye(2), np.array([0.5]))
+    rough = Roughness(np.array([gain]), np.array([loss]))
+    return problem, AttractionStiffness(np.zeros(1), np.zeros(1), np.array([closing]), rough)
+
+
+def test_a_rough_node_presses_with_what_its_own_attraction_leaves():
+    """Closing it takes -gap / C = 4 N/mm in all, and 0.6 of the contact force are attraction."""
+    problem, pull = rough_node(gap=-0.4, gain=0.6)
+    found = solve_with_attraction(problem, pull, np.array([STICK]))
+    assert found.force[0] == pytest.approx(0.4 / 0.1 / (1.0 - 0.6), rel=1e-12)
+    assert found.attraction_drop[0] == pytest.approx(-0.6 * found.force[0], rel=1e-12)
+    assert found.state[0] == pytest.approx(0.0, abs=1e-15)
+    # friction goes with the contact force, not with what is left of it
+    sliding = replace_start(problem, [-0.4, 9.0])
+    slipped = solve_with_attraction(sliding, pull, np.array([STICK]))
+    assert slipped.status.tolist() == [FORWARD]
+    assert slipped.force[1] == pytest.approx(-0.5 * found.force[0], rel=1e-12)
+
+
+def replace_start(problem, start):
+    return ContactProblem(np.array(start), problem.compliance, problem.friction)
+
+
+def test_a_rough_node_that_opens_loses_what_its_contact_force_gained():
+    """Drawn off by 1 mm / C it cannot stay; then 3 N/mm of attraction are gone too."""
+    problem, pull = rough_node(gap=1.0, gain=0.5, loss=3.0)
+    found = solve_with_attraction(problem, pull, np.array([STICK]))
+    assert found.status.tolist() == [OPEN]
+    assert found.state[0] == pytest.approx(1.0 + 0.1 * 3.0, rel=1e-12)
+
+
+def test_the_bone_carries_the_attraction_that_contact_forces_add():
+    """A force of 2 N/mm on a body: 2 = (1 - kappa) lam."""
+    problem, pull = rough_node(gap=0.0, gain=0.75)
+    extra = ExtraUnknowns(np.array([[1.0], [0.0]]), np.array([[1.0, 0.0]]), np.zeros((1, 1)), np.array([2.0]))
+    whole = ContactProblem(problem.start, problem.compliance, problem.friction, extra)
+    found = solve_with_attraction(whole, pull, np.array([STICK]))
+    assert found.force[0] == pytest.approx(2.0 / 0.25, rel=1e-12)

@@ -60,7 +60,7 @@ duration = 1.0
 """
 PLACES = {"press": 0, "slide": 1, "hover": 2, "voltage": 3, "wait": 4}
 #: tables that `SLIDE` does not have
-ELSEWHERE = ("finger.materials", "surface", "electrostatics.signal")
+ELSEWHERE = ("finger.materials", "surface", "electrostatics.signal", "electrostatics.roughness_gap")
 
 
 def judged(schema, text):
@@ -93,6 +93,8 @@ def test_every_key_of_the_models_has_its_row():
     assert found.pop(("finger", "parametric")) == {"participant", "depth"} | {
         spec.name for spec in fields(FingerPad) if spec.init
     }
+    for name, (model, _) in keys.ROUGHNESS.items():
+        assert found.pop(("electrostatics.roughness_gap", name)) == set(model.model_fields)
     for name, law in LAWS.items():
         parameters = {spec.name for spec in fields(law) if spec.init}
         assert found.pop(("finger.materials.NAME", name)) == parameters | {"law"}
@@ -114,7 +116,14 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
         meanings.MATERIAL,
     ]
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
-    written += [*meanings.MOTION.values(), meanings.SIGNAL, sweeps.SWEEP, sweeps.SAMPLES, sweeps.DISTRIBUTION]
+    written += [
+        meanings.ROUGHNESS,
+        *meanings.MOTION.values(),
+        meanings.SIGNAL,
+        sweeps.SWEEP,
+        sweeps.SAMPLES,
+        sweeps.DISTRIBUTION,
+    ]
     for table in [*written, {name: t for name, t in meanings.SURFACE.items() if name != "kind"}]:
         for name, text in table.items():
             assert text.meaning in used, name

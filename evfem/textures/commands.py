@@ -1,0 +1,157 @@
+"""`evfem texture ...`: what its commands do; the arguments stand in `evfem.arguments`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from evfem.common.notices import status
+from evfem.common.storage import write_text
+from evfem.common.tables import csv_text
+from evfem.errors import InputError, quoted
+from evfem.textures.cleaning import Cleaning
+from evfem.textures.generate import Knobs, make
+from evfem.textures.importing import Source, from_csv, from_image, from_recording
+from evfem.textures.library import about, find, names, reference
+from evfem.textures.scans import from_scan
+from evfem.textures.texture import Texture, write
+from evfem.textures.touch import FrictionCurve, Touch, simulate_texture
+
+#: what each way of importing takes beside name, licence and note
+OPTIONS = {
+    "csv": ("unit", "level", "start", "stop", "smooth"),
+    "recording": ("speed",),
+    "image": ("pixel", "depth", "row", "level", "start", "stop", "smooth"),
+    "scan": ("row", "unit", "level", "start", "stop", "smooth"),
+}
+ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+
+def run(given: argparse.Namespace) -> None:
+    """Do one of the commands."""
+    commands: dict[str, Callable[[argparse.Namespace], None]] = {
+        "list": _list,
+        "show": _show,
+        "make": _make,
+        "import": _import,
+        "simulate": _simulate,
+        "database": _database,
+    }
+    commands[given.what](given)
+
+
+def _list(given: argparse.Namespace) -> None:
+    for name in names():
+        texture = reference(name)
+        size = f"{np.ptp(texture.values) * 1e3:.0f} um" if texture.quantity == "height" else "friction"
+        print(f"{name:<16}{texture.kind:<12}{texture.period:>6.4g} mm {size:>9}  {about(name)}")
+
+
+def _show(given: argparse.Namespace) -> None:
+    texture = find(given.name)
+    print(texture)
+    print(f"licence: {texture.licence}")
+    for note in texture.provenance:
+        print(f"- {note}")
+    if texture.quantity == "height":
+        slope = np.diff(texture.values) / np.diff(texture.x)
+        print(f"rms height {np.std(texture.values) * 1e3:.4g} um, rms slope {np.sqrt(np.mean(slope**2)):.4g}")
+
+
+def _make(given: argparse.Namespace) -> None:
+    knobs = Knobs(
+        given.frequency,
+        given.amplitude,
+        given.irregularity,
+        given.second,
+        given.phase,
+        given.hurst,
+        given.beta,
+        given.seed,
+    )
+    _written(make(given.kind, knobs, given.name or given.out.stem, given.licence), given.out)
+
+
+def _import(given: argparse.Namespace) -> None:
+    how = _how(given.file)
+    for name in sorted({option for options in OPTIONS.values() for option in options} - set(OPTIONS[how])):
+        if getattr(given, name) is not None:
+            allowed = ", ".join(f"--{option}" for option in OPTIONS[how])
+            raise InputError(f"--{name}", f"for a file that is taken for a {how}", allowed)
+    source = Source(given.licence, given.name, given.note)
+    cleaning = Cleaning(given.start, given.stop, given.level or "line", given.smooth)
+    row = 0.5 if given.row is None else given.row
+    if how == "csv":
+        texture = from_csv(given.file, source, cleaning, given.unit or "mm")
+    elif how == "recording":
+        texture = from_recording(given.file, source, _needed("speed", given.speed, "mm/s"))
+    elif how == "image":
+        pixel, depth = (_needed(name, getattr(given, name), "mm") for name in ("pixel", "depth"))
+        texture = from_image(given.file, source, pixel=pixel, depth=depth, row=row, cleaning=cleaning)
+    else:
+        texture = from_scan(given.file, source, row=row, unit=given.unit, cleaning=cleaning)
+    _written(texture, given.out)
+
+
+def _how(path: Path) -> str:
+    """What a file is taken for: by its ending, a csv file by its header."""
+    ending = path.suffix.lower()
+    if ending in ENDINGS:
+        return "image"
+    if ending not in (".csv", ".wav"):
+        return "scan"
+    if ending == ".csv":
+        try:
+            first = path.open(encoding="utf-8-sig").readline(200)
+        except (OSError, UnicodeDecodeError):
+            first = ""  # whoever reads it says what is wrong
+        return "recording" if first.replace(" ", "").strip() == "time,acceleration" else "csv"
+    return "recording"
+
+
+def _needed(name: str, value: float | None, unit: str) -> float:
+    if value is None:
+        raise InputError(f"--{name}", "nothing", f"a number in {unit}, needed for this file")
+    return value
+
+
+def _written(texture: Texture, out: Path) -> None:
+    paths = write(texture, out)
+    print(f"{texture}; in {', '.join(map(str, paths))}", flush=True)
+
+
+def touch_of(given: argparse.Namespace) -> Touch:
+    """The finger's part of the arguments."""
+    return Touch(not given.smooth_finger, given.friction, given.load, given.speed, given.length)
+
+
+def _simulate(given: argparse.Namespace) -> None:
+    texture, touch = find(given.name), touch_of(given)
+    with status(f"sliding over {texture.name}"):
+        curve = simulate_texture(texture, touch)
+    _curve(curve, given.out)
+
+
+def _curve(curve: FrictionCurve, out: Path | None) -> None:
+    """Print what a curve is like, and write it."""
+    low, high, mean = curve.friction.min(), curve.friction.max(), curve.friction.mean()
+    band = "" if curve.error is None else f", each +- {curve.error:.2g}"
+    print(f"{curve.source}: friction {low:.4g} to {high:.4g}, {mean:.4g} on average{band}", flush=True)
+    if out is None:
+        return
+    if out.suffix.lower() != ".csv":
+        raise InputError("--out", quoted(str(out)), "a file called .csv")
+    rows = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
+    write_text(out, csv_text([["x", "friction"], *rows]))
+    print(out, flush=True)
+
+
+def _database(given: argparse.Namespace) -> None:
+    from evfem.textures.database import compute_database
+
+    path, counted = compute_database(given.out, workers=given.workers, scheduler=given.scheduler)
+    told = ", ".join(f"{number} {what}" for what, number in counted.items())
+    print(f"{told}; in {path}", flush=True)

@@ -1,0 +1,138 @@
+r"""Textures by generators, each with three knobs: frequency, amplitude, irregularity.
+
+- `grating`: ridges and grooves with cosine-shaped walls, irregularity moves every groove by up to
+  an eighth of its period and changes its depth by up to half.
+- `sinusoids`: a sine with a second harmonic; irregularity i spreads its power over waves whose
+  frequencies are normally distributed with the standard deviation i/2 of the frequency.
+- `self_affine`: power spectral density ``q^-(1 + 2H)`` (Jacobs, Junge and Pastewka 2017,
+  doi:10.1088/2051-672X/aa51f8) from the frequency upwards; H is 1 - irregularity.
+- `spectral`: ``q^-beta`` between two frequencies, one and eight times the knob; beta is
+  3 (1 - irregularity), so that 0 is smooth and 1 is white noise.
+
+All repeat after a whole number of periods. Amplitude is that of the sine with the same root mean
+square (half the depth of a grating); phases are drawn from a seed, the same on every machine.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from evfem.common.checks import Within, check_fields, choice, number
+from evfem.contact.textures import Grating
+from evfem.errors import InputError, quoted
+from evfem.tensor import Array
+from evfem.textures.texture import Texture
+
+#: who may do what with a texture that was made from numbers alone
+FREE = "CC0-1.0"
+#: periods of the knob's frequency in what repeats, samples of the shortest wave, shortest over longest
+PERIODS, SAMPLES, BAND = 8, 32, 8
+
+
+@dataclass(frozen=True)
+class Knobs:
+    """What the generators share: `frequency` (1/mm), `amplitude` (mm), `irregularity` 0 to 1,
+    `seed`; `second` and `phase` (share and rad) of the second harmonic of `sinusoids`; `hurst` and
+    `beta`, None: by the irregularity.
+    """
+
+    frequency: float = field(default=0.5, metadata=number("1/mm from 0.05 to 10", Within(0.05, 10.0)))
+    amplitude: float = field(default=0.02, metadata=number("mm above 0, up to 1", Within(0.0, 1.0, True)))
+    irregularity: float = field(default=0.0, metadata=number("a number from 0 to 1", Within(0.0, 1.0)))
+    second: float = field(default=0.0, metadata=number("a share from 0 to 2", Within(0.0, 2.0)))
+    phase: float = field(default=0.0, metadata=number("an angle from -10 to 10 rad", Within(-10.0, 10.0)))
+    hurst: float | None = field(default=None, metadata=number("an exponent from 0 to 1", Within(0.0, 1.0)))
+    beta: float | None = field(default=None, metadata=number("an exponent from 0 to 6", Within(0.0, 6.0)))
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
+            raise InputError("seed", quoted(self.seed), "a whole number, not negative")
+
+
+def make(kind: str, knobs: Knobs, name: str | None = None, licence: str = FREE) -> Texture:
+    """The texture that a generator makes: grating, sinusoids, self_affine or spectral.
+
+    >>> make("sinusoids", Knobs(frequency=0.5, amplitude=0.01))
+    Texture('sinusoids', sinusoids, 256 heights, period 16 mm, 0.02 mm from lowest to highest)
+    """
+    choice("kind", kind, tuple(GENERATORS))
+    x, height = GENERATORS[kind](knobs)
+    said = ", ".join(f"{key} {value:g}" for key, value in vars(knobs).items() if value is not None)
+    notes = (f"Made by evfem: {kind} with {said}.",)
+    period = PERIODS / knobs.frequency
+    return Texture(name or kind, kind, x, height, licence, period=period, provenance=notes)
+
+
+def _grating(knobs: Knobs) -> tuple[Array, Array]:
+    period, draw = 1.0 / knobs.frequency, random.Random(knobs.seed)
+    x = np.arange(PERIODS * 64) * (period / 64)
+    height = np.zeros_like(x)
+    for k in range(PERIODS):
+        moved = 0.125 * period * knobs.irregularity * (2.0 * draw.random() - 1.0)
+        depth = 2.0 * knobs.amplitude * (1.0 + 0.5 * knobs.irregularity * (2.0 * draw.random() - 1.0))
+        one = Grating(period=period, groove_depth=depth)
+        inside = (x >= k * period) & (x < (k + 1) * period)
+        height[inside] = one.height(x[inside] - k * period - moved)
+    return x, height
+
+
+def _sinusoids(knobs: Knobs) -> tuple[Array, Array]:
+    numbers = np.arange(1, 2 * PERIODS + 1)
+    width = max(0.5 * knobs.irregularity * PERIODS, 1e-3)
+    power = np.exp(-0.5 * ((numbers - PERIODS) / width) ** 2)
+    amplitude = knobs.amplitude * np.sqrt(power / power.sum())
+    spread = knobs.irregularity > 0.0
+    phase = _phases(knobs.seed, numbers.size) if spread else np.zeros(numbers.size)
+    waves = [(numbers, amplitude, phase)]
+    if knobs.second > 0.0:
+        waves.append((2 * numbers, knobs.second * amplitude, 2.0 * phase + knobs.phase))
+    return _sum(waves, knobs.frequency)
+
+
+def _self_affine(knobs: Knobs) -> tuple[Array, Array]:
+    hurst = 1.0 - knobs.irregularity if knobs.hurst is None else knobs.hurst
+    return _power_law(knobs, 1.0 + 2.0 * hurst)
+
+
+def _spectral(knobs: Knobs) -> tuple[Array, Array]:
+    return _power_law(knobs, 3.0 * (1.0 - knobs.irregularity) if knobs.beta is None else knobs.beta)
+
+
+def _power_law(knobs: Knobs, exponent: float) -> tuple[Array, Array]:
+    numbers = np.arange(PERIODS, BAND * PERIODS + 1)
+    amplitude = numbers ** (-0.5 * exponent)
+    amplitude *= knobs.amplitude / np.sqrt(np.sum(amplitude**2))
+    return _sum([(numbers, amplitude, _phases(knobs.seed, numbers.size))], knobs.frequency)
+
+
+def _phases(seed: int, size: int) -> Array:
+    draw = random.Random(seed)  # its numbers are the same in every version of Python
+    return np.array([2.0 * np.pi * draw.random() for _ in range(size)])
+
+
+def _sum(waves: list[tuple[Array, Array, Array]], frequency: float) -> tuple[Array, Array]:
+    """x (n,) and height (n,) of sines: numbers of waves in the period, amplitudes, phases."""
+    shortest = max(
+        float(numbers[amplitude > 1e-9 * amplitude.max()].max()) for numbers, amplitude, _ in waves
+    )
+    size = int(SAMPLES * shortest)
+    turn = 2.0 * np.pi * np.arange(size) / size
+    height = np.zeros(size)
+    for numbers, amplitude, phase in waves:
+        for n, a, p in zip(numbers.tolist(), amplitude.tolist(), phase.tolist(), strict=True):
+            height += a * np.sin(n * turn + p)
+    return np.arange(size) * (PERIODS / frequency / size), height
+
+
+GENERATORS: dict[str, Callable[[Knobs], tuple[Array, Array]]] = {
+    "grating": _grating,
+    "sinusoids": _sinusoids,
+    "self_affine": _self_affine,
+    "spectral": _spectral,
+}

@@ -1,0 +1,126 @@
+r"""Textures with parameters: a sine and its second harmonic, felt by a smooth or a ridged finger.
+
+The profile of the database, the paper's eq. (25) in general::
+
+    h(x) = a (sin(q x) + c sin(2 q x) + d cos(2 q x)),   q = 2 pi / wavelength,   s = q a
+
+`slope` s is the slope of the first sine; `in_phase` c and `in_quadrature` d are the shares of the
+second harmonic. Once the whole contact slips, the friction force of such a slide repeats with the
+wavelength, whatever ridges the finger has, because they move with it.
+
+A point of the database is (ln wavelength, ln slope, c, d, friction, ln load), each from 0 to 1 over
+its range in `RANGES`. What is interpolated is ``(mu(x) - friction) / slope``: for small heights the
+change of friction is proportional to the slope.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, check_fields, number, yes_or_no
+from evfem.contact.surfaces import Sinusoid
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+
+#: name -> smallest and largest value of the database, and whether its logarithm is interpolated
+RANGES = {
+    "wavelength": (1.0, 4.0, True),
+    "slope": (0.02, 0.2, True),
+    "in_phase": (-0.4, 0.4, False),
+    "in_quadrature": (-0.4, 0.4, False),
+    "friction": (0.1, 0.6, False),
+    "load": (0.02, 0.1, True),
+}
+#: samples of a period, steps before it, speed (mm/s) and relaxation time of the tissue (s)
+SAMPLES, STEPS_BEFORE, SPEED, VISCOSITY = 24, 12, 20.0, 1e-3
+#: slide in mm per N/mm of friction force after which the whole contact slips, twice what was seen
+SLIP_PER_FORCE = 130.0
+
+
+@dataclass(frozen=True)
+class Parametric:
+    """A texture with parameters, the load (N/mm), and whether the finger is `ridged`.
+
+    `wavelength` in mm, `slope` of the first sine, shares `in_phase` and `in_quadrature` of the
+    second harmonic, `friction` of the material.
+
+    >>> texture = Parametric(wavelength=2.0, slope=0.1, in_phase=0.2)
+    >>> f"{texture.amplitude:.4f} mm", texture.beyond()
+    ('0.0318 mm', {})
+    """
+
+    wavelength: float = field(default=2.0, metadata=number("mm above 0, up to 100", Within(0.0, 100.0, True)))
+    slope: float = field(default=0.1, metadata=number("a slope above 0, up to 10", Within(0.0, 10.0, True)))
+    in_phase: float = field(default=0.0, metadata=number("a share from -10 to 10", Within(-10.0, 10.0)))
+    in_quadrature: float = field(default=0.0, metadata=number("a share from -10 to 10", Within(-10.0, 10.0)))
+    friction: float = field(default=0.3, metadata=number("a number above 0, to 10", Within(0.0, 10.0, True)))
+    load: float = field(default=0.05, metadata=number("N/mm above 0, up to 10", Within(0.0, 10.0, True)))
+    ridged: bool = field(default=True, metadata=yes_or_no())
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude (mm) of the first sine."""
+        return self.slope * self.wavelength / (2.0 * np.pi)
+
+    def surface(self) -> Sinusoid:
+        """The profile as the rigid surface of a scene."""
+        q, a, c, d = 2.0 * np.pi / self.wavelength, self.amplitude, self.in_phase, self.in_quadrature
+        rows = [[a, q, 0.0], [a * c, 2.0 * q, 0.0], [a * d, 2.0 * q, 0.5 * np.pi]]
+        return Sinusoid(friction=self.friction, terms=[row for row in rows if row[0]])
+
+    def beyond(self) -> dict[str, tuple[float, float]]:
+        """Parameters outside the database, with what it has: {} where it has all of them."""
+        slack = 1e-9
+        return {
+            name: (low, high)
+            for name, (low, high, _) in RANGES.items()
+            if not low - slack <= getattr(self, name) <= high + slack
+        }
+
+    def point(self) -> Floats:
+        """Its place (6,) in the database, 0 to 1 along each axis where it is inside."""
+        return np.array([_share(getattr(self, name), *RANGES[name]) for name in RANGES])
+
+
+def _share(value: float, low: float, high: float, logarithmic: bool) -> float:
+    if logarithmic:
+        value, low, high = np.log(value), np.log(low), np.log(high)
+    return (value - low) / (high - low)
+
+
+def at(point: Floats, ridged: bool) -> Parametric:
+    """The texture at a place (6,) of the database.
+
+    >>> at(Parametric(wavelength=3.0, load=0.03).point(), True).wavelength
+    3.0
+    """
+    values = {}
+    for share, (name, (low, high, logarithmic)) in zip(point.tolist(), RANGES.items(), strict=True):
+        value = low * (high / low) ** share if logarithmic else low + share * (high - low)
+        values[name] = float(f"{value:.6g}")  # what stands in the shipped file is what was computed
+    return Parametric(**values, ridged=ridged)
+
+
+def scene(texture: Parametric) -> Scene:
+    """Viscous sliding of the coarse pad over the texture at a held load: a second slide of one
+    period in `SAMPLES` steps, after a first one over whole periods until everything slips.
+    """
+    periods = np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength)
+    return Scene(
+        FingerPad(resolution="coarse", ridges=texture.ridged, viscosity=VISCOSITY),
+        texture.surface(),
+        solver=Solver(dynamics="viscous", threads=1),
+        motion=(
+            Press(force=texture.load, steps=4),
+            Slide(float(periods) * texture.wavelength, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
+            Slide(texture.wavelength, steps=SAMPLES, speed=SPEED, hold="force"),
+        ),
+        name="texture",
+    )

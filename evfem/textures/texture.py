@@ -1,0 +1,260 @@
+"""A texture, and its files: a `.json` beside its `.csv`, or a folder with both.
+
+What is known over x is either the height of a surface or its friction coefficient. A recording of
+vibrations gives neither: it is kept as what it is, the spectrum of the friction over the spatial
+frequency, and turned into a friction profile with phases that are drawn and a size that is said.
+The `.json` has exactly the keys of `KEYS`; the licence is one of them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import above, choice, set_frozen
+from evfem.common.storage import disk, write_text
+from evfem.common.tables import csv_text, numbers, read_columns
+from evfem.common.views import plus
+from evfem.errors import InputError, quoted
+
+FORMAT = "evfem-texture-1"
+#: what the `.json` is called in a folder
+NAME = "texture.json"
+#: quantity -> the header of its csv file and the units of both columns
+QUANTITIES = {
+    "height": (["x", "height"], ["mm", "mm"]),
+    "friction": (["x", "friction"], ["mm", "1"]),
+    "friction_spectrum": (["frequency", "amplitude"], ["1/mm", "1"]),
+}
+KEYS = ("format", "name", "kind", "quantity", "period", "length", "units", "licence", "provenance", "data")
+#: what a texture may be at most: rows, mm of length, mm of height, friction coefficient, letters of
+#: a text, sentences of provenance, bytes of a `.json`
+MOST_ROWS, LONGEST, HIGHEST, ROUGHEST, MOST_LETTERS, MOST_NOTES, MOST_BYTES = (
+    200_000, 1e4, 10.0, 100.0, 400, 200, 200_000,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """Heights (mm) or friction over x (mm), or the amplitudes of a friction spectrum over the
+    spatial frequency (1/mm), rms amplitude of all together 1.
+
+    `x`, `values`: arrays (n,), x rising. `period` (mm) is that of a texture that repeats, whose rows
+    are one period without its end; None: it has an end. `kind` says what made it, `licence` what
+    others may do with it, `provenance` what was done, a sentence each.
+
+    >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
+    >>> wave
+    Texture('wave', drawn, 2 heights, period 2 mm, 0.01 mm from lowest to highest)
+    >>> wave.over(0.0, 4.0)[0].tolist()
+    [0.0, 1.0, 2.0, 3.0, 4.0]
+    """
+
+    name: str
+    kind: str
+    x: Any
+    values: Any
+    licence: str
+    quantity: str = "height"
+    period: float | None = None
+    provenance: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        for key in ("name", "kind", "licence"):
+            _text(key, getattr(self, key))
+        choice("quantity", self.quantity, tuple(QUANTITIES))
+        x = numbers("x", self.x, "a list of numbers")
+        values = numbers(self.quantity, self.values, "a list of numbers")
+        set_frozen(self, x=x, values=values, provenance=tuple(self.provenance))
+        if len(self.provenance) > MOST_NOTES:
+            raise InputError("provenance", f"{len(self.provenance)} sentences", f"at most {MOST_NOTES}")
+        for note in self.provenance:
+            _text("provenance", note)
+        _check_rows(x, values)
+        _check_range(self)
+        if self.period is not None:
+            period = float(above("period", self.period, 0.0, "a length in mm above zero"))
+            if self.quantity == "friction_spectrum" or not x[-1] - x[0] < period <= LONGEST:
+                given = f"{period:g} mm, with rows over {x[-1] - x[0]:g}"
+                allowed = f"more than the rows' length, up to {LONGEST:g} mm, and none for a spectrum"
+                raise InputError("period", given, allowed)
+            set_frozen(self, period=period)
+
+    def __repr__(self) -> str:
+        """Its size."""
+        if self.quantity == "friction_spectrum":
+            what = f"{self.x.size} frequencies, {self.x[0]:.4g} to {self.x[-1]:.4g} per mm"
+            return f"Texture({self.name!r}, {self.kind}, {what})"
+        plural, unit = ("heights", " mm") if self.quantity == "height" else ("friction coefficients", "")
+        size = f"length {self.length:.4g} mm" if self.period is None else f"period {self.period:.4g} mm"
+        span = f"{plus(np.ptp(self.values)):.4g}{unit} from lowest to highest"
+        return f"Texture({self.name!r}, {self.kind}, {self.x.size} {plural}, {size}, {span})"
+
+    @property
+    def length(self) -> float:
+        """What the rows cover (mm), one period of a texture that repeats; 0 for a spectrum."""
+        if self.quantity == "friction_spectrum":
+            return 0.0
+        return float(self.x[-1] - self.x[0]) if self.period is None else self.period
+
+    def over(self, start: float, stop: float) -> tuple[Floats, Floats]:
+        """Rows from `start` or before it to `stop` or behind it (mm), periods repeated.
+
+        A texture that ends is continued by its mirror image, so that it neither jumps nor stops.
+        """
+        if self.quantity == "friction_spectrum":
+            raise InputError("texture", f"{self.name}, a spectrum", "heights or friction over x")
+        x, values, period = self._repeated()
+        first = int(np.floor((start - x[0]) / period))
+        last = int(np.floor((stop - x[0]) / period)) + 1
+        if (last - first + 1) * x.size > MOST_ROWS * 10:
+            raise InputError("stop", f"{stop - start:g} mm", f"at most {MOST_ROWS * 10} rows")
+        everywhere = np.concatenate([x + k * period for k in range(first, last + 1)])
+        again = np.tile(values, last + 1 - first)
+        before = max(int(np.searchsorted(everywhere, start + 1e-9, side="right")) - 1, 0)
+        kept = slice(before, int(np.searchsorted(everywhere, stop - 1e-9)) + 1)
+        return everywhere[kept], again[kept]
+
+    def _repeated(self) -> tuple[Floats, Floats, float]:
+        """Rows of what repeats, and its period."""
+        if self.period is not None:
+            return self.x, self.values, self.period
+        back = self.x[-1] + np.cumsum(np.diff(self.x)[::-1])[:-1]
+        x, values = np.concatenate([self.x, back]), np.concatenate([self.values, self.values[-2:0:-1]])
+        return x, values, 2.0 * float(self.x[-1] - self.x[0])
+
+    def document(self, data: str) -> dict[str, Any]:
+        """What stands in its `.json`, whose rows are in the file `data`."""
+        header, units = QUANTITIES[self.quantity]
+        return {
+            "format": FORMAT,
+            "name": self.name,
+            "kind": self.kind,
+            "quantity": self.quantity,
+            "period": self.period,
+            "length": self.length,
+            "units": dict(zip(header, units, strict=True)),
+            "licence": self.licence,
+            "provenance": list(self.provenance),
+            "data": data,
+        }
+
+    def rows(self) -> str:
+        """What stands in its `.csv`."""
+        header = QUANTITIES[self.quantity][0]
+        return csv_text([header, *zip(self.x.tolist(), self.values.tolist(), strict=True)])
+
+
+def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
+    """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
+
+    The `.json` is written last: without it there is no texture. Returns both paths.
+
+    >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
+    >>> [path.name for path in write(wave, "wave.json")], read("wave.json").period
+    (['wave.json', 'wave.csv'], 2.0)
+    """
+    path = Path(path)
+    if path.suffix not in ("", ".json"):
+        raise InputError("path", str(path), "a file called .json, or a folder")
+    if path.suffix == "":
+        with disk(f"use {path}"):
+            path.mkdir(parents=True, exist_ok=True)
+        path = path / NAME
+    data = path.with_suffix(".csv")
+    write_text(data, texture.rows())
+    write_text(path, json.dumps(texture.document(data.name), indent=1) + "\n")
+    return path, data
+
+
+def read(path: str | Path) -> Texture:
+    """The texture in a `.json` with its `.csv`, or in a folder with both.
+
+    Raises InputError for anything missing, unknown, damaged or beyond the limits of this module.
+    """
+    path = Path(path)
+    path = path / NAME if path.is_dir() else path
+    table = _table(path)
+    if set(table) != set(KEYS) or table["format"] != FORMAT:
+        odd = sorted(set(table) ^ set(KEYS)) or [f"format {quoted(table['format'])}"]
+        raise InputError("texture", f"{path}: {', '.join(odd)[:80]}", f"exactly the keys {', '.join(KEYS)}")
+    quantity = choice("quantity", table["quantity"], tuple(QUANTITIES))
+    header, units = QUANTITIES[quantity]
+    if table["units"] != dict(zip(header, units, strict=True)):
+        raise InputError("units", quoted(table["units"]), f"{', '.join(units)} for {', '.join(header)}")
+    data = table["data"]
+    if not isinstance(data, str) or Path(data).name != data or not data.endswith(".csv"):
+        raise InputError("data", quoted(data), "the name of a csv file beside the .json")
+    if not isinstance(table["provenance"], list):
+        raise InputError("provenance", quoted(table["provenance"]), "a list of sentences")
+    x, values = read_columns(path.with_name(data), header, "data")
+    names = ("name", "kind", "licence", "quantity", "period", "provenance")
+    found = Texture(x=x, values=values, **{name: table[name] for name in names})
+    if not _near(table["length"], found.length):
+        raise InputError("length", quoted(table["length"]), f"that of the rows, {found.length:g} mm")
+    return found
+
+
+def is_texture(path: Path) -> bool:
+    """Whether a `.json` says that it is a texture."""
+    try:
+        return _table(path).get("format") == FORMAT
+    except InputError:
+        return False
+
+
+def _table(path: Path) -> Mapping[str, Any]:
+    allowed = "a readable texture: a .json beside its .csv, or a folder with both"
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+        if len(data) > MOST_BYTES:
+            raise InputError("texture", f"{path}, which is too long", f"at most {MOST_BYTES} bytes")
+        table = json.loads(data.decode("utf-8"))
+    except OSError as error:
+        raise InputError("texture", f"{path} ({error.strerror or error})", allowed) from None
+    except InputError:
+        raise
+    except (ValueError, RecursionError):
+        raise InputError("texture", f"{path}, which is no JSON", allowed) from None
+    if not isinstance(table, dict):
+        raise InputError("texture", f"{path}, whose JSON is no object", allowed)
+    return table
+
+
+def _near(given: object, length: float) -> bool:
+    number = isinstance(given, (int, float)) and not isinstance(given, bool)
+    return number and abs(given - length) <= 1e-6 * max(length, 1.0)  # type: ignore[operator]
+
+
+def _text(key: str, value: object) -> None:
+    if not isinstance(value, str) or not value.strip() or len(value) > MOST_LETTERS or "\n" in value:
+        raise InputError(key, quoted(value), f"a line of 1 to {MOST_LETTERS} letters")
+
+
+def _check_rows(x: Floats, values: Floats) -> None:
+    if x.size != values.size or not 2 <= x.size <= MOST_ROWS:
+        given = f"{x.size} and {values.size} numbers"
+        raise InputError("x", given, f"2 to {MOST_ROWS} rows of two numbers")
+    falls = np.flatnonzero(np.diff(x) < 1e-9)
+    if falls.size:
+        n = int(falls[0])
+        raise InputError("x", f"{x[n]:g}, then {x[n + 1]:g} (rows {n + 1}, {n + 2})", "rising numbers")
+    if np.abs(x).max() > LONGEST:
+        raise InputError("x", f"{x[np.argmax(np.abs(x))]:g}", f"numbers within {LONGEST:g}")
+
+
+def _check_range(texture: Texture) -> None:
+    values, quantity = texture.values, texture.quantity
+    low, high = {"height": (-HIGHEST, HIGHEST), "friction": (0.0, ROUGHEST)}.get(quantity, (0.0, 1.5))
+    if values.min() < low or values.max() > high:
+        wrong = values[int(np.argmax(np.maximum(low - values, values - high)))]
+        raise InputError(quantity, f"{wrong:g}", f"values from {low:g} to {high:g}, lengths in mm")
+    if quantity == "friction_spectrum" and texture.x[0] <= 0.0:
+        raise InputError("frequency", f"{texture.x[0]:g}", "spatial frequencies in 1/mm above zero")

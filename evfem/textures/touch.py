@@ -1,0 +1,113 @@
+"""From a texture to a scene and to what the model says of it: a finger, its load and its speed.
+
+The pad is the coarse one, viscous; it is pressed to the load, slid until its whole contact slips,
+and then over the part of the texture that is asked for, the load held. Heights are those of the
+rigid surface; a friction profile lies on a level one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, check_fields, number, yes_or_no
+from evfem.contact.surfaces import Flat, Profile
+from evfem.errors import InputError
+from evfem.finger.fingerpad import FingerPad
+from evfem.protocols import Observer
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation.result import Result
+from evfem.simulation.run import simulate
+from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
+from evfem.textures.texture import Texture
+
+#: steps of each mm and of a whole slide, rows of a friction table, mm of texture beside the finger
+STEPS_PER_MM, MOST_STEPS, MOST_TABLE, BESIDE = 20, 400, 9_000, 10.0
+
+
+@dataclass(frozen=True)
+class Touch:
+    """How a finger slides: `ridged` or smooth, `friction` of the texture's material (that of heights;
+    a friction profile has its own), `load` (N/mm), `speed` (mm/s), `length` of the slide (mm).
+
+    >>> Touch(load=-1.0)
+    Traceback (most recent call last):
+    evfem.errors.InputError: load: given -1.0; allowed: N/mm from 0.001 to 1
+    """
+
+    ridged: bool = field(default=True, metadata=yes_or_no())
+    friction: float = field(default=0.3, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
+    load: float = field(default=0.05, metadata=number("N/mm from 0.001 to 1", Within(0.001, 1.0)))
+    speed: float = field(default=SPEED, metadata=number("mm/s from 0.1 to 1000", Within(0.1, 1000.0)))
+    length: float = field(default=8.0, metadata=number("mm from 0.5 to 50", Within(0.5, 50.0)))
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve:
+    """Apparent friction F_t / F_n (n,) over the position (n,) mm, x = 0 where the texture begins.
+
+    `source` says where it is from; `error` is its band (half width), None where it is not known.
+    """
+
+    x: Floats
+    friction: Floats
+    source: str
+    error: float | None = None
+
+
+def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
+    """The scene of a slide over the texture; `every`: fields of every so many steps are kept.
+
+    The bone passes x = 0 when the second slide begins.
+    """
+    before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
+    steps = int(np.clip(round(STEPS_PER_MM * touch.length), 20, MOST_STEPS))
+    return Scene(
+        FingerPad(resolution="coarse", ridges=touch.ridged, viscosity=VISCOSITY),
+        _surface(texture, touch, before),
+        solver=Solver(dynamics="viscous", threads=1),
+        motion=(
+            Press(force=touch.load, steps=4),
+            Slide(before, steps=STEPS_BEFORE, speed=touch.speed, hold="force"),
+            Slide(touch.length, steps=steps, speed=touch.speed, hold="force"),
+        ),
+        output=Output(every=every) if every else Output(),
+        name=_file_name(texture.name),
+    )
+
+
+def _surface(texture: Texture, touch: Touch, before: float) -> Flat | Profile:
+    """The texture under the whole slide, moved so that its x = 0 is passed after `before` mm."""
+    x, values = texture.over(-before - BESIDE, touch.length + BESIDE)
+    x = x + before
+    if texture.quantity == "height":
+        return Profile(x, values, friction=touch.friction)
+    if x.size > MOST_TABLE:
+        few = np.linspace(x[0], x[-1], MOST_TABLE)
+        x, values = few, np.interp(few, x, values)
+    return Flat(friction=np.column_stack([x, values]).tolist())
+
+
+def _file_name(name: str) -> str:
+    return "".join(c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in name)[:60] or "texture"
+
+
+def friction_of(result: Result) -> FrictionCurve:
+    """The apparent friction of the second slide of `touch_scene`."""
+    last = result.motion_index == 2
+    if not last.any():
+        raise InputError("result", "no second slide", "the result of a scene of touch_scene")
+    x = result.position[last] - result.position[~last][-1]
+    return FrictionCurve(x, result.applied_tangential_force[last] / result.applied_force[last], "model")
+
+
+def simulate_texture(texture: Texture, touch: Touch, observers: Sequence[Observer] = ()) -> FrictionCurve:
+    """Slide over the texture by the full model."""
+    return friction_of(simulate(touch_scene(texture, touch), observers=observers))

@@ -1,0 +1,221 @@
+"""What rough faces keep between them: the laws, and the attraction that depends on it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import benchmark_finger, coarse_pad
+
+from evfem.contact.attraction import Attraction
+from evfem.contact.pad import Pad
+from evfem.contact.surfaces import Display, Flat
+from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.roughness import (
+    ConstantRoughness,
+    ExponentialRoughness,
+    PowerRoughness,
+    roughness_of,
+    separation_derivative,
+)
+from evfem.errors import InputError
+from evfem.scene.file import dump, loads
+from evfem.scene.motion import Press, Slide
+from evfem.scene.plan import plan
+from evfem.scene.scene import Output, Scene
+from evfem.simulation.run import simulate
+
+POWER = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.3, open_gap=0.004)
+EXPONENTIAL = ExponentialRoughness(decay=0.0008, pressure=1.0, open_gap=0.006)
+FALLING = pytest.mark.parametrize("law", [POWER, EXPONENTIAL], ids=["power", "exponential"])
+
+
+class Own:
+    """A law of one's own without a derivative; it drops imaginary parts."""
+
+    def separation(self, pressure):
+        return 0.003 / (1.0 + np.abs(pressure) / 0.02)
+
+
+def test_the_laws_are_those_of_their_sources():
+    p = np.array([0.002, 0.01, 0.3])
+    np.testing.assert_allclose(POWER.separation(p), 0.001 * (p / 0.01) ** -0.3, rtol=1e-14)
+    np.testing.assert_allclose(EXPONENTIAL.separation(p), 0.0008 * np.log(1.0 / p), rtol=1e-14)
+    assert EXPONENTIAL.separation(2.0) == 0.0
+    assert ConstantRoughness(0.002).separation(0.01) == 0.002
+
+
+@FALLING
+def test_open_nodes_are_bounded_and_the_laws_are_smooth_where_the_tangent_begins(law):
+    """By hand: the tangent at p_c reaches `open_gap` at no pressure."""
+    if law is POWER:
+        at = 0.004 / 1.3
+        least = 0.01 * (0.001 / at) ** (1.0 / 0.3)
+    else:
+        at, least = 0.006 - 0.0008, np.exp(-(0.006 - 0.0008) / 0.0008)
+    assert law.separation(0.0) == pytest.approx(law.open_gap, rel=1e-14)
+    assert law.separation(least) == pytest.approx(at, rel=1e-12)
+    sides = [law.separation_derivative(least * (1.0 + s)) for s in (-1e-9, 1e-9)]
+    assert sides[0] == pytest.approx(sides[1], rel=1e-7)
+    assert law.separation(0.5 * least) == pytest.approx(0.5 * (law.open_gap + at), rel=1e-12)
+
+
+@pytest.mark.parametrize("law", [POWER, EXPONENTIAL, ConstantRoughness(0.001), Own()])
+def test_derivatives_are_those_of_the_separation(law):
+    p = np.array([1e-5, 1e-3, 0.02, 0.5])
+    h = 1e-6 * p
+    expected = (law.separation(p + h) - law.separation(p - h)) / (2.0 * h)
+    np.testing.assert_allclose(separation_derivative(law, p), expected, rtol=1e-7, atol=1e-9)
+
+
+def test_what_is_no_gap_is_refused():
+    for given in (-0.001, 2.0, "rough", None, True, POWER.__class__):
+        with pytest.raises(InputError, match="roughness_gap"):
+            roughness_of(given)
+    with pytest.raises(InputError, match="open_gap"):
+        ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.001)
+    with pytest.raises(InputError, match="only with a law"):
+        Scene(coarse_pad(), Flat(), motion=Press(force=0.01), roughness_gap=0.001)
+
+
+def row_of_nodes(rough):
+    """Three edges of 0.5 mm under Strong-Troxel's law over 1 um of insulator."""
+    nodes = np.arange(4)
+    pad = Pad(nodes, np.column_stack([nodes[:-1], nodes[1:]]), np.ones(4, dtype=bool))
+    position = np.column_stack([0.5 * nodes, [0.0, 0.0, 0.0, 0.003]])
+    return Attraction(StrongTroxel(), Layers.of(TOUCHSCREEN), pad, Flat(y=0.0), roughness=rough), position
+
+
+def test_the_law_sees_the_gap_and_the_separation_of_each_nodes_own_pressure():
+    attraction, position = row_of_nodes(POWER)
+    pressing = np.array([0.0, 0.002, 0.01, 0.0])
+    length = np.array([0.25, 0.5, 0.5, 0.25])
+    apart = position[:, 1] + POWER.separation(pressing / length)
+    expected = -StrongTroxel().traction(apart, 100.0, Layers.of(TOUCHSCREEN)) * length
+    found = attraction.forces(position, 100.0, np.ones(4, dtype=bool), pressing)
+    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-14)
+    assert not found[:, 0].any()
+
+
+def test_the_gain_on_pressing_is_the_derivative_of_the_force():
+    attraction, position = row_of_nodes(POWER)
+    position[:, 1] = 0.0
+    touching, pressing = np.ones(4, dtype=bool), np.array([1e-4, 0.002, 0.01, 0.03])
+    gain, h = attraction.gain_on_pressing(position, 100.0, touching, pressing), 1e-6 * pressing
+    ahead, behind = (attraction.forces(position, 100.0, touching, pressing + s * h)[:, 1] for s in (1, -1))
+    np.testing.assert_allclose(gain, -(ahead - behind) / (2.0 * h), rtol=1e-6)
+    assert (gain > 0.0).all()
+    without, _ = row_of_nodes(None)
+    assert not without.gain_on_pressing(position, 100.0, touching, pressing).any()
+
+
+MOTION = [Press(force=0.05, steps=2), Slide(0.4, steps=2)]
+
+
+def touchscreen(rough, coupling="monolithic"):
+    surface, output = Display(TOUCHSCREEN), Output(every=4)
+    return Scene(
+        benchmark_finger(), surface, StrongTroxel(), 100.0, MOTION,
+        coupling=coupling, output=output, roughness_gap=rough,
+    )  # fmt: skip
+
+
+def test_a_rough_touchscreen_converges_as_a_smooth_one_and_obeys_the_law_at_every_node():
+    smooth, rough = simulate(touchscreen(0.0)), simulate(touchscreen(POWER))
+    assert rough.substeps.tolist() == [1] * 4
+    assert rough.newton_iterations.sum() < 1.5 * smooth.newton_iterations.sum()
+    frame = rough.frames[-1]
+    pad = rough.mesh.node_sets["pad"]
+    gap, pressure = np.maximum(frame.gap[pad], 0.0), np.maximum(frame.contact_pressure[pad], 0.0)
+    skin = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
+    apart = np.where(frame.contact_status[pad] > 0, 0.0, gap) + POWER.separation(pressure)
+    expected = StrongTroxel().traction(apart, 100.0, skin)
+    found = frame.electrostatic_traction[pad]
+    facing = found > 0.0
+    assert (frame.contact_status[pad][facing] > 0).sum() > 20
+    np.testing.assert_allclose(found[facing], expected[facing], rtol=1e-9)
+
+
+@FALLING
+def test_both_couplings_find_the_same_equilibrium_and_the_books_close(law):
+    together, alternating = (simulate(touchscreen(law, c)) for c in ("monolithic", "staggered"))
+    for name in ("applied_force", "electrostatic_force", "normal_force", "indentation"):
+        np.testing.assert_allclose(together[name][:2], alternating[name][:2], rtol=1e-6)
+        # an edge node whose attraction exceeds its contact force may stay or let go
+        np.testing.assert_allclose(together[name][2:], alternating[name][2:], rtol=1e-3)
+    for one in (together, alternating):
+        given = one.external_work + one.electrostatic_work
+        lost = one.friction_dissipation + one.integrator_dissipation + one.snap_dissipation
+        np.testing.assert_allclose(given, one.stored_energy + lost, atol=1e-7 * given.max())
+
+
+def test_a_constant_gap_is_a_thicker_layer_of_air():
+    """Strong-Troxel's law knows the sum of gap and layers alone: 1 um of air instead."""
+    rough = simulate(touchscreen(0.001))
+    stack = Display(Layer(0.001 * (1.0 + 1.0 / 3.9), 1.0))
+    air = simulate(replace(touchscreen(0.0), surface=stack))
+    for name in ("applied_force", "electrostatic_force", "tangential_force"):
+        np.testing.assert_allclose(rough[name], air[name], rtol=1e-7, atol=1e-9)
+
+
+TABLE = """
+version = 1
+[finger]
+resolution = "coarse"
+[surface]
+kind = "flat"
+[electrostatics]
+law = "kaczmarek"
+voltage = 100.0
+insulator = "touchscreen"
+ROUGH
+[[motion]]
+kind = "press"
+force = 0.05
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "law"),
+    [
+        ("roughness_gap = 0.002", 0.002),
+        ('[electrostatics.roughness_gap]\nlaw = "constant"\ngap = 0.002', ConstantRoughness(0.002)),
+        (
+            '[electrostatics.roughness_gap]\nlaw = "power"\ngap = 0.001\npressure = 0.01\n'
+            "exponent = 0.3\nopen_gap = 0.004",
+            POWER,
+        ),
+        (
+            '[electrostatics.roughness_gap]\nlaw = "exponential"\ndecay = 0.0008\npressure = 1.0\n'
+            "open_gap = 0.006",
+            EXPONENTIAL,
+        ),
+    ],
+)
+def test_a_scene_file_says_it_and_a_dumped_one_too(text, law):
+    scene = loads(TABLE.replace("ROUGH", text))
+    assert scene.roughness_gap == law
+    assert loads(dump(scene)) == scene
+    assert "rough faces" in next(term.reason for term in plan(scene).terms if term.name == "electricity")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("roughness_gap = -0.1", "electrostatics.roughness_gap: given -0.1; allowed: a length in mm"),
+        ('roughness_gap = {law = "linear"}', "constant | power | exponential"),
+        ('roughness_gap = {law = "power", gap = 0.1}', "electrostatics.roughness_gap.pressure"),
+        ('roughness_gap = {law = "constant", gap = 5.0}', "electrostatics.roughness_gap.gap: given 5"),
+    ],
+)
+def test_mistakes_in_a_file_are_one_sentence(text, said):
+    with pytest.raises(InputError) as caught:
+        loads(TABLE.replace("ROUGH", text))
+    assert said in str(caught.value)
+
+
+def test_the_force_of_kaczmareks_law_falls_with_roughness():
+    """Strong-Troxel falls more: its pressure goes with the square of the short length."""
+    layers = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
+    share = [law.traction(0.001, 100.0, layers) / law.traction(0.0, 100.0, layers)
+             for law in (StrongTroxel(), Kaczmarek())]  # fmt: skip
+    assert share[0] < share[1] < 1.0

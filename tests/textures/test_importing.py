@@ -1,0 +1,140 @@
+"""Files of others: units, levelling, gaps, spectra, grey values, and what was done said."""
+
+import struct
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from evfem.errors import InputError
+from evfem.textures import scans
+from evfem.textures.cleaning import Cleaning
+from evfem.textures.importing import Source, friction_profile, from_csv, from_image, from_recording
+
+SOURCE = Source("CC0-1.0", name="mine", note="From my table.")
+
+
+def csv(path, header, *columns):
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="")
+    return path
+
+
+def wav(path, samples, rate):
+    data = np.rint(samples * 32767).astype("<i2").tobytes()
+    form = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)
+    body = b"WAVEfmt " + struct.pack("<I", 16) + form + b"data" + struct.pack("<I", len(data)) + data
+    path.write_bytes(b"RIFF" + struct.pack("<I", len(body)) + body)
+    return path
+
+
+def test_heights_in_micrometres_are_levelled_and_both_is_said(tmp_path):
+    x = np.arange(0.0, 4000.0, 10.0)
+    wave = 5.0 * np.sin(2.0 * np.pi * x / 1000.0)
+    texture = from_csv(csv(tmp_path / "a.csv", "x,height", x, wave + 0.02 * x + 7.0), SOURCE, unit="um")
+    line = np.polynomial.Polynomial.fit(x, wave, 1)(x)
+    np.testing.assert_allclose(texture.values, (wave - line) * 1e-3, atol=1e-9)
+    assert texture.length == pytest.approx(3.99)
+    assert texture.provenance == (
+        "From a.csv.",
+        "From my table.",
+        "Lengths were in um.",
+        "Levelled: line taken off.",
+    )
+
+
+def test_a_parabola_is_taken_off():
+    x = np.linspace(0.0, 3.0, 50)
+    _, height, notes = Cleaning(level="parabola")(x, 1.0 + 2.0 * x - 3.0 * x**2)
+    assert np.abs(height).max() < 1e-12
+    assert notes == ["Levelled: parabola taken off."]
+
+
+def test_more_than_half_missing_is_refused():
+    height = np.array([1.0, np.nan, np.nan, np.nan, 2.0])
+    with pytest.raises(InputError, match="3 of 5 missing"):
+        Cleaning()(np.arange(5.0), height)
+
+
+def test_a_cut_that_leaves_nothing_is_refused():
+    with pytest.raises(InputError, match="0 of 5 points"):
+        Cleaning(start=10.0)(np.arange(5.0), np.arange(5.0))
+
+
+def test_smoothing_halves_a_wave_of_the_cut_off_length():
+    x = np.arange(0.0, 40.0, 0.01)
+    _, height, _ = Cleaning(level="none", smooth=2.0)(x, np.sin(np.pi * x))
+    assert np.ptp(height[1000:3000]) == pytest.approx(1.0, rel=1e-3)
+
+
+def test_friction_is_kept_as_it_is(tmp_path):
+    path = csv(tmp_path / "f.csv", "x,friction", [0.0, 1.0], [0.3, 0.5])
+    texture = from_csv(path, SOURCE)
+    assert (texture.quantity, texture.values.tolist()) == ("friction", [0.3, 0.5])
+
+
+def test_a_recording_is_a_spectrum_over_the_spatial_frequency(tmp_path):
+    time = np.arange(8000) / 4000.0
+    samples = 0.4 * np.sin(2 * np.pi * 62.5 * time) + 0.3 * np.sin(2 * np.pi * 125.0 * time)
+    texture = from_recording(wav(tmp_path / "r.wav", samples, 4000), SOURCE, speed=50.0)
+    assert texture.quantity == "friction_spectrum"
+    strong = texture.x[texture.values > 0.2]
+    assert np.all((np.abs(strong - 1.25) < 0.06) | (np.abs(strong - 2.5) < 0.06))
+    power = [np.sum(texture.values[np.abs(texture.x - f) < 0.2] ** 2) for f in (1.25, 2.5)]
+    assert power[0] / power[1] == pytest.approx((0.4 / 0.3) ** 2, rel=0.01)
+    assert np.sum(texture.values**2) == pytest.approx(1.0)
+
+
+def test_an_acceleration_is_divided_by_the_square_of_the_frequency(tmp_path):
+    time = np.arange(8192) / 4096.0
+    low, high = 2 * np.pi * 64.0, 2 * np.pi * 128.0
+    path = csv(tmp_path / "a.csv", "time,acceleration", time, np.sin(low * time) + 4.0 * np.sin(high * time))
+    texture = from_recording(path, SOURCE, speed=64.0)
+    power = [np.sum(texture.values[np.abs(texture.x - f) < 0.1] ** 2) for f in (1.0, 2.0)]
+    assert power[0] / power[1] == pytest.approx(1.0, rel=0.02)
+
+
+def test_a_spectrum_becomes_friction_of_the_size_that_is_said(tmp_path):
+    time = np.arange(8000) / 4000.0
+    texture = from_recording(wav(tmp_path / "r.wav", np.sin(400 * time), 4000), SOURCE, speed=50.0)
+    friction = friction_profile(texture, mean=0.4, rms=0.05, length=20.0, seed=1)
+    assert np.mean(friction.values) == pytest.approx(0.4, abs=0.005)
+    assert np.std(friction.values) == pytest.approx(0.05, rel=0.1)
+    with pytest.raises(InputError, match="rms"):
+        friction_profile(texture, mean=0.4, rms=0.5, length=20.0)
+
+
+def test_grey_values_become_heights_of_the_depth_that_is_said(tmp_path):
+    grey = np.zeros((5, 8), np.uint8)
+    grey[2] = [0, 255, 0, 255, 0, 255, 51, 255]
+    Image.fromarray(grey).save(tmp_path / "cloth.png")
+    texture = from_image(
+        tmp_path / "cloth.png", SOURCE, pixel=0.1, depth=0.2, cleaning=Cleaning(level="none")
+    )
+    assert texture.values.tolist() == pytest.approx([0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.04, 0.2])
+    assert texture.x[-1] == pytest.approx(0.7)
+    assert any("not measured" in note for note in texture.provenance)
+
+
+@pytest.mark.parametrize("name", ["a.png", "a.wav", "a.csv"])
+def test_damaged_files_are_refused(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff\xff")
+    readers = {
+        "a.png": lambda: from_image(path, SOURCE, pixel=0.1, depth=0.1),
+        "a.wav": lambda: from_recording(path, SOURCE, speed=10.0),
+        "a.csv": lambda: from_csv(path, SOURCE),
+    }
+    with pytest.raises(InputError, match="file: given"):
+        readers[name]()
+
+
+def test_an_image_of_too_many_pixels_is_refused_before_it_is_decoded(tmp_path):
+    Image.new("1", (10_000, 5_000)).save(tmp_path / "large.png")
+    with pytest.raises(InputError, match="10000 x 5000 pixels"):
+        from_image(tmp_path / "large.png", SOURCE, pixel=0.1, depth=0.1)
+
+
+def test_without_the_extra_a_scan_is_refused_with_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setattr(scans, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"evfem\[scans\]"):
+        scans.from_scan(tmp_path / "a.x3p", SOURCE)
