@@ -156,7 +156,7 @@ class FactorisedBody:
         rounding = self._rounding(state) / self.limits.tolerance
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
         dim = state.bone.size
-        sums = np.abs(forces[:-dim].reshape(-1, dim).sum(axis=0)).max()
+        sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = (target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return float(free / largest)
