@@ -166,8 +166,9 @@ class Pardiso:
         return y, g
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
-        state[self.kept] = kept
-        x = self._solve(333, state).astype(np.float64)
+        given = state.astype(self.real)  # sums of states are of double precision
+        given[self.kept] = kept
+        x = self._solve(333, given).astype(np.float64)
         x[self.kept] = kept
         return x
 

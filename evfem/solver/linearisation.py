@@ -104,15 +104,16 @@ class Linearisation:
         """
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
-        steep = self.negative_stiffness(state) > self.steep * self.pad.length(position[:, 0])
-        needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
+        weakening = self.negative_stiffness(state)
+        steep, near = self.steep * self.pad.length(position[:, 0]), (gap <= reach) | (state.status != OPEN)
+        needed = self.pad.free & (near | (weakening > steep))
         if not needed.any():
             needed[np.argmin(gap)] = True
         if needed[self.candidates].sum() == needed.sum():
             return
-        enough = np.sort(gap)[min(int(SPARE * needed.sum()), int(self.pad.free.sum()) - 1)]
-        near = (gap <= max(enough, NEIGHBOURS * self.interface.length)) | self._deep
-        wider = self.pad.free & near | needed
+        enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
+        wider = (gap <= max(enough, NEIGHBOURS * self.interface.length)) | (SPARE * weakening > steep)
+        wider = self.pad.free & (wider | self._deep) | needed
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
 

@@ -284,6 +284,11 @@ def test_forces_on_kept_unknowns_go_past_the_single_precision(back_end):
     exact = problem.condensed(KEPT, small)[1]
     _, found = factor.forward(small + np.isin(np.arange(problem.size), KEPT) * 2.0**20)
     np.testing.assert_allclose(found - 2.0**20, exact, atol=1e-3 * np.abs(exact).max())
+    # and sums of states with numbers of double precision serve as well as states
+    state, _ = factor.forward(small)
+    half = np.float64(0.5)
+    doubled = factor.backward(half * state + half * state, np.zeros(KEPT.size))
+    np.testing.assert_allclose(doubled, factor.backward(state, np.zeros(KEPT.size)), atol=1e-12)
     _, alone = factor.forward(small)
     np.testing.assert_allclose(alone, exact, atol=1e-5 * np.abs(exact).max())
 
