@@ -23,6 +23,7 @@ from evfem.electrostatics import forces as forces
 from evfem.electrostatics import signals as signals
 from evfem.electrostatics.dielectrics import Dielectric as Dielectric
 from evfem.electrostatics.dielectrics import DielectricTable as DielectricTable
+from evfem.electrostatics.drive import Drive as Drive
 from evfem.electrostatics.laws import FILM as FILM
 from evfem.electrostatics.laws import TOUCHSCREEN as TOUCHSCREEN
 from evfem.electrostatics.laws import Kaczmarek as Kaczmarek
@@ -42,6 +43,7 @@ from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine
+from evfem.electrostatics.timesignals import Square as Square
 from evfem.errors import EvfemError as EvfemError
 from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
@@ -52,6 +54,8 @@ from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
+from evfem.finger.fingerprint import HeightMap as HeightMap
+from evfem.finger.fingertip import Fingertip as Fingertip
 from evfem.finger.scan import RidgeScan as RidgeScan
 from evfem.loading import load as load
 from evfem.mesh import file as _mesh_file

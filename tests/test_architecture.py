@@ -28,15 +28,18 @@ ROOMS = {
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
         "space pattern assembly weakform userforms dynamics drag body",
     ),
-    "finger": ({"numpy"}, "outline lattice layers scan section fingerpad"),
+    "finger": (
+        {"numpy", "PIL"},
+        "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
+    ),
     "electrostatics": (
-        {"numpy", "scipy"},
-        "laws dielectrics charges alternating roughness forces signals wav timesignals encoding hjif "
-        "signalfile",
+        {"numpy", "scipy", "skfem"},
+        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
+        "forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge attraction signorini follower condensed stability",
+        "surfaces textures own pad edge charging attraction signorini follower condensed stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -45,7 +48,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms scene written keys voltage meanings schema file resolution drift sense plan",
+        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
+        "timescales plan",
     ),
     "simulation": (
         {"numpy", "threadpoolctl"},

@@ -28,10 +28,11 @@ import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
+from evfem.contact.charging import Charged, Charging
 from evfem.contact.pad import Pad, surface_state
-from evfem.electrostatics.laws import traction_derivative
+from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
-from evfem.tensor import mul, positive_part
+from evfem.tensor import derivative, mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
 
 #: gaps up to this (mm) count as closed
@@ -65,6 +66,35 @@ class Attraction:
     direction: str = "vertical"
     air_layer: bool = True
     roughness: Any = None
+    charging: Charging | None = None
+
+    def acts(self, voltage: float) -> bool:
+        """Whether anything attracts at this voltage: charges may without it."""
+        return voltage != 0.0 or self.charging is not None
+
+    @property
+    def no_charges(self) -> Floats:
+        """Charges (2, P) of an uncharged pad, (2, 0) where charges do not move."""
+        return np.zeros((2, 0)) if self.charging is None else self.charging.none
+
+    def _seen(self, gap: Any, voltage: float, x: Floats) -> Any:
+        """The voltage that the law sees at gaps (P,) of nodes at x (P,): that of the charges, too."""
+        if self.charging is None:
+            return voltage
+        return self.charging.effective(gap, voltage, self.pad.length(x))
+
+    def charged(
+        self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
+    ) -> Charged:
+        """The electric state at positions (P, 2): with the charges (2, P), or those at the end of
+        the present step.
+        """
+        assert self.charging is not None
+        x = position[:, 0]
+        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + self._separation(x, pressing)
+        length = self.pad.length(x)
+        found = self.charging.after(gap, voltage, length) if charges is None else charges
+        return Charged(found, voltage, gap, length)
 
     def forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
@@ -81,12 +111,12 @@ class Attraction:
         """`forces` at W places of a way (W, P, 2), from positions (W, P, 2), voltages (W,) and
         contact forces (W, P).
         """
-        if not voltages.any():
+        if not voltages.any() and self.charging is None:
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
         x = positions[..., 0]
         gaps = np.maximum(frame.gap, 0.0).reshape(x.shape) + self._separation(x, pressing)
-        pairs = list(zip(gaps, voltages.tolist(), strict=True))
+        pairs = [(gap, self._seen(gap, u, at)) for gap, u, at in zip(gaps, voltages.tolist(), x, strict=True)]
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
         weight = on * pressure * self.pad.length(x)
@@ -124,21 +154,30 @@ class Attraction:
         on = 1.0 if self.air_layer else touching.astype(float)
         p = self._contact_pressure(position[:, 0], pressing)
         closer = separation_derivative(self.roughness, p)
-        rate = traction_derivative(self.law, self.roughness.separation(p), voltage, self.layers)
+        rate = self._rate(self.roughness.separation(p), voltage, position[:, 0])
         return np.asarray(on * rate * closer)
 
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
         """How fast the attraction of a node weakens with its vertical gap, -dp/dg A (P,) in N/mm
-        per mm; 0 where it touches: there contact holds the gap.
+        per mm; 0 where it touches, where contact holds the gap, and where losses make it grow with
+        the gap: that stabilises, and the iterations do without it.
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
         x = position[:, 0]
         apart = np.maximum(gap, 0.0) + self._separation(x, pressing)
-        rate = traction_derivative(self.law, apart, voltage, self.layers)
-        return np.where(gap > TOUCHING, -on * rate * self.pad.length(x), 0.0)
+        weakening = -on * self._rate(apart, voltage, x) * self.pad.length(x)
+        return np.where((gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
+
+    def _rate(self, apart: Floats, voltage: float, x: Floats) -> Any:
+        """dp/dg (P,) in MPa/mm of nodes at x (P,), the charges of the present step following."""
+        if self.charging is None:
+            return traction_derivative(self.law, apart, voltage, self.layers)
+        law = self.law
+        seen = lambda g: law.traction(g, self._seen(g, voltage, x), self.layers)  # noqa: E731
+        return derivative(seen, apart, GAP_STEP)
 
     def stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
@@ -150,8 +189,9 @@ class Attraction:
         frame = surface_state(self.surface, position)
         length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
-        apart = np.maximum(frame.gap, 0.0) + self._separation(position[:, 0], pressing)
-        p = on * self.law.traction(apart, voltage, self.layers)
+        x = position[:, 0]
+        apart = np.maximum(frame.gap, 0.0) + self._separation(x, pressing)
+        p = on * self.law.traction(apart, self._seen(apart, voltage, x), self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
         of, moved, value = self.pad.length_gradient(position[:, 0])
         nodes = np.arange(size)

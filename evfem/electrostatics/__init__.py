@@ -12,11 +12,13 @@ from evfem.electrostatics.alternating import (
 )
 from evfem.electrostatics.dielectrics import SKINS, Dielectric, DielectricTable
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.rigid import FieldSolution, rigid_field
 
 __all__ = [
     "SKINS",
     "Dielectric",
     "DielectricTable",
+    "FieldSolution",
     "Kaczmarek",
     "Layer",
     "Layers",
@@ -25,6 +27,7 @@ __all__ = [
     "complex_length",
     "corner_frequencies",
     "eps_0",
+    "rigid_field",
     "square_wave_pressure",
     "step_pressure",
     "step_rates",

@@ -95,6 +95,14 @@ class Sandwich:
         """Voltage (V) that makes the same field in the gap without charges; `charges` (2, ...)."""
         return voltage + self.skin * charges[0] - self.insulator * charges[1]
 
+    def voltage_at(self, gap: Any, charges: Any, displacement: Values) -> Any:
+        """Voltage (V) of an electrode that has the `displacement` over eps_0 (V/mm): an open circuit
+        keeps that, and so the force, whatever the gap.
+        """
+        film, middle = displacement, displacement - charges[1]
+        skin = middle - charges[0]
+        return self.skin * skin + gap / self.gap_eps_r * middle + self.insulator * film
+
     def fields(self, gap: Any, voltage: Values, charges: Any) -> tuple[Any, Any, Any]:
         """Displacements over eps_0 (V/mm) in skin, gap and insulator."""
         total = self.skin + gap / self.gap_eps_r + self.insulator

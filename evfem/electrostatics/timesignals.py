@@ -36,6 +36,8 @@ HEADER = ["time", "voltage"]
 LARGEST, FASTEST = 1e6, 1e9
 #: share of the fluctuation's power that lies below the highest frequency of samples
 POWER = 0.95
+#: share of half a period that counts as rounding of a time
+FLIP = 1e-9
 #: largest difference of two spacings of evenly spaced times, as a share of the spacing
 EVEN = 1e-3
 
@@ -79,6 +81,38 @@ class Sine:
         """Voltage (V) at `time` (s, any shape)."""
         turns = 2.0 * np.pi * self.frequency * np.asarray(time) + self.phase
         return plain(self.bias + self.amplitude * np.sin(turns))
+
+
+@dataclass(frozen=True)
+class Square:
+    """+`amplitude` in the first half of each period and -`amplitude` in the second, in V;
+    frequency in Hz.
+
+    >>> Square(frequency=50.0, amplitude=100.0)([0.0, 0.009, 0.01, 0.02]).tolist()
+    [100.0, 100.0, -100.0, 100.0]
+    """
+
+    frequency: float = field(metadata=_FREQUENCY)
+    amplitude: float = field(metadata=_AMPLITUDE)
+    kind = "square"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def largest(self) -> float:
+        """Largest magnitude (V)."""
+        return self.amplitude
+
+    @property
+    def highest_frequency(self) -> float:
+        """Its frequency (Hz); the flips themselves have no time scale."""
+        return self.frequency
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) at `time` (s, any shape); a flip within rounding of a time has happened."""
+        half = np.floor(2.0 * self.frequency * np.asarray(time) + FLIP)
+        return plain(self.amplitude * (1.0 - 2.0 * np.mod(half, 2.0)))
 
 
 @dataclass(frozen=True)

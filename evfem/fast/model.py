@@ -244,6 +244,8 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    if scene.drive is not None and scene.drive.resolved:
+        raise InputError("drive", "resolved in time", "the mean over the cycle with the fast model")
     rough = roughness_of(scene.roughness_gap)
     if rough is not None and not isinstance(rough, ConstantRoughness):
         allowed = "a length in mm with the fast model"

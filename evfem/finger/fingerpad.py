@@ -8,7 +8,7 @@ parameters with the defaults given there; every length is in mm.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from evfem import data
 from evfem.common.checks import Within, choice, real, set_frozen
 from evfem.common.views import called, changed, short, table
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.finger.layers import LAYERS, NAIL, thickness_of
+from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
@@ -188,7 +188,7 @@ class FingerPad:
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
                 _check_alone(self)
         mistakes.report()
-        set_frozen(self, materials=_all_materials(self.materials))
+        set_frozen(self, materials=all_materials(self.materials, (*LAYERS, NAIL)))
         _check_section(self, self._section)
 
     @classmethod
@@ -228,7 +228,11 @@ class FingerPad:
         return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
 
     def _changed(self) -> dict[str, Any]:
-        laws = {name: law for name, law in self.materials.items() if law != _all_materials({}).get(name)}
+        laws = {
+            name: law
+            for name, law in self.materials.items()
+            if law != all_materials({}, (*LAYERS, NAIL)).get(name)
+        }
         return {k: v for k, v in changed(self).items() if k != "materials"} | (
             {"materials": laws} if laws else {}
         )
@@ -278,14 +282,13 @@ def participant_sizes(name: str) -> dict[str, Any]:
     return {"width": width, "height": height, **sizes}
 
 
-def _all_materials(own: object) -> dict[str, Any]:
+def all_materials(own: object, layers: Sequence[TissueLayer]) -> dict[str, Any]:
+    """The laws of the layers, Table 2's where a user gives none of his `own`."""
     if not isinstance(own, Mapping):
         raise InputError(
             "finger.materials", quoted(own), "a law for each region that is not to have that of Table 2"
         )
-    laws: dict[str, Any] = {
-        layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in (*LAYERS, NAIL)
-    }
+    laws: dict[str, Any] = {layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in layers}
     for name, law in own.items():
         if name not in laws:
             raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))

@@ -1,7 +1,7 @@
 """The layers of the finger pad: one row each, from the outline to the bone, and the nail.
 
 A row has all that the package knows about a layer. A layer more is a row at its place in `LAYERS`,
-and its thickness a parameter of `FingerPad`: the field `NAME_thickness`, with the default
+and its thickness a parameter of `FingerPad` and `Fingertip`: the field `NAME_thickness`, with the default
 `thickness_of("NAME")`.
 """
 
@@ -33,8 +33,8 @@ class TissueLayer:
 
     `number` is the region's in files and stays what it is when layers are added. `moduli` are
     those of the default neo-Hookean material. A layer without `thickness` fills what the others
-    leave. `rows`: its rows of quadratic cells for each resolution (the nail has those of the layer
-    that it replaces).
+    leave. `rows`: its rows of quadratic cells for each resolution of a cross-section, `solid_rows`
+    of a whole pad, one where none is given (the nail has those of the layer that it replaces).
     """
 
     name: str
@@ -42,6 +42,7 @@ class TissueLayer:
     moduli: Moduli
     thickness: Thickness | None
     rows: Mapping[str, int] = field(default_factory=dict)
+    solid_rows: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def parameter(self) -> str:
@@ -71,6 +72,7 @@ LAYERS: tuple[TissueLayer, ...] = (
         moduli=TABLE_2["stratum_corneum"],
         thickness=Thickness(0.38, lowest=0.1, highest=0.8),
         rows={"coarse": 2, "medium": 4, "paper": 2, "fine": 8},
+        solid_rows={"coarse": 1, "medium": 1, "fine": 1},
     ),
     TissueLayer(
         name="epidermis",
@@ -78,6 +80,7 @@ LAYERS: tuple[TissueLayer, ...] = (
         moduli=TABLE_2["epidermis"],
         thickness=Thickness(0.47, lowest=0.15, highest=1.0),
         rows={"coarse": 2, "medium": 4, "paper": 11, "fine": 10},
+        solid_rows={"coarse": 1, "medium": 1, "fine": 2},
     ),
     TissueLayer(
         name="dermis",
@@ -85,6 +88,7 @@ LAYERS: tuple[TissueLayer, ...] = (
         moduli=TABLE_2["dermis"],
         thickness=Thickness(1.0, lowest=0.5, highest=2.0),
         rows={"coarse": 2, "medium": 4, "paper": 6, "fine": 14},
+        solid_rows={"coarse": 1, "medium": 1, "fine": 2},
     ),
     TissueLayer(
         name="hypodermis",
@@ -92,6 +96,7 @@ LAYERS: tuple[TissueLayer, ...] = (
         moduli=TABLE_2["hypodermis"],
         thickness=None,
         rows={"coarse": 3, "medium": 5, "paper": 6, "fine": 14},
+        solid_rows={"coarse": 2, "medium": 2, "fine": 3},
     ),
 )
 #: Takes the place of the outermost layer on top; everything below it, down to the bone, is `NAIL_BED`.

@@ -81,13 +81,17 @@ class Ridges:
 
     def depth(self, x: Floats) -> Floats:
         """Depth below the crest line, along the ellipse's normal (mm)."""
+        return self.below(x) * quintic((self.end - np.abs(x)) / (self.end - self.full))
+
+    def below(self, x: Floats) -> Floats:
+        """The same of ridges that do not fade."""
         t = 2.0 * np.abs((x / self.pitch - self.phase + 0.5) % 1.0 - 0.5)
         if self.crest == 0.0:
             shape = t**self.exponent
         else:
             s = np.clip((t - self.crest) / (1.0 - self.crest - self.groove), 0.0, 1.0)
             shape = 0.5 * (1.0 - np.cos(np.pi * s))
-        return self.height * shape * quintic((self.end - np.abs(x)) / (self.end - self.full))
+        return np.asarray(self.height * shape)
 
 
 def quintic(s: Floats) -> Floats:

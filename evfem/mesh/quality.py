@@ -13,6 +13,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
+from evfem.mesh.hexahedron import PLACES
 from evfem.mesh.mesh import KINDS, Mesh
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
@@ -244,11 +245,11 @@ TRIANGLE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.5, 0.0), (0.5, 0.5), (0.0, 0.
 
 
 def scaled_jacobian(mesh: Mesh) -> Floats:
-    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square or
+    """Smallest scaled Jacobian of each cell, (E,), over all its nodes: 1 for a square, a cube or an
     equilateral triangle.
 
-    det(t1, t2) / (|t1| |t2|) with the tangents of the cell's own, possibly curved, coordinate
-    lines at the node; in triangles the longest two of the three directions count, and sin 60
+    det(t1, t2[, t3]) / (|t1| |t2| [|t3|]) with the tangents of the cell's own, possibly curved,
+    coordinate lines at the node; in triangles the longest two of the three directions count, and sin 60
     degrees is divided out. Zero or less: the cell is degenerate or turned inside out.
 
     >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
@@ -256,8 +257,10 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
     >>> scaled_jacobian(square).tolist()
     [1.0]
     """
-    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
     x = mesh.points[mesh.cells]
+    if mesh.corners == 8:
+        return _scaled_jacobian_of_hexahedra(x, mesh.order)
+    slopes_at = _square_slopes if mesh.corners == 4 else _triangle_slopes
     smallest = np.full(len(x), np.inf)
     for place in (SQUARE if mesh.corners == 4 else TRIANGLE)[: mesh.cells.shape[1]]:
         t = slopes_at(place, mesh.order) @ x
@@ -269,6 +272,22 @@ def scaled_jacobian(mesh: Mesh) -> Floats:
             lengths = np.maximum(lengths, third * np.maximum(first, second)) * np.sqrt(0.75)
         smallest = np.minimum(smallest, det / np.maximum(lengths, 1e-300))
     return smallest
+
+
+def _scaled_jacobian_of_hexahedra(x: Floats, order: int) -> Floats:
+    smallest = np.full(len(x), np.inf)
+    for place in PLACES[: x.shape[1]]:
+        t = _cube_slopes(place, order) @ x
+        lengths = np.linalg.norm(t, axis=2).prod(axis=1)
+        smallest = np.minimum(smallest, np.linalg.det(t) / np.maximum(lengths, 1e-300))
+    return smallest
+
+
+def _cube_slopes(place: Ints, order: int) -> Floats:
+    """Derivatives (3, nodes) of a hexahedron's shape functions at a place."""
+    (f, df), (g, dg), (h, dh) = (_line(float(s), order) for s in place)
+    i, j, k = (PLACES[: (order + 1) ** 3].T + 1) // (3 - order)
+    return np.array([df[i] * g[j] * h[k], f[i] * dg[j] * h[k], f[i] * g[j] * dh[k]])
 
 
 def _square_slopes(place: tuple[float, float], order: int) -> Floats:

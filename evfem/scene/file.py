@@ -45,7 +45,7 @@ from evfem.scene.keys import (
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
-from evfem.scene.voltage import voltage_of
+from evfem.scene.voltage import drive_of, voltage_of
 from evfem.scene.written import FORCE_LAWS, TEXTURES, VERSION, dump
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import from_table
@@ -203,9 +203,10 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
     with at("electrostatics"):
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
+    voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
     same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
     same["roughness_gap"] = _roughness(table.roughness_gap)
-    return {"law": law, "voltage": voltage_of(table, not ramped, folder), **same}
+    return {"law": law, "voltage": voltage, "drive": drive, **same}
 
 
 def _roughness(given: float | Mapping[str, Any]) -> Any:

@@ -12,8 +12,11 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
+from evfem.electrostatics.dielectrics import SKINS
+from evfem.electrostatics.drive import WAVEFORMS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
+from evfem.electrostatics.timesignals import FASTEST
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
@@ -137,6 +140,12 @@ class ElectrostaticsTable(Table):
 
     law: Literal["strong_troxel", "kaczmarek"] = required("strong_troxel | kaczmarek")
     voltage: float | None = optional("a voltage in V")
+    amplitude: float | None = optional("a peak voltage in V, not negative")
+    frequency: float | None = optional(f"a frequency in Hz, above 0, up to {FASTEST:g}")
+    waveform: Literal[WAVEFORMS] = optional(" | ".join(WAVEFORMS), WAVEFORMS[0])  # type: ignore[valid-type]
+    skin: str | None = optional(f"{' | '.join(SKINS)} | the path of a csv file")
+    gap_conductivity: float = optional("a conductivity in S/m, not negative", 0.0)
+    drive: Literal["mean", "resolved"] = optional("mean | resolved", "mean")
     voltage_file: str | None = optional(
         "the path of a csv file (header: position,voltage or time,voltage) or of a .wav"
     )

@@ -117,6 +117,12 @@ SURFACE = {
 ELECTROSTATICS = {
     "law": Text("", "force law of the paper, eqs (2) to (5)"),
     "voltage": Text("V", "effective, across skin and insulator", "", Within(-1e6, 1e6)),
+    "amplitude": Text("V", "peak, instead of voltage", "", Within(0.0, 1e6)),
+    "frequency": Text("Hz", "of the alternating voltage; without it a direct one", "", POSITIVE),
+    "waveform": Text("", "of the alternating voltage"),
+    "skin": Text("", "dielectric of the stratum corneum; without it stratum_corneum_eps_r"),
+    "gap_conductivity": Text("S/m", "of what fills the gap: the leak", "", NOT_NEGATIVE),
+    "drive": Text("", "attraction by its mean over the cycle, or resolved in time with its charges"),
     "voltage_file": Text("", "voltage over the position, instead of a number"),
     "voltage_profile": Text("mm, V", "the same in the scene file"),
     "signal": Text("", "voltage over time, instead of a number"),
@@ -138,8 +144,8 @@ ROUGHNESS = {
     "open_gap": Text("mm", "at no pressure, where the law itself has no bound"),
 }
 SIGNAL = {
-    "frequency": Text("Hz", "of the sine, or of the carrier"),
-    "amplitude": Text("V", "of the sine"),
+    "frequency": Text("Hz", "of the sine, square wave or carrier"),
+    "amplitude": Text("V", "of the sine or square wave"),
     "bias": Text("V", "mean voltage"),
     "phase": Text("rad", "at time 0"),
     "envelope": Text("V", "height of the carrier: a number, or a signal that modulates it"),

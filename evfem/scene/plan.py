@@ -20,11 +20,13 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
+from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage
+from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, skin_of
 from evfem.scene.terms import Boundary
+from evfem.scene.timescales import left_out, time_scales
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
@@ -135,12 +137,13 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    others = unresolved(scene, mesh), too_fast(scene), *drifting(scene, mesh, moduli)
+    others = unresolved(scene, mesh), too_fast(scene), left_out(scene), *drifting(scene, mesh, moduli)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
         _friction(scene),
         _electricity(scene),
+        *_drive(scene),
         _time(scene),
         _forms(scene, mesh),
     )
@@ -217,7 +220,7 @@ def _electricity(scene: Scene) -> Term:
     if scene.law is None or largest_voltage(scene) == 0.0:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
-    signal = scene.voltage
+    signal = applied(scene)
     over_time = (
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
@@ -236,9 +239,16 @@ def _roughness(scene: Scene) -> str:
     return f", rough faces up to {apart:g} mm apart, less with a node's contact pressure"
 
 
+def _drive(scene: Scene) -> tuple[Term, ...]:
+    """The time scales of a scene with a drive."""
+    if scene.drive is None:
+        return ()
+    return (Term("drive", True, time_scales(scene, *skin_of(scene))),)
+
+
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
-    clock = ", the clock sets the voltage alone" if isinstance(scene.voltage, TimeSignal) else ""
+    clock = ", the clock sets the voltage alone" if isinstance(applied(scene), TimeSignal) else ""
     lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
     if dynamics == "quasistatic":
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))

@@ -26,10 +26,12 @@ from evfem.common.checks import (
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.contact.own import completed
+from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, RoughnessLaw, Surface, TimeSignal
+from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.strategy import Strategy
@@ -147,12 +149,12 @@ class Scene:
     """A finger, a surface, an electrostatic law with a voltage, and what happens.
 
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
-    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). `law` None and
-    `voltage` 0: no electrostatics. The insulator belongs to the surface. `air_layer` False: only
-    touching nodes carry electrostatic force. `roughness_gap` (mm, or a `RoughnessLaw`) is what
-    rough skin keeps between itself and the insulator where they touch. `depth` (mm) is how deep the
-    plane finger is meant to be; it changes no number but adds `Result.total`, in N and mm2. Raises
-    InputError for anything that does not fit together.
+    position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
+    alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
+    surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
+    or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
+    `depth` (mm) is how deep the plane finger is meant to be; it changes no number but adds
+    `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -163,6 +165,7 @@ class Scene:
     air_layer: bool = field(default=True, kw_only=True)
     direction: str = field(default="vertical", kw_only=True)
     coupling: str = field(default="monolithic", kw_only=True)
+    drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
@@ -174,7 +177,7 @@ class Scene:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        for check in (_check_electrostatics, _check_motion, _check_time, _check_dynamics):
+        for check in (_check_electrostatics, check_drive, _check_motion, _check_time, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
         mistakes.report()
@@ -239,6 +242,8 @@ def _check_parts(scene: Scene) -> None:
         raise InputError("solver", quoted(scene.solver), "a Solver")
     if not isinstance(scene.output, Output):
         raise InputError("output", quoted(scene.output), "an Output")
+    if not isinstance(scene.drive, Drive | None):
+        raise InputError("electrostatics.drive", quoted(scene.drive), "a Drive, or None")
     if scene.depth is not None:
         set_frozen(scene, depth=DEPTH["check"]("depth", scene.depth))
     if not isinstance(scene.name, str) or not scene.name or any(c in scene.name for c in "/\\:\0\n"):
@@ -307,7 +312,8 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _check_time(scene: Scene) -> None:
-    if isinstance(scene.voltage, TimeSignal) and not any(takes_time(motion) for motion in scene.motion):
+    timed = isinstance(applied(scene), TimeSignal) or (scene.drive is not None and scene.drive.resolved)
+    if timed and not any(takes_time(motion) for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 

@@ -18,7 +18,7 @@ from pydantic import Field as Default
 from pydantic import create_model
 
 from evfem.common.checks import Within
-from evfem.electrostatics.timesignals import Carrier, Sine
+from evfem.electrostatics.timesignals import Carrier, Sine, Square
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, FingerPad
 from evfem.scene import keys, meanings
 from evfem.scene.keys import Table
@@ -31,7 +31,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 SPOKEN = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
 SPOKEN |= {"object": "table", "array": "list"}
 #: signals whose fields know their limits
-CLASSES: Mapping[str, type | None] = {"sine": Sine, "carrier": Carrier, "sampled": None}
+CLASSES: Mapping[str, type | None] = {"sine": Sine, "square": Square, "carrier": Carrier, "sampled": None}
 #: a key of [finger] that belongs to the scene
 DEPTH: Any = (float | None, Default(default=None))
 Schema = dict[str, Any]

@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.laws import Layer, Layers, StrongTroxel
+from evfem.electrostatics.laws import Layers, StrongTroxel
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
+from evfem.scene.driven import applied, attracting, lossless, solids
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
@@ -168,21 +169,21 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
 
 def _layers(scene: Scene) -> Layers:
     """The solid layers, with a usual stratum corneum where only the mesh knows its thickness."""
-    return Layers.of(*_solids(scene).values())
+    return attracting(scene, *solids(scene, *skin_of(scene)))[1]
 
 
-def _solids(scene: Scene) -> dict[str, Layer]:
-    electrical, insulator = scene.finger.electrical, scene.ground.insulator
-    thickness = getattr(electrical, "stratum_corneum_thickness", None)
+def skin_of(scene: Scene) -> tuple[float, float]:
+    """Thickness (mm) and permittivity of the stratum corneum."""
+    electrical = scene.finger.electrical
+    thickness: Any = getattr(electrical, "stratum_corneum_thickness", None)
     if thickness is None:
         thickness = getattr(scene.finger, "stratum_corneum_thickness", SKIN)
-    skin = Layer(thickness, getattr(electrical, "stratum_corneum_eps_r", 1650.0))
-    return {"stratum corneum": skin} | ({"insulator": insulator} if insulator is not None else {})
+    return float(thickness), float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
 
 
 def largest_voltage(scene: Scene) -> float:
     """Largest magnitude of the voltage anywhere in the scene (V)."""
-    own: Any = scene.voltage
+    own: Any = applied(scene)
     if isinstance(own, VoltageProfile):
         own = own.voltage
     elif isinstance(own, FollowForce):
@@ -230,10 +231,10 @@ def _breakdown(scene: Scene) -> Iterator[str]:
     """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
     if scene.law is None or isinstance(scene.voltage, FollowForce):
         return
-    voltage, solids = largest_voltage(scene), _solids(scene)
+    voltage, layers = largest_voltage(scene), solids(scene, *skin_of(scene))
     reduced = float(np.min(_layers(scene).reduced))
-    for name, layer in solids.items():
-        field = 1e-3 * voltage / (float(np.min(layer.eps_r)) * reduced)
+    for name, layer in zip(("stratum corneum", "insulator"), layers, strict=True):
+        field = 1e-3 * voltage / (float(np.min(lossless(scene, layer).eps_r)) * reduced)
         if field > BREAKDOWN and np.max(layer.thickness) > 0.0:
             yield (
                 f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
@@ -283,7 +284,7 @@ def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
     smallest gap.
     """
     assert scene.law is not None
-    layers = Layers.of(scene.ground.insulator)
+    layers = Layers.of(lossless(scene, scene.ground.insulator))
     traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
     softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
     depth = float(np.ptp(mesh.points[:, 1]))

@@ -6,9 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
+from evfem.common.checks import Within, real
+from evfem.electrostatics.dielectrics import SKINS, DielectricTable, dielectric
+from evfem.electrostatics.drive import CREST, Drive
 from evfem.electrostatics.signalfile import read_voltage
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
+from evfem.electrostatics.timesignals import Carrier, Sampled, Sine, Square
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.keys import (
@@ -25,11 +28,12 @@ from evfem.scene.keys import (
 )
 
 #: keys of [electrostatics] that give a voltage
-KEYS = ("voltage", "voltage_file", "voltage_profile", "signal")
+KEYS = ("voltage", "amplitude", "voltage_file", "voltage_profile", "signal")
 #: largest file in bytes
 LARGEST = 64 * 2**20
 
 SineTable = derived(Sine)
+SquareTable = derived(Square)
 CarrierTable = derived(Carrier, envelope=(float | dict[str, Any], required("a voltage in V, or a signal")))
 
 
@@ -45,16 +49,28 @@ class SampledTable(Table):
     repeat: bool = optional("true | false", False)
 
 
-SIGNALS: Mapping[str, type[Table]] = {"sine": SineTable, "carrier": CarrierTable, "sampled": SampledTable}
+SIGNALS: Mapping[str, type[Table]] = {
+    "sine": SineTable,
+    "square": SquareTable,
+    "carrier": CarrierTable,
+    "sampled": SampledTable,
+}
 
 
 def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
     """The voltage of the table [electrostatics], 0 where none is given nor `needed`; paths start
     at `folder`.
     """
+    if table.amplitude is not None:
+        real(
+            "electrostatics.amplitude",
+            table.amplitude,
+            "a peak voltage in V, from 0 to 1e6",
+            Within(0.0, 1e6),
+        )
     given = [name for name in KEYS if getattr(table, name) is not None]
     if len(given) > 1 or (needed and not given):
-        allowed = "exactly one of voltage (V), voltage_file and signal"
+        allowed = "exactly one of voltage (V), amplitude (V), voltage_file and signal"
         raise InputError("electrostatics.voltage", " and ".join(given) or ABSENT, allowed)
     if table.voltage_file is not None:
         path = folder / table.voltage_file
@@ -67,7 +83,29 @@ def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
             return VoltageProfile(*columns("electrostatics.voltage_profile", table.voltage_profile))
     if table.signal is not None:
         return _signal(table.signal, "electrostatics.signal", folder)
+    if table.amplitude is not None:
+        return float(table.amplitude) / CREST[table.waveform]
     return table.voltage or 0.0
+
+
+#: keys of [electrostatics] that make a drive of it, with what they are without one
+DRIVE = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": "mean"}
+
+
+def drive_of(table: Any, folder: Path) -> Drive | None:
+    """The drive of the table [electrostatics], None where no key asks for one."""
+    given = {name: getattr(table, name) for name in DRIVE}
+    if given == DRIVE:
+        return None
+    resolved = given.pop("drive") == "resolved"
+    with at("electrostatics"):
+        if given["skin"] is not None and given["skin"] not in SKINS:
+            path = folder / given["skin"]
+            if path.suffix.lower() != ".csv":
+                dielectric(given["skin"])
+            check_size("electrostatics.skin", path, LARGEST)
+            given["skin"] = DielectricTable.from_csv(path)
+        return Drive(**given, resolved=resolved)
 
 
 def _signal(table: Mapping[str, Any], prefix: str, folder: Path) -> TimeSignal:
@@ -79,7 +117,7 @@ def _signal(table: Mapping[str, Any], prefix: str, folder: Path) -> TimeSignal:
     if isinstance(values.get("envelope"), dict):
         values["envelope"] = _signal(values["envelope"], f"{prefix}.envelope", folder)
     with at(prefix):
-        return Sine(**values) if kind == "sine" else Carrier(**values)
+        return {"sine": Sine, "square": Square, "carrier": Carrier}[kind](**values)
 
 
 def _sampled(values: dict[str, Any], prefix: str, folder: Path) -> Sampled:

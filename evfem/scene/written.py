@@ -16,10 +16,12 @@ import tomli_w
 from evfem.common.views import changed
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
+from evfem.electrostatics.dielectrics import SKINS
+from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
+from evfem.electrostatics.timesignals import Carrier, Sampled, Sine, Square
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.scan import RidgeScan
@@ -124,11 +126,26 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
         )
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
     table |= voltage_keys(scene.voltage)
+    if scene.drive is not None:
+        table |= _drive_keys(scene.drive)
     insulator = scene.ground.insulator
+    if not isinstance(insulator.eps_r, float):
+        raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
     if (rough := scene.roughness_gap) != 0.0:
         table["roughness_gap"] = _roughness_key(rough)
     return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}
+
+
+def _drive_keys(drive: Drive) -> dict[str, Any]:
+    """The keys of [electrostatics] that make this drive."""
+    table = _changed(drive)
+    if not isinstance(table.get("skin", ""), str):
+        given = type(table["skin"]).__name__
+        raise InputError("electrostatics.skin", given, f"{' | '.join(SKINS)}, for a file")
+    if table.pop("resolved", False):
+        table["drive"] = "resolved"
+    return table
 
 
 def _roughness_key(rough: Any) -> Any:
@@ -145,21 +162,23 @@ def voltage_keys(voltage: Any) -> dict[str, Any]:
     if isinstance(voltage, VoltageProfile):
         rows = zip(voltage.position.tolist(), voltage.voltage.tolist(), strict=True)
         return {"voltage_profile": [list(row) for row in rows]}
-    if isinstance(voltage, (Sine, Carrier, Sampled)):
+    if isinstance(voltage, (Sine, Square, Carrier, Sampled)):
         return {"signal": _signal_table(voltage)}
     if not isinstance(voltage, float):
-        allowed = "a number, a VoltageProfile, Sine, Carrier or Sampled in a scene file"
+        allowed = "a number, a VoltageProfile, Sine, Square, Carrier or Sampled in a scene file"
         raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
     return {"voltage": voltage}
 
 
-def _signal_table(signal: Sine | Carrier | Sampled) -> dict[str, Any]:
+def _signal_table(signal: Sine | Square | Carrier | Sampled) -> dict[str, Any]:
     table = {"kind": signal.kind, **changed(signal)}
     if isinstance(signal, Sampled):
         table["voltage"] = signal.voltage.tolist()
     elif isinstance(signal, Carrier) and isinstance(signal.envelope, TimeSignal):
-        if not isinstance(signal.envelope, (Sine, Carrier, Sampled)):
+        if not isinstance(signal.envelope, (Sine, Square, Carrier, Sampled)):
             given = f"a carrier with an envelope of the class {type(signal.envelope).__name__}"
-            raise InputError("electrostatics.voltage", given, "Sine, Carrier or Sampled in a scene file")
+            raise InputError(
+                "electrostatics.voltage", given, "Sine, Square, Carrier or Sampled in a scene file"
+            )
         table["envelope"] = _signal_table(signal.envelope)
     return table

@@ -68,7 +68,18 @@ class Ledger:
             **self.sums,
             "stored_energy": end.stored + end.springs,
             "kinetic_energy": end.kinetic,
+            "field_energy": self._field_energy(state),
         }
+
+    def _field_energy(self, state: State) -> float:
+        """Energy of the field under a voltage that is resolved in time, else 0."""
+        attraction = self.model.attraction
+        if attraction is None or attraction.charging is None:
+            return 0.0
+        position = self.model.equilibrium.interface.resting(state)
+        pressing = state.contact_force[:, 0]
+        at = attraction.charged(position, state.voltage, pressing, state.charges)
+        return attraction.charging.field_energy(at)
 
 
 def shares(model: Model, position: Floats) -> Floats:

@@ -12,12 +12,14 @@ import numpy as np
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
+from evfem.contact.charging import Charging
 from evfem.contact.pad import Pad, make_pad
-from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
+from evfem.scene.driven import attracting, lossless, sandwich, solids
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -120,15 +122,18 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attract
         thickness = layer_thickness(mesh, "stratum_corneum", pad.nodes)
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
-    skin = Layer(np.broadcast_to(thickness, pad.nodes.shape).astype(float), electrical.stratum_corneum_eps_r)
-    layers = Layers.of(skin, surface.insulator)
-    rough = roughness_of(scene.roughness_gap)
-    return Attraction(scene.law, layers, pad, surface, scene.direction, scene.air_layer, rough)
+    thickness = np.broadcast_to(thickness, pad.nodes.shape).astype(float)
+    skin, insulator = solids(scene, thickness, electrical.stratum_corneum_eps_r)
+    law, layers = attracting(scene, skin, insulator)
+    rough, charging = roughness_of(scene.roughness_gap), None
+    if scene.drive is not None and scene.drive.resolved:
+        charging = Charging(sandwich(scene, skin, insulator), pad.nodes.size)
+    return Attraction(law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
 
 
 def _check_quadratic(scene: Scene) -> None:
     """The squared voltage can be an unknown only of laws that are proportional to it."""
-    layers = Layers.of(scene.ground.insulator)
+    layers = Layers.of(lossless(scene, scene.ground.insulator))
     assert scene.law is not None
     once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
     if not np.isclose(twice, 4.0 * once, rtol=1e-9):

@@ -18,6 +18,7 @@ from evfem.common.notices import LOG
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer, TimeSignal
+from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.simulation.checkpoint import (
@@ -120,7 +121,7 @@ class Run:
     """A scene on its way: the model, the present state, the rows and frames so far."""
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
-        self.scene = scene
+        self.scene, self.voltage = scene, applied(scene)
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
@@ -133,7 +134,7 @@ class Run:
 
     def voltage_at(self, position: float, time: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
-        voltage = self.scene.voltage
+        voltage = self.voltage
         if isinstance(voltage, FollowForce):
             return 0.0
         if isinstance(voltage, VoltageProfile):
@@ -142,7 +143,7 @@ class Run:
 
     def _follows(self, seconds: float) -> bool:
         """Whether a step of so many seconds follows the scene's voltage on the way."""
-        voltage = self.scene.voltage
+        voltage = self.voltage
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     # -- from motions to targets
@@ -200,13 +201,13 @@ class Run:
             force = start["applied_force"] if motion.hold == "force" else None
         elif isinstance(motion, Wait):
             force = start["applied_force"] if motion.hold == "force" else None
-        if isinstance(self.scene.voltage, (VoltageProfile, TimeSignal)):
+        if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
         bone = self.model.bone(position, indentation)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
         drive: VoltageControl = GivenVoltage(voltage)
-        if isinstance(self.scene.voltage, FollowForce) and isinstance(motion, Slide):
-            drive = self._following(self.scene.voltage, position)
+        if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
+            drive = self._following(self.voltage, position)
         return Target(position, height, drive)
 
     @staticmethod
@@ -226,7 +227,7 @@ class Run:
             return Target(x, start.height.towards(end.height, fraction), drive(x, fraction), duration)
 
         def drive(x: float, fraction: float) -> VoltageControl:
-            wanted = self.scene.voltage
+            wanted = self.voltage
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
             if self._follows(seconds):

@@ -48,6 +48,17 @@ Where no equilibrium is near, the body is released and comes to rest at another 
 :math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
 :math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``.
 
+Where the voltage is resolved in time (`evfem.contact.charging`) the pad first moves with the charges
+and the voltage that it had, which is the way of :math:`W_e`, and then charge flows:
+``source_work`` is what the source gives in both, ``leakage_dissipation`` what crosses the layers, and
+
+.. math:: W_s = \Delta W_f + D_l + W_e + W_a
+
+with the ``field_energy`` of skin, gap and insulator and the work W_a of the field on the tributary
+lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction does not do and
+which is part of ``integrator_dissipation``. This holds for Strong and Troxel's law, which is the
+pressure of that field, and lacks the work on a roughness gap that changes with the load.
+
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
 
@@ -59,6 +70,7 @@ from functools import cached_property
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.contact.charging import Charging, Flow
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.simulation.model import Model
@@ -71,6 +83,8 @@ SUMS = (
     "viscous_dissipation",
     "integrator_dissipation",
     "snap_dissipation",
+    "source_work",
+    "leakage_dissipation",
 )
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
@@ -164,7 +178,9 @@ class Part:
         drag = body.drag_dissipation(new.u)
         lost -= drag
         snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
-        added = (given, pulled, friction, viscous, 0.0 if snap else lost, drag + lost if snap else 0.0)
+        flow, beside = self._flow(), self._lengthening()
+        snapped = (beside, drag + lost) if snap else (lost + beside, 0.0)
+        added = (given, pulled, friction, viscous, *snapped, flow.source_work, flow.leakage)
         return dict(zip(SUMS, added, strict=True))
 
     def electrostatic(self) -> float:
@@ -172,6 +188,8 @@ class Part:
         model, old, new = self.model, self.old, self.new
         moved = (new.u - old.u)[model.pad.nodes]
         trapezoidal = _mean_work(old.attraction, new.attraction, moved)
+        if model.attraction is not None and model.attraction.charging is not None:
+            return self._work_of_charged(model.attraction.charging, moved)
         if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
             return trapezoidal
         open_ = ~(old.touching | new.touching)
@@ -179,21 +197,66 @@ class Part:
         along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
         if not (along[:, 1].any() or model.attraction.direction == "normal"):
             return trapezoidal
-        values = self._pulls(along, WAY)
-        integral = float(SHARE @ values)
+        way = self._on_the_way(along, (old.voltage, new.voltage))
+        return trapezoidal + way - _mean_work(old.attraction, new.attraction, along)
+
+    def _on_the_way(self, along: Floats, voltages: tuple[float, float]) -> float:
+        """Work of the attraction along `along` (P, dim) of the straight way between two voltages."""
+        values = self._pulls(along, WAY, voltages)
         size = np.abs(_LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
-            integral = float(FINE_SHARE @ self._pulls(along, FINE_WAY))
-        return trapezoidal + integral - _mean_work(old.attraction, new.attraction, along)
+            return float(FINE_SHARE @ self._pulls(along, FINE_WAY, voltages))
+        return float(SHARE @ values)
 
-    def _pulls(self, along: Floats, ways: Floats) -> Floats:
+    def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
+        """Work of the attraction while the pad moves (P, dim) with the charges and the voltage
+        that it had.
+        """
+        begin, seconds = charging.old, charging.seconds
+        charging.begin(begin, 0.0)
+        work = self._on_the_way(moved, (begin.voltage, begin.voltage))
+        charging.begin(begin, seconds)
+        return work
+
+    def _flow(self) -> Flow:
+        """What the source gave, and what leaked; the first voltage is raised before anything moves."""
+        attraction, new = self.model.attraction, self.new
+        if attraction is None or attraction.charging is None:
+            return Flow(0.0, 0.0)
+        charging = attraction.charging
+        position = self.model.equilibrium.interface.resting(new)
+        flow = charging.flow(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges))
+        if self.old.voltage == charging.old.voltage:
+            return flow
+        return Flow(flow.source_work + charging.field_energy(charging.old), flow.leakage)
+
+    def _lengthening(self) -> float:
+        """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
+        attraction = self.model.attraction
+        if attraction is None or attraction.charging is None:
+            return 0.0
+        charging = attraction.charging
+        begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
+        grown = attraction.pad.length(end[:, 0]) - attraction.pad.length(begin[:, 0])
+        pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
+        work = 0.0
+        for way, share in zip(WAY, SHARE, strict=True):
+            position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
+            carried = charging.carried(attraction.pad.length(position[:, 0]))
+            at = attraction.charged(position, charging.old.voltage, pressing, carried)
+            work += share * float(charging.energy_density(at) @ grown)
+        return work
+
+    def _pulls(self, along: Floats, ways: Floats, voltages: tuple[float, float]) -> Floats:
         """Attraction times the way `along` (P, dim) at the parts `ways` (w,) of the straight way,
         the squared voltage growing evenly: (w,) in N mm per mm of depth.
         """
         attraction, old, new = self.model.attraction, self.old, self.new
         assert attraction is not None
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
-        volts = np.sqrt((1.0 - ways) * old.voltage**2 + ways * new.voltage**2)
+        volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
+        if voltages[0] == voltages[1]:
+            volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
         forces = attraction.forces_along(places, volts, old.touching, pressing)

@@ -61,7 +61,9 @@ class Anderson:
         self._changes = [*self._changes, (step, image)][-ANDERSON_DEPTH:]
         kept = len(self._changes)
         products = np.empty((kept, kept))
-        products[:-1, :-1] = self._products[len(self._products) + 1 - kept :, len(self._products) + 1 - kept :]
+        products[:-1, :-1] = self._products[
+            len(self._products) + 1 - kept :, len(self._products) + 1 - kept :
+        ]
         products[-1] = products[:, -1] = [step @ change for change, _ in self._changes]
         self._products = products
 

@@ -37,7 +37,7 @@ from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Target, sticks
 from evfem.solver.interface import Interface
-from evfem.solver.state import Balance, Folded, Limits, Record, Reusable, State, StepFailed
+from evfem.solver.state import NO_CHARGES, Balance, Folded, Limits, Record, Reusable, State, StepFailed
 from evfem.solver.strategy import Strategy
 
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
@@ -144,6 +144,7 @@ class Statics:
             reaction=np.zeros(dim),
             velocity=still,
             last_increment=still,
+            charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
         )
         attraction = self.attraction_at(state, state, voltage)
         return replace(state, attraction=attraction, reaction=-attraction.sum(axis=0))

@@ -192,7 +192,7 @@ class Linearisation:
 
     def negative_stiffness(self, state: State) -> Floats:
         """How fast the attraction of every pad node weakens with its gap (P,) in N/mm per mm."""
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
@@ -201,7 +201,7 @@ class Linearisation:
         """What the attraction of every pad node gains when its gap closes (P,) in N/mm, at no
         contact force.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
         pressing = state.contact_force[:, 0]
@@ -218,7 +218,12 @@ class Linearisation:
         find no equilibrium: it is cut to `STABLE`.
         """
         attraction = self.attraction
-        if attraction is None or attraction.roughness is None or state.voltage == 0.0 or self.frozen:
+        if (
+            attraction is None
+            or attraction.roughness is None
+            or self.frozen
+            or not attraction.acts(state.voltage)
+        ):
             return None
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         unpressed, pressed = (
@@ -231,9 +236,9 @@ class Linearisation:
         """The attraction's stiffness on the candidates but for the weakening with a node's own
         gap, which belongs to the contact problem: what is left are changes of tributary lengths.
         None without attraction, or where they are faint: a symmetric compliance takes a third of
-        the time.
+        the time. None with charges too, so that a factorisation does not depend on the step.
         """
-        if self.attraction is None or state.voltage == 0.0 or self.frozen:
+        if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
             return None
         position, c = self.interface.resting(state), self.candidates
         pressing = state.contact_force[:, 0]

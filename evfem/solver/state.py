@@ -13,6 +13,8 @@ from evfem.solver.strategy import Strategy
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
+#: the charges where the voltage is not resolved in time
+NO_CHARGES: Floats = np.zeros((2, 0))
 
 
 class StepFailed(ArithmeticError):
@@ -42,7 +44,8 @@ class State:
     the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
     mm/s, and the increment of the displacements in the step that led here (N, 2). While an
     equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
-    too (`evfem.solver.pressure`).
+    too (`evfem.solver.pressure`). Under a voltage resolved in time each pad node has two charges
+    over eps_0 (2, P) in V/mm (`evfem.contact.charging`).
     """
 
     u: Floats
@@ -55,6 +58,7 @@ class State:
     velocity: Floats
     last_increment: Floats
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    charges: Floats = field(default_factory=lambda: NO_CHARGES)
 
     @property
     def touching(self) -> Any:

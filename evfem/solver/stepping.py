@@ -21,7 +21,7 @@ settle, the part is solved all at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -104,9 +104,19 @@ class Stepper:
         return rest
 
     def solve(self, state: State, target: Target) -> State:
-        """One equilibrium with the coupling asked for: all at once, or mechanics under attraction
-        found beforehand.
-        """
+        """One equilibrium with the coupling asked for; where charges move, they follow."""
+        attraction, interface = self.equilibrium.attraction, self.equilibrium.interface
+        if attraction is None or attraction.charging is None:
+            return self._coupled(state, target)
+        pressing = state.contact_force[:, 0]
+        old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
+        attraction.charging.begin(old, target.duration)
+        new = self._coupled(state, target)
+        end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
+        return replace(new, charges=end.charges)
+
+    def _coupled(self, state: State, target: Target) -> State:
+        """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:
             return equilibrium.step(state, target)

@@ -12,11 +12,10 @@ deformation gradient, d = 3, or its part in the plane of plane strain (F33 = 1),
     split_tangent(F, theta)     A = dS/dF (d, d, d, d, ...), c = dS/dtheta (d, d, ...), k = dq/dtheta (...)
     split_sigma_zz(F, theta)    Cauchy stress out of the plane
 
-Where theta = ln det F, S + q F^-T is P, or its part in the plane. The arrays of a tangent that do not
-depend on the state are read-only views without memory of their own. Laws that work with the
-small-strain volume change have `volume_measure = "trace"`: there theta stands for tr(F) - d,
-and S + q I is the stress. All functions accept complex F and theta (for
-`tensor.complex_step`).
+Where theta = ln det F, S + q F^-T is P, or its part in the plane. The arrays of a tangent that do
+not depend on the state are read-only views without memory of their own. Laws that work with the
+small-strain volume change have `volume_measure = "trace"`: there theta stands for tr(F) - d, and S
++ q I is the stress. All functions accept complex F and theta (for `tensor.complex_step`).
 """
 
 from __future__ import annotations

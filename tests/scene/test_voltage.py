@@ -88,7 +88,7 @@ def test_voltage_files_over_the_position_are_read_as_ever(tmp_path):
     ("signal", "old", "new", "key"),
     [
         (SINE, 'kind = "sine"', "", "electrostatics.signal.kind"),
-        (SINE, 'kind = "sine"', 'kind = "square"', "electrostatics.signal.kind"),
+        (SINE, 'kind = "sine"', 'kind = "triangle"', "electrostatics.signal.kind"),
         (SINE, "frequency = 50", "frequency = 0.0", "electrostatics.signal.frequency"),
         (SINE, "frequency = 50", "", "electrostatics.signal.frequency"),
         (SINE, "bias = 20.0", "offset = 20.0", "electrostatics.signal.offset"),

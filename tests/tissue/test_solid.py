@@ -1,4 +1,6 @@
-"""Hexahedra: patch test, derivatives, rigid motion, convergence, and plane strain as a special case."""
+"""Hexahedra: patch test, derivatives, rigid motion, convergence, and plane strain as a special
+case.
+"""
 
 from functools import cache
 
@@ -264,8 +266,8 @@ def test_strip_between_fixed_sides_is_plane_strain(element):
 
 @pytest.mark.parametrize("law", ["neo_hookean", "yeoh", "ogden"])
 def test_laws_of_the_plane_are_those_of_space_in_plane_strain(law):
-    """W, S and q of F in the plane are those of the same F embedded (laws of a user, whose stress is
-    split by the dimension, are so only where theta = ln J)."""
+    """W, S and q of F in the plane are those of the same F embedded (laws of a user, whose stress
+    is split by the dimension, are so only where theta = ln J)."""
     flat = np.array([[1.1, 0.2], [-0.1, 0.9]])
     theta = np.array(0.03)
     W, (S, q) = LAWS[law].split_energy(flat, theta), LAWS[law].split_stress(flat, theta)

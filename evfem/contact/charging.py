@@ -1,0 +1,148 @@
+"""Charges of the pad nodes under a voltage that is resolved in time: internal variables of the
+attraction.
+
+Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.charges`) on its
+tributary length A. A step goes in two parts: the pad moves with the charges and the voltage that it
+had, the charge of each node r A staying what it is while A changes; then, in its new place, charge
+flows for the seconds of the step while the voltage goes straight to its new value. So the charges
+at the end are a function of gap and voltage, the force law sees their effective voltage, and contact
+and Newton stay as they are. Nothing is committed before a step is accepted.
+
+The balance of a step, each term from its own integral::
+
+    source work = change of the field energy + leakage + work of the attraction while the pad moves
+                  + work of the field on the tributary lengths, which a vertical traction leaves out
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.laws import eps_0
+
+#: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
+#: charge on; Gauss points of each
+LONGER, POINTS = 3.0, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Charged:
+    """An electric state of the pad: charges over eps_0 (2, P) in V/mm, voltage (V), gaps (P,) and
+    tributary lengths (P,) in mm.
+    """
+
+    charges: Floats
+    voltage: float
+    gap: Floats
+    length: Floats
+
+
+@dataclass(frozen=True)
+class Flow:
+    """Energies of one step (N mm per mm of depth): what the source gave, and what charge that
+    crossed the layers dissipated.
+    """
+
+    source_work: float
+    leakage: float
+
+
+class Charging:
+    """The charges of a step that begins at `begin` and takes `seconds`."""
+
+    def __init__(self, stack: Sandwich, nodes: int) -> None:
+        self.stack = stack
+        self.nodes = nodes
+        none = np.zeros(nodes)
+        self.begin(Charged(self.none, 0.0, none, none), 0.0)
+
+    @property
+    def none(self) -> Floats:
+        """No charge anywhere (2, P)."""
+        return np.zeros((2, self.nodes))
+
+    def begin(self, old: Charged, seconds: float) -> None:
+        """A step begins at the state `old`."""
+        self.old, self.seconds = old, seconds
+
+    def carried(self, length: Floats) -> Floats:
+        """The charges (2, P) of the beginning on other tributary lengths (P,)."""
+        return np.asarray(self.old.charges * np.where(length > 0.0, self.old.length / _positive(length), 1.0))
+
+    def after(self, gap: Any, voltage: float, length: Floats) -> Any:
+        """The charges (2, P) at the end of the step, in the new place under the new voltage."""
+        before = self.old.voltage if self.seconds > 0.0 else voltage
+        return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
+
+    def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
+        """The voltage (P,) that the force law sees at the end of the step."""
+        if self.seconds == 0.0:
+            return self.stack.effective(voltage, self.carried(length))
+        return self.stack.effective(voltage, self.after(gap, voltage, length))
+
+    def energy_density(self, at: Charged) -> Floats:
+        """Energy of the field in skin, gap and insulator of every node (P,), N mm per mm^2.
+
+        It is also what the field would do as work, with given charges of the nodes and a given
+        voltage, per mm that a node's tributary length grows.
+        """
+        fields = self.stack.fields(at.gap, at.voltage, at.charges)
+        squares = (s * np.asarray(D) ** 2 for s, D in zip(self._shares(at.gap), fields, strict=True))
+        return np.asarray(0.5 * eps_0 * sum(squares))
+
+    def field_energy(self, at: Charged) -> float:
+        """Energy of the field, N mm per mm of depth."""
+        return float(np.sum(at.length * self.energy_density(at)))
+
+    def flow(self, new: Charged) -> Flow:
+        """What the source gave and what leaked in the step that ended at `new`."""
+        old, stack, seconds = self.old, self.stack, self.seconds
+        start = self.carried(new.length)
+        before, moved = (
+            stack.fields(gap, old.voltage, charges)[0]
+            for gap, charges in ((old.gap, old.charges), (new.gap, start))
+        )
+        source = old.voltage * np.sum(new.length * moved - old.length * before)
+        leaked = 0.0
+        if seconds == 0.0:
+            jumped = stack.fields(new.gap, new.voltage, start)[0]
+            source += 0.5 * (old.voltage + new.voltage) * np.sum(new.length * (jumped - moved))
+            return Flow(float(eps_0 * source), 0.0)
+        time, weight = self._times()
+        volts = old.voltage + (new.voltage - old.voltage) * (time / seconds)
+        charges = stack.after(new.gap, start[:, None], old.voltage, volts[:, None], time[:, None])
+        fields = stack.fields(new.gap, volts[:, None], charges)
+        for s, rate, D in zip(self._shares(new.gap), stack.rates, fields, strict=True):
+            leaked += float(np.sum(weight @ (rate * s * D**2 * new.length)))
+        # by parts: the work of the displacement current is U D at the ends less the mean of D while U rises
+        last = stack.fields(new.gap, new.voltage, new.charges)[0]
+        rise = (new.voltage - old.voltage) / seconds
+        source += np.sum(new.length * (new.voltage * last - old.voltage * moved))
+        source += np.sum(weight @ ((stack.rates[0] * volts[:, None] - rise) * fields[0] * new.length))
+        return Flow(float(eps_0 * source), float(eps_0 * leaked))
+
+    def _shares(self, gap: Floats) -> tuple[Any, Any, Any]:
+        """Reduced thicknesses (mm) of the three layers."""
+        return self.stack.skin, gap / self.stack.gap_eps_r, self.stack.insulator
+
+    def _times(self) -> tuple[Floats, Floats]:
+        """Places (s) and weights (s) of the step, dense where the fastest charge moves."""
+        fastest = sum(float(np.max(rate)) for rate in self.stack.rates)
+        ends, end = [0.0], min(1.0 / fastest, self.seconds) if fastest > 0.0 else self.seconds
+        while end < self.seconds:
+            ends.append(end)
+            end *= LONGER
+        ends.append(self.seconds)
+        x, w = np.polynomial.legendre.leggauss(POINTS)
+        length = np.diff(ends)[:, None]
+        at = np.array(ends[:-1])[:, None] + length * (0.5 + 0.5 * x)
+        return at.ravel(), (0.5 * length * w).ravel()
+
+
+def _positive(length: Floats) -> Floats:
+    return np.where(length > 0.0, length, 1.0)

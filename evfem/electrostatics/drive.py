@@ -1,0 +1,153 @@
+r"""How a scene's voltage alternates, what conducts, and what a force law sees of it.
+
+A voltage is the effective one (root mean square). Under a sine the mean attraction over the cycle
+is a law of the complex length z (`evfem.electrostatics.laws`). A square wave of the same effective
+voltage U is the sum of its odd harmonics, :math:`U_n^2 = 8 U^2 / (\pi n)^2`, whose mean pressures
+add up:
+
+.. math:: \bar p = \sum_{n = 1, 3, ...} p(g, U_n, z(n \omega)) .
+
+The first harmonics count one by one, those above in groups at their mean frequency, as the
+pressure hardly changes from one to the next.
+
+Resolved in time, the voltage of the moment charges the skin, the gap leaks
+(`evfem.electrostatics.charges`), and the attraction swings with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import (
+    Values,
+    Within,
+    check_fields,
+    number,
+    one_of,
+    plain,
+    real,
+    set_frozen,
+    yes_or_no,
+)
+from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric
+from evfem.electrostatics.laws import Layer, Layers, traction_derivative
+from evfem.electrostatics.timesignals import FASTEST, Sine, Square
+from evfem.protocols import ForceLaw, TimeSignal
+
+WAVEFORMS = ("sine", "square")
+#: peak over effective voltage
+CREST = {"sine": float(np.sqrt(2.0)), "square": 1.0}
+#: odd harmonics of a square wave that count one by one, groups of those above, and the highest one
+SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
+
+_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
+_CONDUCTIVITY = number("a conductivity in S/m, not negative", Within(0.0))
+
+
+@dataclass(frozen=True)
+class Drive:
+    """An alternating voltage and what conducts, for `Scene(drive=...)`; the scene's `voltage` is
+    its effective value.
+
+    `frequency` in Hz; None where the voltage is a signal over time that has its own, or a direct
+    voltage that is resolved in time. `waveform` sine or square. `skin`: a name in
+    `evfem.electrostatics.SKINS`, a `Dielectric`, a table or a number; None is the finger's own
+    permittivity. `gap_conductivity` in S/m. Without `resolved` the attraction is its mean over the
+    cycle, which is right where the finger is too slow to follow twice the frequency; resolved, the
+    steps follow the voltage of the moment, and charges move.
+
+    >>> Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8).peak(70.7107)
+    100.00003...
+    """
+
+    frequency: float | None = field(default=None, metadata=_FREQUENCY)
+    waveform: str = field(default="sine", metadata=one_of(*WAVEFORMS))
+    skin: Any = None
+    gap_conductivity: float = field(default=0.0, metadata=_CONDUCTIVITY)
+    resolved: bool = field(default=False, metadata=yes_or_no())
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if self.skin is not None and not (isinstance(self.skin, str) and self.skin in SKINS):
+            skin = dielectric(self.skin)
+            if not isinstance(skin, Permittivity):
+                allowed = "a name of a skin, a Dielectric, a DielectricTable or a permittivity of at least 1"
+                skin = real("skin", skin, allowed, Within(1.0))
+            set_frozen(self, skin=skin)
+
+    def peak(self, effective: Values) -> Values:
+        """Peak (V) of the waveform with this effective voltage (V)."""
+        return plain(CREST[self.waveform] * np.asarray(effective))
+
+    def signal(self, voltage: float) -> TimeSignal | float:
+        """The voltage of the moment with this effective value (V), where it is resolved: a signal,
+        or a direct voltage without a frequency.
+        """
+        if self.frequency is None:
+            return voltage
+        return (Sine if self.waveform == "sine" else Square)(self.frequency, abs(self.peak(voltage)))
+
+    def skin_layer(self, thickness: Values, eps_r: float) -> Layer:
+        """The stratum corneum, `thickness` in mm, of the drive's skin or of the finger's `eps_r`."""
+        return Layer(thickness, eps_r if self.skin is None else dielectric(self.skin))
+
+
+@dataclass(frozen=True)
+class CycleMean:
+    """A force law over the cycle of a voltage with several harmonics: the sum of its tractions
+    times `weights` (H,), over layers whose first axis is that of the harmonics.
+    """
+
+    law: ForceLaw
+    weights: Any
+
+    def traction(self, gap: Values, voltage: Values, layers: Any) -> Values:
+        """Mean attraction in MPa."""
+        return self._sum(self.law.traction(gap, voltage, layers))
+
+    def traction_derivative(self, gap: Values, voltage: Values, layers: Any) -> Values:
+        """Its derivative by the gap in MPa/mm."""
+        return self._sum(traction_derivative(self.law, gap, voltage, layers))
+
+    def potential(self, gap: Values, voltage: Values, layers: Any) -> Values:
+        """Its potential per area in N/mm."""
+        of: Any = self.law
+        return self._sum(of.potential(gap, voltage, layers))
+
+    def _sum(self, values: Any) -> Values:
+        return plain(np.tensordot(self.weights, np.asarray(values), 1))
+
+
+def harmonics() -> tuple[Floats, Floats]:
+    """Orders and weights of the harmonics of a square wave, the sum of the weights being 1.
+
+    >>> order, weight = harmonics()
+    >>> order[:3].tolist(), weight[:2].round(4).tolist(), round(weight.sum(), 12)
+    ([1.0, 3.0, 5.0], [0.8106, 0.0901], 1.0)
+    """
+    order = np.arange(1.0, HIGHEST, 2.0)
+    weight = 8.0 / (np.pi * order) ** 2
+    weight[-1] += 1.0 - weight.sum()
+    ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
+    begins = np.concatenate([np.arange(SINGLE), ends])
+    sums = np.add.reduceat(weight, begins)
+    return np.exp(np.add.reduceat(weight * np.log(order), begins) / sums), sums
+
+
+def mean_law(
+    law: ForceLaw, drive: Drive, frequency: float | None, solids: tuple[Layer, ...]
+) -> tuple[Any, Layers]:
+    """The law and the layers that give the mean attraction over the cycle at `frequency` (Hz)."""
+    given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": getattr(law, "gap_eps_r", 1.0)}
+    if frequency is None or drive.waveform == "sine":
+        return law, Layers.of(*solids, frequency=frequency, **given)
+    order, weight = harmonics()
+    found = [Layers.of(*solids, frequency=frequency * n, **given) for n in order]
+    reduced, loss = (
+        np.stack([np.asarray(getattr(one, name)) for one in found]) for name in ("reduced", "loss")
+    )
+    return CycleMean(law, weight), Layers(reduced, found[0].thickness, loss)

@@ -1,0 +1,256 @@
+"""Outlines of grounded bodies above a slab: polylines with vertical walls, their ends and corners.
+
+An outline is what its points say: straight between them, vertical where an x is repeated. One that
+is periodic repeats from its last x on; where its two heights differ there is a wall. One that is
+not ends in the open air: the body is what lies between the outline and the straight line between
+its ends (stretched over what rises above it), so a flat outline is a thin sheet and one with end
+walls a bar. Where both ends rise more steeply than `FLANK`, without being walls, they are flanks of
+a body that is symmetric about that line: the lower half of a cylinder stands for the cylinder.
+
+At a corner whose air angle is w the potential grows like r^(pi/w), so the field is singular where
+w > pi; `corner_sizes` says how small cells must be there.
+
+The field's mesh has rows that follow the outline. They are pinned at walls: each wall parts a low
+run (`rank` 1, one block of rows) from a high one (`rank` 2, two blocks, the lower of which goes on
+through the wall). A run that is low at one end and high at the other is split in the middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Values, finite
+from evfem.errors import InputError
+
+#: ends of an outline steeper than this, |n_y| < 0.3, are flanks of a body that goes on above
+FLANK = 0.3
+ONE_WAY = "walls that go one way"
+#: heights closer than this share of the largest length are one height
+SAME = 1e-12
+#: share of the energy around a corner that its smallest cells may miss
+CORNER = 1e-7
+#: the same of what a corner close to the slab adds, whose own field ends at the gap
+TIP = 1e-4
+
+
+@dataclass(frozen=True)
+class Run:
+    """A piece of an outline between two walls: points `x`, `height` (mm); of rank 2 with the
+    `shares` of its height, left and right, at which its lower block ends.
+    """
+
+    x: Floats
+    height: Floats
+    rank: int = 1
+    shares: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A checked outline: points `x`, `height` in mm without repetitions but those of walls.
+
+    >>> Outline.of([0.0, 0.3, 0.3, 0.5], [0.05, 0.05, 2.0, 2.0]).runs()[1].rank
+    2
+    """
+
+    x: Floats
+    height: Floats
+    periodic: bool
+
+    @classmethod
+    def of(cls, x: Values, height: Values, periodic: bool = True) -> Outline:
+        """The outline of these points; InputError for what is none."""
+        x = np.atleast_1d(np.asarray(finite("x", x, "places in mm, finite numbers"), dtype=float))
+        height = np.atleast_1d(np.asarray(finite("height", height, "heights in mm"), dtype=float))
+        if x.ndim != 1 or x.size < 2 or height.shape != x.shape:
+            given = f"shapes {x.shape} and {height.shape}"
+            raise InputError("x, height", given, "two rows of numbers, of the same length, at least 2")
+        if np.any(np.diff(x) < 0.0) or x[-1] <= x[0]:
+            raise InputError("x", "places that go back", "places that do not decrease; equal ones are a wall")
+        if height.min() < 0.0:
+            raise InputError("height", float(height.min()), "heights in mm above the slab, not negative")
+        if periodic:
+            x, height = _without_end_walls(x, height)
+        keep = _without_repetitions(x, height)
+        outline = cls(x[keep], height[keep], bool(periodic))
+        if not periodic and any(top < end for top, end in zip(outline.tops, outline.feet, strict=True)):
+            raise InputError("height", "a wall at an end that hangs down", "end walls that rise")
+        return outline
+
+    @property
+    def length(self) -> float:
+        """From the first to the last x: the period of a periodic outline."""
+        return float(self.x[-1] - self.x[0])
+
+    @property
+    def tops(self) -> tuple[float, float]:
+        """Heights of the two ends, above the walls that may stand there."""
+        return float(self.height[0]), float(self.height[-1])
+
+    @property
+    def feet(self) -> tuple[float, float]:
+        """Heights of the two ends, below the walls that may stand there."""
+        walls = self.x[1] == self.x[0], self.x[-2] == self.x[-1]
+        return float(self.height[int(walls[0])]), float(self.height[-1 - int(walls[1])])
+
+    @property
+    def is_flanked(self) -> bool:
+        """Whether both ends are steep: flanks of a body that goes on above."""
+        dx, dh = np.diff(self.x)[[0, -1]], np.diff(self.height)[[0, -1]] * [-1.0, 1.0]
+        return bool(np.all(dh > 0.0) and np.all(dx > 0.0) and np.all(dx < FLANK * np.hypot(dx, dh)))
+
+    def lid(self, x: Floats) -> Floats:
+        """Upper side (mm) of a body that ends in the air: stretched over it, or its mirror image."""
+        side = -1.0 if self.is_flanked else 1.0
+        hull = side * np.interp(x, *_stretched(self.x, side * self.height))
+        chord = np.interp(x, self.x[[0, -1]], self.height[[0, -1]])
+        return np.asarray(2.0 * chord - hull if self.is_flanked else hull)
+
+    def lifted(self, lowest: float) -> Outline:
+        """The same outline, nowhere lower than `lowest`, with points where it leaves that height."""
+        h, dh = self.height[:-1], np.diff(self.height)
+        crossing = (h - lowest) * (self.height[1:] - lowest) < 0.0
+        at = np.flatnonzero(crossing & (np.diff(self.x) > 0.0))
+        new = self.x[at] + (lowest - h[at]) / dh[at] * (self.x[at + 1] - self.x[at])
+        x, height = np.insert(self.x, at + 1, new), np.insert(self.height, at + 1, lowest)
+        return Outline(x, np.maximum(height, lowest), self.periodic)
+
+    def pieces(self) -> list[Run]:
+        """The outline cut at its walls; walls at the two ends belong to no piece."""
+        walls = np.flatnonzero(np.diff(self.x) == 0.0) + 1
+        cuts = [0, *walls, self.x.size]
+        pieces = [Run(self.x[a:b], self.height[a:b]) for a, b in pairwise(cuts)]
+        return [piece for piece in pieces if piece.x.size > 1]
+
+    def runs(self) -> list[Run]:
+        """Pieces with their ranks, none of them low at one end and high at the other."""
+        pieces = self.pieces()
+        ends = [(piece.height[0], piece.height[-1]) for piece in pieces]
+        left = [ends[i - 1][1] for i in range(len(ends))]
+        right = [ends[(i + 1) % len(ends)][0] for i in range(len(ends))]
+        if not self.periodic:
+            left[0] = right[-1] = np.inf
+        near = SAME * max(self.length, self.height.max())
+        runs = []
+        for piece, low, high in zip(pieces, left, right, strict=True):
+            shares = tuple(
+                float(other / own) if other < own - near else None
+                for other, own in zip((low, high), (piece.height[0], piece.height[-1]), strict=True)
+            )
+            runs += _ranked(piece, *shares)
+        return runs
+
+
+def _stretched(x: Floats, height: Floats) -> tuple[Floats, Floats]:
+    """Corners of the line stretched over points in ascending order of `x`."""
+    corners: list[int] = []
+    for k in range(x.size):
+        while len(corners) > 1:
+            a, b = corners[-2:]
+            if (x[b] - x[a]) * (height[k] - height[a]) < (x[k] - x[a]) * (height[b] - height[a]):
+                break
+            corners.pop()
+        if corners and x[k] == x[corners[-1]] and height[k] <= height[corners[-1]]:
+            continue
+        if len(corners) == 1 and x[k] == x[corners[0]]:
+            corners.pop()
+        corners.append(k)
+    return x[corners], height[corners]
+
+
+def _without_end_walls(x: Floats, height: Floats) -> tuple[Floats, Floats]:
+    """A period whose wall, if there is one, is between its last and its first point."""
+    first, last = int(np.searchsorted(x, x[0], "right")) - 1, int(np.searchsorted(x, x[-1]))
+    seam = np.diff(np.concatenate([height[last:], height[: first + 1]]))
+    if np.any(seam > 0.0) and np.any(seam < 0.0):
+        raise InputError("height", "a wall that goes up and down where the period ends", ONE_WAY)
+    return x[first : last + 1], height[first : last + 1]
+
+
+def _without_repetitions(x: Floats, height: Floats) -> Floats:
+    """Which points to keep: two of each x at most, and not the same one twice."""
+    same = np.diff(x) == 0.0
+    rises = np.sign(np.diff(height)) * same
+    inner = same[:-1] & same[1:]
+    if np.any(inner & (rises[:-1] * rises[1:] < 0)):
+        raise InputError("height", "a wall that goes up and down at one x", ONE_WAY)
+    keep = np.ones(x.size, dtype=bool)
+    keep[1:-1] = ~inner
+    near = SAME * max(float(x[-1] - x[0]), float(height.max()))
+    twice = np.append(same & (np.abs(np.diff(height)) <= near), False)
+    return np.asarray(keep & ~twice)
+
+
+def _ranked(piece: Run, left: float | None, right: float | None) -> list[Run]:
+    """The piece with its rank; `left` and `right` are the shares of its height where lower
+    neighbours end.
+    """
+    if left is None and right is None:
+        return [piece]
+    if left is not None and right is not None:
+        return [replace(piece, rank=2, shares=(left, right))]
+    middle = 0.5 * (piece.x[0] + piece.x[-1])
+    nearest = float(piece.x[np.argmin(np.abs(piece.x - middle))])
+    if abs(nearest - middle) < 0.1 * (piece.x[-1] - piece.x[0]):
+        middle = nearest
+    height = float(np.interp(middle, piece.x, piece.height))
+    before, after = piece.x < middle, piece.x > middle
+    first = Run(np.append(piece.x[before], middle), np.append(piece.height[before], height))
+    last = Run(np.insert(piece.x[after], 0, middle), np.insert(piece.height[after], 0, height))
+    if left is not None:
+        return [replace(first, rank=2, shares=(left, 1.0)), last]
+    assert right is not None
+    return [first, replace(last, rank=2, shares=(1.0, right))]
+
+
+def corner_sizes(outline: Outline, runs: list[Run], reduced: float) -> list[Floats]:
+    """Sizes (mm) of the smallest cells at the points of each run; infinite where nothing turns.
+
+    `reduced` is the slab's thickness over its permittivity, which adds to the gap.
+    """
+    x, h = (np.concatenate([getattr(run, name) for run in runs]) for name in ("x", "height"))
+    if outline.periodic:
+        before, after = (x[-1] - outline.length, h[-1]), (x[0] + outline.length, h[0])
+    else:
+        before, after = _beyond(outline, 0), _beyond(outline, -1)
+    along = np.diff(np.concatenate([[before[0]], x, [after[0]]])) + 1j * np.diff(
+        np.concatenate([[before[1]], h, [after[1]]])
+    )
+    into, out = along[:-1].copy(), along[1:].copy()
+    still = SAME * max(outline.length, float(h.max()))
+    for k in range(x.size):  # a run's end may repeat the point of its neighbour
+        if abs(into[k]) <= still:
+            into[k] = into[k - 1]
+        if abs(out[-1 - k]) <= still:
+            out[-1 - k] = out[-k]
+    angle = np.pi + np.angle(out / into) if outline.periodic else np.pi + _turn(out / into)
+    power = np.pi / np.maximum(angle, 1e-3)
+    with np.errstate(divide="ignore", over="ignore"):
+        wide, close = ((share / (power - 1.0) ** 2) ** (0.5 / power) for share in (CORNER, TIP))
+        sizes = np.maximum(np.minimum((h + reduced) * wide, h * close), still)
+    return np.split(sizes, np.cumsum([run.x.size for run in runs])[:-1])
+
+
+def right_angle(distance: float) -> float:
+    """Size (mm) of the smallest cells at the edge of a block, `distance` from the electrode."""
+    return float(distance * (9.0 * CORNER) ** 0.75)
+
+
+def _turn(ratio: Any) -> Floats:
+    """Angles turned, where a full turn back is the edge of a sheet."""
+    turned = np.angle(ratio)
+    return np.where(turned < -np.pi + 1e-9, turned + 2.0 * np.pi, turned)
+
+
+def _beyond(outline: Outline, end: int) -> tuple[float, float]:
+    """The body's next point beyond an end: on its wall or its lid."""
+    inner = 1 if end == 0 else -2
+    if outline.x[inner] == outline.x[end]:
+        return float(outline.x[end]), float(outline.height[end])
+    x = np.asarray(outline.x[inner])
+    return float(x), float(outline.lid(x))

@@ -1,0 +1,195 @@
+r"""Poisson's problem between a grounded body and an electrode under a slab, and forces by virtual work.
+
+.. math:: \int \varepsilon\, \nabla\varphi\cdot\nabla v = 0, \qquad
+          \varphi = 0 \text{ on the body}, \quad \varphi = U \text{ on the electrode},
+
+with elements of order `ORDER` on the mapped quadrilaterals of `evfem.electrostatics.fieldmesh`.
+The co-energy at unit voltage is half the capacitance,
+
+.. math:: C = \varepsilon_0 \int \varepsilon\, |\nabla\varphi|^2 ,
+
+from above, as the discrete potential is one of those over which the exact one is the minimum. The
+force is its exact derivative at fixed potentials when the mesh moves with velocity V (Henrotte and
+Hameyer 2004, doi:10.1016/j.cam.2003.06.012),
+
+.. math:: F = -\int T : \nabla V, \qquad T = \varepsilon_0 \varepsilon\,
+          (E \otimes E - \tfrac12 |E|^2 I), \qquad E = -\nabla\varphi,
+
+never an integral of surface values, which corners would spoil.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+
+from evfem.common.arrays import Floats, Ints
+from evfem.electrostatics.fieldmesh import FieldMesh
+from evfem.electrostatics.laws import eps_0
+from evfem.tensor import ddot, dot, identity
+
+#: polynomial order of the elements
+ORDER = 3
+
+
+def poisson(u: Any, v: Any, w: Any) -> Any:
+    """eps grad u . grad v."""
+    return w.eps * dot(u.grad, v.grad)
+
+
+def virtual_work(w: Any) -> Any:
+    """-T : grad V of the potential `w.phi` and the velocity of the mesh `w.x_velocity`, `w.y_velocity`."""
+    E = -w.phi.grad
+    T = w.eps * (E[:, None] * E[None] - 0.5 * dot(E, E) * identity(2, E.ndim - 1))
+    return -ddot(T, np.stack([w.x_velocity.grad, w.y_velocity.grad]))
+
+
+@dataclass(frozen=True, eq=False)
+class Potential:
+    """A discrete potential: values `phi` of the unknowns of `space`, 1 on the electrode."""
+
+    space: Space
+    phi: Floats
+
+    @classmethod
+    def of(cls, space: Space) -> Potential:
+        """The solution of Poisson's problem."""
+        return cls(space, space.solve())
+
+    @property
+    def capacitance(self) -> float:
+        """Capacitance in F per m of depth, numerically N/V^2."""
+        return float(eps_0 * self.phi @ (self.space.stiffness @ self.phi))
+
+    def force(self, lift: Floats | None = None, direction: int = 1) -> float:
+        """Force in N/mm at 1 V along y (along x with `direction` 0) on what moves with `lift`: on the
+        body unless something else is said.
+        """
+        return self.space.force(self.phi, self.space.mesh.lift if lift is None else lift, direction)
+
+    def values(self, x: Floats, y: Floats) -> Floats:
+        """Potential (...) at places (...) in mm."""
+        return self._sampled(x, y, 0)
+
+    def gradients(self, x: Floats, y: Floats) -> Floats:
+        """Gradient (2, ...) at places (...) in mm; above the air's upper end, at that end."""
+        return self._sampled(x, y, 1)
+
+    def _sampled(self, x: Floats, y: Floats, order: int) -> Floats:
+        cells, local = self.space.mesh.located(x.ravel(), y.ravel())
+        basis = self.space.basis
+        total = 0.0
+        for k in range(basis.Nbfun):
+            shape = basis.elem.gbasis(basis.mapping, local[:, :, None], k, tind=cells)[0]
+            part = shape.grad if order else np.asarray(shape)
+            total = total + self.phi[basis.element_dofs[k, cells]] * part[..., 0]
+        return np.asarray(total).reshape(((2,) if order else ()) + x.shape)
+
+
+class Space:
+    """Elements on a field's mesh, assembled."""
+
+    def __init__(self, mesh: FieldMesh, eps_r: float, order: int = ORDER) -> None:
+        import skfem
+
+        self.mesh, self.order = mesh, order
+        grid = skfem.MeshQuad(mesh.points, mesh.cells, sort_t=False, validate=False)
+        element = skfem.ElementQuad2() if order == 2 else skfem.ElementQuadP(order)
+        rule = {"intorder": 2 * order}
+        self.basis = skfem.CellBasis(grid, element, **rule)
+        self.vertices = self.basis.with_element(skfem.ElementQuad1())
+        self.eps = np.repeat(1.0 + (eps_r - 1.0) * mesh.in_slab, self.basis.X.shape[1]).reshape(
+            -1, self.basis.X.shape[1]
+        )
+
+    @cached_property
+    def stiffness(self) -> Any:
+        """Matrix of `poisson`."""
+        import skfem
+
+        return skfem.BilinearForm(poisson).assemble(self.basis, eps=self.eps).tocsr()
+
+    def force(self, phi: Floats, lift: Floats, direction: int) -> float:
+        """`virtual_work` of the velocity `lift` of the vertices along an axis, in N/mm."""
+        import skfem
+
+        along, still = self.vertices.interpolate(lift), self.vertices.interpolate(0.0 * lift)
+        velocity = (along, still) if direction == 0 else (still, along)
+        values = {"phi": self.basis.interpolate(phi), "eps": self.eps}
+        return float(
+            eps_0
+            * skfem.Functional(virtual_work).assemble(
+                self.basis, **values, x_velocity=velocity[0], y_velocity=velocity[1]
+            )
+        )
+
+    def solve(self) -> Floats:
+        """Potential that is 0 on the body and 1 on the electrode."""
+        phi, fixed, master = self.conditions()
+        free = np.ones(phi.size, dtype=bool)
+        free[fixed] = False
+        free &= master == np.arange(phi.size)
+        number = np.full(phi.size, -1)
+        number[free] = np.arange(free.sum())
+        slave = np.flatnonzero(number[master] >= 0)
+        T = sparse.csr_matrix(
+            (np.ones(slave.size), (slave, number[master[slave]])), shape=(phi.size, int(free.sum()))
+        )
+        return np.asarray(phi + T @ solve_spd(T.T @ self.stiffness @ T, -(T.T @ (self.stiffness @ phi))))
+
+    def conditions(self) -> tuple[Floats, Ints, Ints]:
+        """Values of the potential on body and electrode, the unknowns held there, and for each unknown
+        its master: itself, or on the right end of a period its twin on the left.
+        """
+        mesh, grid = self.mesh, self.basis.mesh
+        facets = grid.boundary_facets()
+        row, line = mesh.row[grid.facets[:, facets]], mesh.line[grid.facets[:, facets]]
+        rows, lines = mesh.shape
+        left, right = (np.all(line == end, axis=0) for end in (0, lines))
+        electrode = np.all(row == 0, axis=0)
+        master = np.arange(self.basis.N)
+        if mesh.periodic:
+            twins = [facets[side][np.argsort(row[0, side])] for side in (left, right)]
+            pairs = min(twin.size for twin in twins)
+            self._join(master, *(twin[:pairs] for twin in twins))
+            paired = np.isin(facets, np.concatenate([twin[:pairs] for twin in twins]))
+        else:
+            electrode |= left | right | np.all(row == rows, axis=0)
+            paired = np.zeros(facets.size, dtype=bool)
+        phi = np.zeros(self.basis.N)
+        body = self._on(facets[~(electrode | paired)])
+        plate = self._on(facets[electrode])
+        phi[self.basis.nodal_dofs[0, np.unique(grid.facets[:, facets[electrode]])]] = 1.0
+        if self.order == 2:
+            phi[plate] = 1.0
+        return phi, np.union1d(body, plate), master
+
+    def _on(self, facets: Ints) -> Ints:
+        """Unknowns of facets."""
+        vertices = np.unique(self.basis.mesh.facets[:, facets])
+        return np.concatenate(
+            [self.basis.nodal_dofs[:, vertices].ravel(), self.basis.facet_dofs[:, facets].ravel()]
+        )
+
+    def _join(self, master: Ints, left: Ints, right: Ints) -> None:
+        """Tell the unknowns of the facets on the right end of a period their twins."""
+        basis, grid = self.basis, self.basis.mesh
+        master[basis.facet_dofs[:, right]] = basis.facet_dofs[:, left]
+        for k in (0, 1):
+            vertices = [np.sort(grid.facets[:, side], axis=0)[k] for side in (right, left)]
+            master[basis.nodal_dofs[0, vertices[0]]] = basis.nodal_dofs[0, vertices[1]]
+
+
+def solve_spd(matrix: Any, b: Floats) -> Floats:
+    """Solution of a symmetric positive definite system."""
+    from scipy.sparse.linalg import splu
+
+    factors = splu(
+        matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True, "Equil": False},
+    )  # fmt: skip
+    return np.asarray(factors.solve(b))

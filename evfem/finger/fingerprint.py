@@ -1,0 +1,149 @@
+r"""Ridges of a whole finger pad, as a depth below the crests over x and z (mm) of the smooth pad.
+
+A pattern is a phase :math:`\varphi(x, z)` that grows by one from crest to crest; the profile
+across a ridge is that of the plane's ridges (`evfem.finger.outline`). With the pitch p:
+
+=========  ================================================================================
+along      :math:`\varphi = x/p`: the ridges run along the finger, as in its cross-section
+across     :math:`\varphi = z/p`
+whorl      distance from the core over p: circles
+loop       distance from a ray over p, which begins at the core: ridges come in, turn
+           round it and leave where they came from
+arch       :math:`(z - h e^{-x^2/2w^2})/p`: ridges across that rise in the middle
+=========  ================================================================================
+
+The core is the lowest point of the pad; loop and arch have the sizes below (assumed). A measured
+print is a map of heights instead.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.tables import read_columns
+from evfem.errors import InputError
+from evfem.finger.outline import Ridges, quintic
+
+#: direction of a loop's ray from the bone's end, in degrees from -z towards +x
+LOOP_TILT = 20.0
+#: rise of an arch and its half width (mm)
+ARCH_RISE, ARCH_WIDTH = 1.5, 2.5
+#: part of the fine rectangle, from its middle, in which ridges have their full height
+FULL = 0.875
+#: most values of a measured print
+MOST = 4_000_000
+
+
+def _loop(x: Floats, z: Floats) -> Floats:
+    tilt = math.radians(LOOP_TILT)
+    along, aside = x * math.sin(tilt) - z * math.cos(tilt), x * math.cos(tilt) + z * math.sin(tilt)
+    return np.hypot(np.minimum(along, 0.0), aside)
+
+
+def _arch(x: Floats, z: Floats) -> Floats:
+    return z - ARCH_RISE * np.exp(-0.5 * (x / ARCH_WIDTH) ** 2)
+
+
+#: pattern -> length (mm) whose multiples of the pitch are the crests
+PATTERNS: Mapping[str, Callable[[Floats, Floats], Floats]] = {
+    "along": lambda x, z: x,
+    "across": lambda x, z: z,
+    "whorl": np.hypot,
+    "loop": _loop,
+    "arch": _arch,
+}
+
+
+@dataclass(frozen=True)
+class Print:
+    """Ridges of a pattern with the plane's profile."""
+
+    pattern: str
+    profile: Ridges
+
+    def depth(self, x: Floats, z: Floats) -> Floats:
+        """Depth (mm) below the crests at x, z."""
+        return self.profile.below(PATTERNS[self.pattern](x, z))
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap:
+    """A measured print: `height` (rows, columns) in mm at `z` (rows,) and `x` (columns,), both
+    increasing; linear in between, its edges go on beyond them.
+
+    >>> flat = HeightMap(np.array([0.0, 1.0]), np.array([0.0, 2.0]), np.array([[0.0, 0.1], [0.0, 0.1]]))
+    >>> flat.depth(np.array([0.5, 3.0]), np.array([1.0, 1.0])).tolist()
+    [0.05, 0.0]
+    """
+
+    x: Floats
+    z: Floats
+    height: Floats
+
+    def depth(self, x: Floats, z: Floats) -> Floats:
+        """Depth (mm) below the highest point at x, z."""
+        (i, s), (j, t) = _between(self.z, z), _between(self.x, x)
+        h = self.height
+        low, high = (h[k, j] * (1.0 - t) + h[k, j + 1] * t for k in (i, i + 1))
+        return np.asarray(float(h.max()) - (low * (1.0 - s) + high * s))
+
+
+def _between(grid: Floats, places: Floats) -> tuple[Any, Floats]:
+    """Interval of the grid and the part of it where the places lie."""
+    i = np.clip(np.searchsorted(grid, places, side="right") - 1, 0, len(grid) - 2)
+    return i, np.clip((places - grid[i]) / (grid[i + 1] - grid[i]), 0.0, 1.0)
+
+
+def faded(depth: Floats, share: Floats) -> Floats:
+    """Depths that come to nothing towards the edge of the fine rectangle; `share` (..., 2) is the
+    place between its middle, 0, and its edges, 1.
+    """
+    fade = quintic((1.0 - np.abs(share)) / (1.0 - FULL))
+    return np.asarray(depth * fade[..., 0] * fade[..., 1])
+
+
+def read(path: Path, pixel: float, height: float) -> HeightMap:
+    """The print in a csv file (header x,z,height: every pair of some x and z, in mm), or in a grey
+    image with `pixel` mm from point to point, black `height` mm below white.
+
+    An image shows the pad from below, tip up, its middle at x = z = 0. Raises `InputError`.
+    """
+    if path.suffix.lower() == ".csv":
+        return _from_rows(*read_columns(path, ["x", "z", "height"], "finger.ridges"))
+    return _from_image(path, pixel, height)
+
+
+def _from_rows(x: Floats, z: Floats, height: Floats) -> HeightMap:
+    xs, zs = np.unique(x), np.unique(z)
+    order = np.lexsort((x, z))
+    full = len(xs) * len(zs) == len(x) and min(len(xs), len(zs)) > 1
+    if not full or (x[order].reshape(len(zs), -1) != xs).any():
+        given = f"{len(x)} rows of {len(xs)} x and {len(zs)} z"
+        raise InputError("finger.ridges", given, "one row for every pair of at least two x and two z")
+    return HeightMap(xs, zs, height[order].reshape(len(zs), len(xs)))
+
+
+def _from_image(path: Path, pixel: float, height: float) -> HeightMap:
+    from PIL import Image, UnidentifiedImageError
+
+    allowed = f"a grey image of at most {MOST} points, or a csv file with the header x,z,height"
+    try:
+        with Image.open(path) as image:
+            if image.width * image.height > MOST or min(image.size) < 2:
+                raise InputError("finger.ridges", f"{path} with {image.width} x {image.height}", allowed)
+            grey = np.asarray(image.convert("F"), dtype=float)
+    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise InputError("finger.ridges", str(path), allowed) from error
+    span = float(np.ptp(grey))
+    if span == 0.0:
+        raise InputError("finger.ridges", f"{path} of one grey", allowed)
+    rows, columns = grey.shape
+    x, z = (pixel * (np.arange(n) - 0.5 * (n - 1)) for n in (columns, rows))
+    return HeightMap(x, z, height * (grey[::-1] - grey.min()) / span)

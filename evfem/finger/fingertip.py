@@ -1,0 +1,331 @@
+"""The whole finger pad in three dimensions, with its materials.
+
+The cross-section through its middle is that of `FingerPad` below the equator: the same outline,
+layers, ridges and moduli. What a cross-section does not say (length of finger and bone, posture,
+how the rim is held) are parameters; every length is in mm.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from evfem import data
+from evfem.common.checks import Within, choice, real, set_frozen
+from evfem.common.views import called, changed, short, table
+from evfem.errors import InputError, Mistakes, quoted
+from evfem.finger import fingerprint
+from evfem.finger.fingerpad import CLEARANCE, RANGES, STEEPEST, STEEPEST_FLAT, Electrical, all_materials
+from evfem.finger.fingerpad import participant_sizes as sizes_in_section
+from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
+from evfem.finger.layers import LAYERS, thickness_of
+from evfem.finger.outline import Ridges
+from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Solid, rows_that_merge
+from evfem.mesh.mesh import Mesh
+from evfem.mesh.quality import scaled_jacobian
+from evfem.protocols import Material
+
+#: parameters that only a whole pad has -> lowest and highest value, and its unit
+OWN_RANGES: Mapping[str, tuple[float, float, str]] = {
+    "length": (16.0, 32.0, " mm"),
+    "bone_length": (6.0, 28.0, " mm"),
+    "posture": (0.0, 45.0, " degrees"),
+    "ridge_pixel": (0.005, 0.5, " mm"),
+}
+#: those that it shares with `FingerPad`
+SHARED = (
+    *("width", "height", "bone_width", "bone_height", "bone_offset", "viscosity"),
+    *("ridge_height", "ridge_width", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove"),
+    *(layer.parameter for layer in LAYERS if layer.thickness),
+)
+TIP_RANGES: Mapping[str, tuple[float, float, str]] = {
+    **{name: RANGES[name] for name in SHARED},
+    **OWN_RANGES,
+}
+RIMS = ("fixed", "free")
+#: angle (degrees) at which the finger of Table 1 was held, whose length is seen from above
+HELD = 30.0
+#: smallest scaled Jacobian of a cell below measured ridges, and the largest part of the outline's
+#: smallest radius that the skin may have
+SMALLEST_SHAPE, THICKEST = 0.02, 0.7
+
+
+@dataclass(frozen=True)
+class TipDivisions:
+    """How finely to divide, in quadratic cells: columns of a smooth pad across and along, cells on
+    each side of the rectangle of `evfem.finger.solid`, columns per parallel and per curved ridge.
+    """
+
+    across: int
+    along: int
+    sides: int
+    per_ridge: float
+    per_curved_ridge: float
+
+
+#: resolution -> divisions; the rows of each layer stand in `LAYERS`
+TIP_RESOLUTIONS: Mapping[str, TipDivisions] = {
+    "coarse": TipDivisions(across=7, along=8, sides=2, per_ridge=3.0, per_curved_ridge=1.5),
+    "medium": TipDivisions(across=10, along=12, sides=3, per_ridge=3.0, per_curved_ridge=2.0),
+    "fine": TipDivisions(across=16, along=20, sides=4, per_ridge=6.0, per_curved_ridge=3.0),
+}
+
+
+@dataclass(frozen=True)
+class Fingertip:
+    """The lower half of a finger's end in three dimensions: x across the finger, y up, z along it,
+    its tip towards +z.
+
+    **Shape.** The lower half of an ellipsoid with the full axes `width`, `height` and `length`
+    around (0, 0, 0), above it the lower half of the bone, an ellipsoid with the full axes
+    `bone_width`, `bone_height` and `bone_length` whose centre is `bone_offset` higher. `length` is
+    about that of the paper's fingers seen from above, 26 mm held at 30 degrees; the bone's length
+    is assumed. The cut between the two moves with the bone (`rim` "fixed": the nail holds it) or
+    is "free". `posture` in degrees turns the tip down.
+
+    **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along
+    the finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile
+    of `FingerPad`: `ridge_height`, `ridge_width`, `ridge_exponent`, `ridge_phase`, `ridge_crest`,
+    `ridge_groove`. Or a measured print: a `HeightMap`, the path of a csv file with the header
+    x,z,height in mm, or of a grey image whose points are `ridge_pixel` mm apart, white
+    `ridge_height` above black, seen from below with the tip up; `ridge_width` then says how finely
+    the pad is divided. Ridges fade out towards the edges of the rectangle that is 0.64 of the
+    pad's axes.
+
+    **Layers and materials** are those of `FingerPad` (one table), without nail and nail bed.
+
+    **Mesh.** `resolution` coarse, medium or fine: smooth about 5k, 12k and 43k nodes; with
+    parallel ridges 22k, 34k and 115k, with curved ones 53k, 83k and 193k. Sets of nodes: `pad`
+    (the skin's surface), `bone` (with the cut, where the rim is fixed), `rim` (the cut). `mesh(1)`
+    has linear hexahedra, twice as many in each direction.
+
+    Raises `InputError` for values out of range and for geometry that cannot exist.
+
+    >>> finger = Fingertip(ridges=False, resolution="coarse")
+    >>> mesh = finger.mesh()
+    >>> mesh.kind, sorted(mesh.node_sets), float(mesh.points[:, 1].min())
+    ('hexahedron27', ['bone', 'pad', 'rim'], -6.395)
+    >>> Fingertip(length=60.0)
+    Traceback (most recent call last):
+    evfem.errors.InputError: finger.length: given 60.0; allowed: 16 to 32 mm
+    """
+
+    width: float = 16.68
+    height: float = 12.79
+    length: float = 22.5
+    ridges: bool | str | os.PathLike[str] | HeightMap = "along"
+    ridge_pixel: float = 0.05
+    ridge_height: float = 0.15
+    ridge_width: float = 0.50
+    ridge_exponent: float = 7.0
+    ridge_phase: float = 0.0
+    ridge_crest: float = 0.0
+    ridge_groove: float = 0.0
+    # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
+    stratum_corneum_thickness: float = thickness_of("stratum_corneum")
+    epidermis_thickness: float = thickness_of("epidermis")
+    dermis_thickness: float = thickness_of("dermis")
+    bone_width: float = 6.0
+    bone_height: float = 5.0
+    bone_length: float = 17.0
+    bone_offset: float = 1.0
+    rim: str = "fixed"
+    posture: float = 0.0
+    resolution: str = "medium"
+    materials: Mapping[str, Material] = field(default_factory=dict)
+    electrical: Electrical = field(default_factory=Electrical)
+    viscosity: float = 0.0
+
+    def __post_init__(self) -> None:
+        mistakes = Mistakes()
+        for name, (low, high, unit) in TIP_RANGES.items():
+            key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
+            with mistakes.of_a_part():
+                set_frozen(self, **{name: real(key, getattr(self, name), allowed, Within(low, high))})
+        with mistakes.of_a_part():
+            choice("finger.resolution", self.resolution, tuple(TIP_RESOLUTIONS))
+        with mistakes.of_a_part():
+            choice("finger.rim", self.rim, RIMS)
+        with mistakes.of_a_part():
+            if not mistakes.found:
+                set_frozen(self, ridges=_ridges(self))
+        mistakes.report()
+        set_frozen(self, materials=all_materials(self.materials, LAYERS))
+        _check_shape(self, self._solid)
+
+    @classmethod
+    def participant(cls, name: str, resolution: str = "medium", ridges: Any = "along") -> Fingertip:
+        """The finger of a participant, i to xi, of the paper's Table 1: as wide, as high, and seen
+        from above as long as measured, c cos 30 degrees.
+
+        Bone, epidermis and dermis are scaled with it (assumed); the rest is as in
+        `FingerPad.participant`.
+
+        >>> finger = Fingertip.participant("ii", ridges=False)
+        >>> finger.width, round(finger.length, 2), round(finger.bone_length, 2)
+        (14.04, 22.23, 16.8)
+        """
+        return cls(resolution=resolution, ridges=ridges, **tip_sizes(name))
+
+    def __repr__(self) -> str:
+        """What differs from the default."""
+        return called("Fingertip", self._changed())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: sizes, and what differs from the default."""
+        rows = [("ellipsoid", f"{self.width:g} x {self.height:g} x {self.length:g} mm")]
+        rows += [("ridges", short(self.ridges)), ("rim", self.rim), ("resolution", self.resolution)]
+        told = {"width", "height", "length", "ridges", "rim", "resolution"}
+        own = {name: value for name, value in self._changed().items() if name not in told}
+        return table("Fingertip", rows + [(name, short(value)) for name, value in own.items()])
+
+    def _changed(self) -> dict[str, Any]:
+        usual = all_materials({}, LAYERS)
+        laws = {name: law for name, law in self.materials.items() if law != usual[name]}
+        own = {name: value for name, value in changed(self).items() if name != "materials"}
+        return own | ({"materials": laws} if laws else {})
+
+    def mesh(self, order: int = 2) -> Mesh:
+        """The mesh: `hexahedron` cells of order 1, or half as many divisions of `hexahedron27`
+        cells of order 2, whose mid-nodes lie on the true surfaces.
+        """
+        if order not in (1, 2):
+            raise InputError("order", quoted(order), "1 or 2")
+        mesh = self._solid.mesh(order)
+        if isinstance(self.ridges, HeightMap):
+            shape = float(scaled_jacobian(mesh).min())
+            if not shape > SMALLEST_SHAPE:
+                given = f"a print that leaves cells with a scaled Jacobian of {shape:.2g}"
+                allowed = "a smoother or lower print, or a finer finger.resolution or finger.ridge_width"
+                raise InputError("finger.ridges", quoted(given), allowed)
+        return mesh
+
+    @property
+    def _solid(self) -> Solid:
+        outer = Ellipsoid(0.5 * self.width, 0.5 * self.height, 0.5 * self.length)
+        axes = 0.5 * self.bone_width, 0.5 * self.bone_height, 0.5 * self.bone_length
+        relief: Any = self.ridges
+        if self.ridges == "none":
+            relief = None
+        elif isinstance(self.ridges, str):
+            relief = Print(self.ridges, self._profile)
+        return Solid(
+            outer,
+            Ellipsoid(*axes, self.bone_offset),
+            layers=LAYERS,
+            thickness=tuple(getattr(self, layer.parameter) for layer in LAYERS if layer.thickness),
+            rows=tuple(layer.solid_rows.get(self.resolution, 1) for layer in LAYERS),
+            grid=self._grid(outer),
+            relief=relief,
+            rim_is_fixed=self.rim == "fixed",
+            posture=self.posture,
+        )
+
+    @property
+    def _profile(self) -> Ridges:
+        """The ridges' profile; how they fade is said in `evfem.finger.solid`."""
+        shape = self.ridge_exponent, self.ridge_phase, self.ridge_crest, self.ridge_groove
+        return Ridges(self.ridge_height, self.ridge_width, *shape, full=0.0, end=1.0)
+
+    def _grid(self, outer: Ellipsoid) -> Grid:
+        """Columns of the rectangle: fine where ridges cross them, with lines on crests and grooves
+        of parallel ones.
+        """
+        divisions = TIP_RESOLUTIONS[self.resolution]
+        fine = self.ridges not in ("across", "none"), self.ridges not in ("along", "none")
+        (across, *x), (along, *z) = (
+            self._lines(axis, fine[k] and self.ridges in ("along", "across"), plain if not fine[k] else 0)
+            for k, (axis, plain) in enumerate(((outer.a, divisions.across), (outer.c, divisions.along)))
+        )
+        merging = rows_that_merge(LAYERS[0].solid_rows.get(self.resolution, 1), fine)
+        return Grid((across, along), merging, divisions.sides, (x[0], z[0]), (x[1], z[1]))
+
+    def _lines(self, axis: float, parallel: bool, plain: int) -> tuple[int, float, float]:
+        """Columns of the rectangle at the bone over an axis (mm), and its two ends over the axis:
+        `plain` of them, or nine times as many at the surface as ridges need.
+        """
+        if plain:
+            return plain, -RECTANGLE, RECTANGLE
+        divisions = TIP_RESOLUTIONS[self.resolution]
+        step = 9.0 * self.ridge_width / (divisions.per_ridge if parallel else divisions.per_curved_ridge)
+        fitting = 2.0 * RECTANGLE * axis / step
+        if not parallel:
+            return max(round(fitting), 1), -RECTANGLE, RECTANGLE
+        count = max(int(fitting + 0.1), 1)
+        middle, half = ((self.ridge_phase + 0.25) % 0.5 - 0.25) * self.ridge_width, 0.5 * count * step
+        return count, (middle - half) / axis, (middle + half) / axis
+
+
+def tip_sizes(name: str) -> dict[str, Any]:
+    """Parameters of `Fingertip` that a participant of Table 1 has of his or her own (mm)."""
+    sizes = sizes_in_section(name)
+    kept = {key: value for key, value in sizes.items() if key in TIP_RANGES}
+    length = data.load("table1").value(name, "c") * math.cos(math.radians(HELD))
+    return kept | {"length": length, "bone_length": Fingertip.bone_length * length / Fingertip.length}
+
+
+def _ridges(tip: Fingertip) -> str | HeightMap:
+    """Name of the pattern, or the measured print."""
+    given = tip.ridges
+    if isinstance(given, HeightMap):
+        return given
+    if isinstance(given, bool):
+        return "along" if given else "none"
+    if given == "none" or given in PATTERNS:
+        return str(given)
+    if isinstance(given, str | os.PathLike) and Path(given).suffix:
+        return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height)
+    allowed = "false | none | " + " | ".join(PATTERNS) + " | the path of a csv file or of a grey image"
+    raise InputError("finger.ridges", quoted(given), allowed)
+
+
+def _check_shape(tip: Fingertip, solid: Solid) -> None:
+    """Refuse geometry whose parts do not fit into each other."""
+    skin, radius = sum(solid.thickness), solid.outer.smallest_radius
+    deepest = [layer for layer in LAYERS if layer.thickness][-1]
+    meaning = "times the surface's smallest radius, together with the layers above it"
+    _at_most(deepest.parameter, skin, THICKEST * radius, f"{THICKEST:g} {meaning}")
+    if tip.ridges != "none":
+        axis = tip.length if tip.ridges == "across" else tip.width
+        _at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")
+        _check_profile(tip, solid.thickness[0])
+    angle = np.linspace(0.0, 0.5 * np.pi, 46)
+    theta, phi = (grid.ravel() for grid in np.meshgrid(angle, angle))
+    unit = np.column_stack([np.sin(theta) * np.cos(phi), -np.cos(theta), np.sin(theta) * np.sin(phi)])
+    inside = solid.outer.point(unit) - skin * solid.outer.normal(unit)
+    bone = solid.bone
+    away = (inside - [0.0, bone.centre, 0.0]) / [bone.a, bone.b, bone.c]
+    clear = (1.0 - 1.0 / np.linalg.norm(away, axis=1)) * np.linalg.norm(
+        inside - [0.0, bone.centre, 0.0], axis=1
+    )
+    if not clear.min() >= CLEARANCE:
+        raise InputError(
+            "finger.bone_length",
+            f"a bone that leaves {clear.min():.3g} mm to the dermis",
+            f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers",
+        )
+
+
+def _check_profile(tip: Fingertip, thickness: float) -> None:
+    relief = tip.ridges
+    height = float(np.ptp(relief.height)) if isinstance(relief, HeightMap) else tip.ridge_height
+    _at_most("ridge_height", height, 0.7 * thickness, "0.7 times the stratum corneum's thickness")
+    if isinstance(relief, HeightMap):
+        return
+    flat = tip.ridge_crest + tip.ridge_groove
+    _at_most("ridge_crest", flat, 0.9, "0.9 together with finger.ridge_groove")
+    slope, limit = tip._profile.steepest, STEEPEST_FLAT if tip.ridge_crest > 0.0 else STEEPEST
+    if slope > limit:
+        allowed = f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest"
+        raise InputError("finger.ridge_height", f"walls with a slope of {slope:.3g}", allowed)
+
+
+def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
+    if value > limit * (1.0 + 1e-12):
+        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} ({meaning})")

@@ -1,0 +1,223 @@
+r"""The mesh of a whole finger pad: layers between the lower halves of two ellipsoids, the finger's
+and the bone's.
+
+A point of either surface is named by a unit vector e with :math:`e_y \le 0`: :math:`(a e_x, b e_y,
+c e_z)` for semi-axes a, b, c. Seen from below the vectors fill the unit disc :math:`(p, q) = (e_x,
+e_z)`, which is divided into a rectangle of lines p = const and q = const, so that parallel ridges
+follow the lines, and four sides whose lines go on to the rim along great circles:
+
+    +---------+
+    |\   q   /|
+    | +-----+ |
+    | |     | p
+    | +-----+ |
+    |/       \|
+    +---------+
+
+The skin's interfaces are true offsets of the smooth ellipsoid along its normals; straight lines to
+the bone fill the hypodermis. Ridges are cut along the normals, and the columns below them merge
+three to one (`evfem.finger.blocks`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.finger.blocks import DIGITS, block
+from evfem.finger.fingerprint import faded
+from evfem.finger.layers import TissueLayer
+from evfem.mesh.hexahedron import MIRRORED
+from evfem.mesh.mesh import Mesh
+
+#: half of the rectangle's sides over the semi-axes
+RECTANGLE = 0.64
+
+
+@dataclass(frozen=True)
+class Ellipsoid:
+    """Semi-axes a (x), b (y), c (z) in mm around (0, `centre`, 0)."""
+
+    a: float
+    b: float
+    c: float
+    centre: float = 0.0
+
+    @property
+    def smallest_radius(self) -> float:
+        """Smallest radius of curvature: normal offsets inwards must stay below it."""
+        return min(self.a, self.b, self.c) ** 2 / max(self.a, self.b, self.c)
+
+    def point(self, unit: Floats) -> Floats:
+        """Points (N, 3) of the unit vectors (N, 3)."""
+        return unit * [self.a, self.b, self.c] + [0.0, self.centre, 0.0]
+
+    def normal(self, unit: Floats) -> Floats:
+        """Outward unit normals (N, 3)."""
+        n = unit / [self.a, self.b, self.c]
+        return np.asarray(n / np.linalg.norm(n, axis=1)[:, None])
+
+
+class Relief(Protocol):
+    """Ridges over the smooth pad."""
+
+    def depth(self, x: Floats, z: Floats) -> Floats:
+        """Depth (mm) below the crests."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """How the disc is divided, in quadratic cells (twice as many linear ones).
+
+    `columns` of the rectangle across and along, as they are at the bone; in the rows `merging[0]`
+    three columns across become one, in `merging[1]` along. `sides`: cells from the rectangle to
+    the rim. The rectangle lies between `low` and `high`, each (p, q).
+    """
+
+    columns: tuple[int, int]
+    merging: tuple[tuple[int, ...], tuple[int, ...]]
+    sides: int
+    low: tuple[float, float] = (-RECTANGLE, -RECTANGLE)
+    high: tuple[float, float] = (RECTANGLE, RECTANGLE)
+
+
+@dataclass(frozen=True)
+class Solid:
+    """Geometry of a whole pad (mm).
+
+    `layers` from the surface to the bone, `thickness` of all of them but the innermost, `rows` of
+    quadratic cells in each; `posture` in degrees turns the tip (+z) down.
+    """
+
+    outer: Ellipsoid
+    bone: Ellipsoid
+    layers: tuple[TissueLayer, ...]
+    thickness: tuple[float, ...]
+    rows: tuple[int, ...]
+    grid: Grid
+    relief: Relief | None = None
+    rim_is_fixed: bool = True
+    posture: float = 0.0
+
+    def mesh(self, order: int) -> Mesh:
+        """Hexahedra of `order` 1 or 2, the latter with half the divisions and mid-nodes on the
+        true surfaces.
+        """
+        per_cell = 3 - order
+        rows = [n * per_cell for n in self.rows]
+        places, cells, row = self._joined(sum(rows), per_cell, order)
+        unit, r = places[:, :3], places[:, 3]
+        starts = np.concatenate([[0], np.cumsum(rows)])
+        level = np.interp(r, starts, np.arange(len(starts)))
+        points = self._turned(self._points(unit, level))
+        layer = np.repeat(np.arange(len(rows)), rows)[row]
+        region = np.array([one.number for one in self.layers])[layer]
+        names = {one.name: one.number for one in self.layers}
+        rim, bone = np.flatnonzero(unit[:, 1] == 0.0), np.flatnonzero(r == r.max())
+        sets = {
+            "pad": np.flatnonzero(r == 0.0),
+            "bone": np.union1d(bone, rim) if self.rim_is_fixed else bone,
+            "rim": rim,
+        }
+        kind = "hexahedron27" if order == 2 else "hexahedron"
+        return Mesh(points, _right_handed(points, cells), kind, region, names, sets)
+
+    def _joined(self, rows: int, per_cell: int, order: int) -> tuple[Floats, Ints, Ints]:
+        """The five patches with their common nodes once: places (N, 4) as (unit vector, row),
+        cells, and the row of each cell.
+        """
+        grid = self.grid
+        across, along = (n * per_cell for n in grid.columns)
+        sides = grid.sides * per_cell
+        # linear cells halve the rows, the first of each two merges
+        merging = [[row * per_cell for row in rows] for rows in grid.merging]
+        middle = block((across, along), rows, merging, order)
+        over = block((across, sides), rows, [merging[0], []], order)
+        beside = block((along, sides), rows, [merging[1], []], order)
+        parts = [(middle, self._rectangle(middle.points))]
+        parts += [(over, self._side(over.points, 1, end)) for end in (0, 1)]
+        parts += [(beside, self._side(beside.points, 0, end)) for end in (0, 1)]
+        places = np.vstack([np.column_stack([unit, mesh.points[:, 2]]) for mesh, unit in parts])
+        first = np.cumsum([0] + [len(mesh.points) for mesh, _ in parts])
+        cells = np.vstack([mesh.cells + start for (mesh, _), start in zip(parts, first, strict=False)])
+        _, kept, number = np.unique(places.round(DIGITS), axis=0, return_index=True, return_inverse=True)
+        row = np.concatenate([mesh.region for mesh, _ in parts])
+        return places[kept], number.ravel()[cells], row
+
+    def _rectangle(self, parameters: Floats) -> Floats:
+        """Unit vectors (N, 3) of parameters (N, 3) of the middle patch."""
+        low, high = np.array(self.grid.low), np.array(self.grid.high)
+        p, q = (low + (high - low) * parameters[:, :2]).T
+        return np.column_stack([p, -np.sqrt(1.0 - p * p - q * q), q])
+
+    def _side(self, parameters: Floats, axis: int, end: int) -> Floats:
+        """Unit vectors (N, 3) of the patch beyond the rectangle's edge at the `end` (0 low, 1
+        high) of an `axis` (0 x, 1 z): v goes from that edge to the rim along great circles.
+        """
+        u, v = parameters[:, 0], parameters[:, 1]
+        on_edge = np.full((len(u), 2), float(end))
+        on_edge[:, 1 - axis] = u
+        start = self._rectangle(on_edge)
+        aside, out = 0.25 * np.pi * (2.0 * u - 1.0), 1.0 if end else -1.0
+        rim = np.zeros_like(start)
+        rim[:, 2 * axis], rim[:, 2 - 2 * axis] = out * np.cos(aside), np.sin(aside)
+        angle = np.arccos(np.clip((start * rim).sum(axis=1), -1.0, 1.0))[:, None]
+        t = v[:, None]
+        unit = (np.sin((1.0 - t) * angle) * start + np.sin(t * angle) * rim) / np.sin(angle)
+        unit[v == 0.0], unit[v == 1.0] = start[v == 0.0], rim[v == 1.0]
+        return unit
+
+    def _points(self, unit: Floats, level: Floats) -> Floats:
+        """Points (N, 3) at levels counted in layers: 0 the surface, 1 below the outermost ..."""
+        foot, normal = self.outer.point(unit), self.outer.normal(unit)
+        innermost = len(self.layers) - 1
+        depths = np.concatenate([[0.0], np.cumsum(self.thickness)])
+        layer = np.minimum(level.astype(int), innermost)
+        part = level - layer
+        upper, lower = depths[layer], depths[np.minimum(layer + 1, innermost)]
+        upper = np.where(layer == 0, self._relief(unit, foot), upper)
+        skin = foot - ((1.0 - part) * upper + part * lower)[:, None] * normal
+        inside = foot - depths[-1] * normal
+        deep = inside + part[:, None] * (self.bone.point(unit) - inside)
+        return np.where((layer == innermost)[:, None], deep, skin)
+
+    def _relief(self, unit: Floats, foot: Floats) -> Floats:
+        """Depth (N,) of the surface below the smooth ellipsoid."""
+        if self.relief is None:
+            return np.zeros(len(unit))
+        low, high = np.array(self.grid.low), np.array(self.grid.high)
+        share = (2.0 * unit[:, [0, 2]] - low - high) / (high - low)
+        return faded(self.relief.depth(foot[:, 0], foot[:, 2]), share)
+
+    def _turned(self, points: Floats) -> Floats:
+        """Points of the pad in its posture."""
+        if self.posture == 0.0:
+            return points
+        c, s = math.cos(math.radians(self.posture)), math.sin(math.radians(self.posture))
+        return points @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
+
+
+def _right_handed(points: Floats, cells: Ints) -> Ints:
+    """The cells, those of left-handed patches mirrored."""
+    x = points[cells[:, [0, 1, 3, 4]]]
+    edges = x[:, 1:] - x[:, :1]
+    left = np.linalg.det(edges) < 0.0
+    order = MIRRORED[: cells.shape[1]]
+    return np.where(left[:, None], cells[:, order], cells)
+
+
+def rows_that_merge(first: int, directions: Sequence[bool]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Rows, one after the other from `first`, that merge columns across and along: two for each of
+    the `directions` that is finely divided, in turns.
+
+    >>> rows_that_merge(1, (True, False)), rows_that_merge(1, (True, True))
+    (((1, 2), ()), ((1, 3), (2, 4)))
+    """
+    chosen = [k for _ in range(2) for k in (0, 1) if directions[k]]
+    across, along = ([first + i for i, k in enumerate(chosen) if k == axis] for axis in (0, 1))
+    return tuple(across), tuple(along)

@@ -1,0 +1,121 @@
+"""What the drive of a scene means to its other parts: the voltage that a run sees, the layers and
+the law of the attraction, and what does not go with it.
+
+`scene` is a `Scene` throughout; it uses this file itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import Values
+from evfem.electrostatics.charges import Sandwich, constants
+from evfem.electrostatics.drive import Drive, mean_law
+from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import Carrier
+from evfem.errors import ABSENT, InputError
+from evfem.protocols import TimeSignal
+from evfem.scene.motion import VoltageRamp
+
+
+def applied(scene: Any) -> Any:
+    """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
+    the moment.
+    """
+    drive = scene.drive
+    if drive is None or not drive.resolved or not isinstance(scene.voltage, float):
+        return scene.voltage
+    return drive.signal(scene.voltage)
+
+
+def frequency(scene: Any) -> float | None:
+    """Frequency (Hz) at which dielectrics count: that of the drive, or of the scene's own signal."""
+    drive, voltage = scene.drive, scene.voltage
+    if drive is None or drive.frequency is not None:
+        return None if drive is None else drive.frequency
+    if isinstance(voltage, Carrier):
+        return voltage.frequency
+    if drive.resolved and isinstance(voltage, TimeSignal):
+        return voltage.highest_frequency or None
+    return None
+
+
+def solids(scene: Any, thickness: Values, eps_r: float) -> tuple[Layer, Layer]:
+    """Stratum corneum, `thickness` in mm with the finger's `eps_r` or the drive's skin, and
+    insulator.
+    """
+    drive = scene.drive or Drive()
+    return drive.skin_layer(thickness, eps_r), scene.ground.insulator
+
+
+def attracting(scene: Any, skin: Layer, insulator: Layer) -> tuple[Any, Layers]:
+    """The law and the layers of the attraction: of the mean over the cycle, or where the drive is
+    resolved without what conducts, which moves the charges instead.
+    """
+    drive, at = scene.drive, frequency(scene)
+    if drive is None:
+        return scene.law, Layers.of(skin, insulator)
+    if drive.resolved:
+        stack = sandwich(scene, skin, insulator)
+        thickness = np.asarray(skin.thickness) + insulator.thickness
+        return scene.law, Layers(stack.skin + stack.insulator, thickness)
+    return mean_law(scene.law, drive, at, (skin, insulator))
+
+
+def lossless(scene: Any, layer: Layer) -> Layer:
+    """A layer with its real permittivity alone, at the drive's frequency."""
+    return Layer(layer.thickness, constants(layer, frequency(scene))[0])
+
+
+def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich:
+    """The layers of a resolved drive as its charges see them."""
+    gap = {"gap_conductivity": scene.drive.gap_conductivity}
+    gap["gap_eps_r"] = getattr(scene.law, "gap_eps_r", 1.0)
+    return Sandwich.of(skin, insulator, frequency=frequency(scene), **gap)
+
+
+def check_drive(scene: Any) -> None:
+    """Raise InputError where drive, law, voltage and motions do not fit together."""
+    drive = scene.drive
+    if drive is None:
+        return
+    if scene.law is None:
+        allowed = "a scene with an electrostatic law and a voltage"
+        raise InputError("electrostatics.frequency", "a drive without a law", allowed)
+    (_check_resolved if drive.resolved else _check_mean)(scene, drive)
+    attracting(scene, *solids(scene, 0.3, 1650.0))  # dielectrics that need a frequency say so
+
+
+def _check_mean(scene: Any, drive: Drive) -> None:
+    voltage = scene.voltage
+    if isinstance(voltage, Carrier):
+        if voltage.resolved:
+            allowed = 'a carrier with resolved=False, or drive = "resolved"'
+            raise InputError("electrostatics.signal", "a resolved carrier in a mean over the cycle", allowed)
+        if drive.frequency is not None:
+            given = f"{drive.frequency:g} beside a carrier of {voltage.frequency:g} Hz"
+            raise InputError("electrostatics.frequency", given, "nothing here")
+    elif drive.frequency is None:
+        allowed = 'a frequency in Hz, needed for the mean over the cycle; or drive = "resolved"'
+        raise InputError("electrostatics.frequency", ABSENT, allowed)
+
+
+def _check_resolved(scene: Any, drive: Drive) -> None:
+    voltage = scene.voltage
+    if scene.direction == "normal":
+        raise InputError("electrostatics.direction", "normal in a resolved drive", "vertical")
+    if isinstance(voltage, (FollowForce, VoltageProfile)):
+        allowed = "a number or a signal over time with a resolved drive"
+        raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
+    if isinstance(voltage, TimeSignal) and drive.frequency is not None:
+        given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
+        raise InputError("electrostatics.frequency", given, "nothing here")
+    if isinstance(voltage, Carrier) and not voltage.resolved:
+        allowed = "a carrier with resolved=True in a resolved drive"
+        raise InputError("electrostatics.signal", "the mean of a carrier", allowed)
+    for i, motion in enumerate(scene.motion):
+        if isinstance(motion, VoltageRamp):
+            raise InputError(f"motion[{i}]", "a voltage ramp in a resolved drive", "a signal over time")

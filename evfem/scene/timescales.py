@@ -1,0 +1,76 @@
+"""The time scales of a scene with a drive: voltage, charge and mechanics, in words for its plan.
+
+Twice the frequency of the voltage is that of the attraction. The gap discharges below its corner
+frequency, and the skin is a conductor below its own (`evfem.electrostatics.alternating`); both are
+told for touching skin. Kelvin-Voigt tissue with the relaxation time tau follows up to 1 / (2 pi tau);
+without time in the mechanics it follows at once. A swing slower than `FOLLOWS` times that moves the
+tissue, and its mean over the cycle leaves that out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evfem.protocols import TimeSignal
+from evfem.scene.driven import frequency, sandwich, solids
+from evfem.scene.scene import Scene
+
+#: a swing up to so many times the highest frequency that the tissue follows still moves it
+FOLLOWS = 5.0
+
+
+def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
+    """What the drive of a scene is, which time scales it has, and which of them are resolved; the
+    stratum corneum is `thickness` mm thick.
+    """
+    drive = scene.drive
+    assert drive is not None
+    at = frequency(scene)
+    what = "direct voltage" if at is None else f"{drive.waveform} of {at:g} Hz"
+    if isinstance(scene.voltage, TimeSignal):
+        what = f"{type(scene.voltage).__name__} signal"
+    how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
+    charge = _charge(scene, thickness, eps_r)
+    parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
+    if not drive.resolved and at is not None:
+        parts.append(f"left out: the swing of the attraction at {2.0 * at:g} Hz")
+    return "; ".join(parts)
+
+
+def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
+    """Below which frequencies gap and skin discharge where they touch."""
+    stack = sandwich(scene, *solids(scene, thickness, eps_r))
+    skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
+    said = []
+    if gap > 0.0:
+        said.append(f"charge: the gap leaks below {gap / (2.0 * np.pi):.3g} Hz")
+    if skin > 0.0:
+        corner = skin / (1.0 + float(np.max(stack.skin)) / float(np.max(stack.insulator))) / (2.0 * np.pi)
+        said.append(f"charge: the skin conducts below {corner:.3g} Hz")
+    return said or ["charge: nothing conducts"]
+
+
+def bandwidth(scene: Scene) -> float:
+    """Highest frequency (Hz) that the tissue follows, infinite without time in the mechanics."""
+    own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
+    slowest = max([scene.finger.viscosity, *own])
+    if scene.solver.dynamics == "quasistatic" or not slowest > 0.0:
+        return np.inf
+    return 1.0 / (2.0 * np.pi * slowest)
+
+
+def _mechanics(scene: Scene) -> str:
+    highest = bandwidth(scene)
+    return "at once" if np.isinf(highest) else f"up to {highest:.3g} Hz"
+
+
+def left_out(scene: Scene) -> str | None:
+    """A sentence if a mean over the cycle leaves out what moves the tissue, else None."""
+    at, highest = frequency(scene), bandwidth(scene)
+    if scene.drive is None or scene.drive.resolved or at is None or np.isinf(highest):
+        return None
+    if 2.0 * at >= FOLLOWS * highest:
+        return None
+    much = f"the attraction swings at {2.0 * at:g} Hz, and the tissue follows up to {highest:.3g} Hz"
+    other = f'drive = "resolved" with steps of at most {1.0 / (20.0 * at):.2g} s does not'
+    return f"{much}: the mean over the cycle leaves that out, {other}"

@@ -1,0 +1,266 @@
+"""The full field of rigid outlines against closed forms, its force, its bounds, its refusals."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
+
+from evfem import EvfemError, InputError, Layer
+from evfem.electrostatics import eps_0, rigid, rigid_field
+from evfem.electrostatics.bounds import capacitance_bounds
+from evfem.electrostatics.fieldmesh import make_mesh
+from evfem.electrostatics.outlines import Outline
+from evfem.electrostatics.poisson import Potential, Space
+
+FILM = Layer(0.09, 3.35)
+#: of random outlines that are ones: their walls go one way
+SEEDS = (0, 1, 2, 4, 5, 6, 8, 9, 12, 13, 14, 15)
+
+
+def carter(pitch, groove, gap):
+    """C / eps_0 and F / (eps_0 U^2) of one pitch of deep rectangular grooves (Carter 1926)."""
+    half = groove / (2.0 * gap)
+    capacitance = pitch / gap - 4.0 / np.pi * (half * np.arctan(half) - np.log1p(half**2) / 2.0)
+    return capacitance, (pitch - 2.0 * groove / np.pi * np.arctan(half)) / (2.0 * gap**2)
+
+
+def grooves(pitch, groove, gap):
+    land = (pitch - groove) / 2.0
+    deep = gap + 4.0 * groove
+    return [0.0, land, land, pitch - land, pitch - land, pitch], [gap, gap, deep, deep, gap, gap]
+
+
+def love(width, gap):
+    """C / eps_0 of a thin strip parallel to a plane (Love 1924, doi:10.1112/plms/s2-22.1.337)."""
+
+    def ratio(m):
+        K, E = ellipk(m), ellipe(m)
+        angle = np.arcsin(np.sqrt((K - E) / (m * K)))
+        return 2.0 / np.pi * (K * ellipeinc(angle, m) - E * ellipkinc(angle, m))
+
+    m = brentq(
+        lambda m: ratio(m) - width / (2.0 * gap), 1e-9, 1.0 - 1e-15, xtol=1e-16
+    )  # for widths below 12 gaps
+    return 2.0 * ellipk(m) / ellipk(1.0 - m)
+
+
+def cylinder(radius, gap):
+    """C / eps_0 and F / (eps_0 U^2) of a cylinder over a plane."""
+    angle = np.arccosh(1.0 + gap / radius)
+    return 2.0 * np.pi / angle, np.pi / (angle**2 * np.sqrt((radius + gap) ** 2 - radius**2))
+
+
+def wave(gap, points=801):
+    x = np.linspace(0.0, 0.5, points)
+    return x, gap + 0.075 * (1.0 - np.cos(4.0 * np.pi * x))
+
+
+def ridges(gap, points=401):
+    x = np.linspace(0.0, 0.5, points)
+    return x, gap + 0.15 * np.abs(x / 0.25 - 1.0) ** 7
+
+
+def numbers(solution):
+    return solution.capacitance / (1e-3 * eps_0), solution.force / eps_0
+
+
+@pytest.mark.parametrize("case", [(0.5, 0.2, 0.05), (0.5, 0.25, 0.02), (1.3, 0.9, 0.002)])
+def test_deep_grooves_are_carters(case):
+    assert numbers(rigid_field(*grooves(*case))) == pytest.approx(carter(*case), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("outline", "slab", "expected"),
+    [
+        (wave(0.2), None, (2.038861797, 4.166514045)),
+        (wave(0.05), None, (5.507024468, 34.326092805)),
+        (wave(0.25), FILM, (1.55194701, 2.40949649)),
+        (wave(0.005), FILM, (7.53901511, 81.97857879)),
+        (ridges(0.0001), FILM, (15.465105, 268.500067)),
+        (ridges(0.25), FILM, (1.754376, 3.078003)),
+    ],
+    ids=["wave .2", "wave .05", "wave .25 film", "wave .005 film", "ridges touch", "ridges .25"],
+)
+def test_ridges_of_two_shapes_agree_with_boundary_integrals(outline, slab, expected):
+    """Sinusoids and t^7 ridges, computed elsewhere by boundary integrals (each number twice)."""
+    assert numbers(rigid_field(*outline, slab=slab)) == pytest.approx(expected, rel=5e-5)
+
+
+def test_half_a_cylinder_stands_for_a_cylinder():
+    angle = np.linspace(-np.pi / 2, np.pi / 2, 401)
+    x, height = 8.34 * np.sin(angle), 1.0 + 8.34 * (1.0 - np.cos(angle))
+    solved = rigid_field(x, height, voltage=2000.0, periodic=False)
+    assert 1e3 * solved.capacitance / eps_0 == pytest.approx(cylinder(8.34, 1.0)[0], rel=2e-4)
+    assert solved.force * 1e3 == pytest.approx(0.112524670, rel=1e-4)  # N per metre
+
+
+def test_a_flat_outline_that_ends_is_loves_strip():
+    """Its edges pull too: the force is the derivative of Love's capacitance."""
+    width, gap = 1.0, 0.1
+    solved = rigid_field([0.0, width], [gap, gap], periodic=False)
+    assert 1e3 * solved.capacitance / eps_0 == pytest.approx(love(width, gap), rel=1e-5)
+    slope = (love(width, gap + 1e-4) - love(width, gap - 1e-4)) / 2e-4
+    assert solved.force / eps_0 == pytest.approx(-slope / 2.0, rel=1e-5)
+    assert rigid_field([0.0, width], [gap, gap], periodic=False, voltage=-3.0).force == pytest.approx(
+        9.0 * solved.force, rel=1e-12
+    )
+
+
+def test_the_field_under_an_edge_is_maxwells():
+    """x / g = (u + 1 + e^u) / pi, E / E0 = 1 / (1 + e^u); 0.782188294 right under the edge."""
+    gap, width = 0.1, 40.0
+    solved = rigid_field([-width, 0.0], [gap, gap], periodic=False)
+    u = np.array([-3.0, -1.2784645427610738, 0.5])
+    exact = 1.0 / (1.0 + np.exp(u))
+    assert exact[1] == pytest.approx(0.782188294, abs=1e-9)
+    x = gap * (u + 1.0 + np.exp(u)) / np.pi
+    assert solved.surface_field(x) * gap == pytest.approx(exact, rel=2e-3)
+
+
+def test_a_plate_over_a_slab_is_exact():
+    solved = rigid_field([0.0, 0.4, 1.0], [0.05] * 3, slab=FILM, voltage=100.0)
+    distance = 0.05 + 0.09 / 3.35
+    assert numbers(solved) == pytest.approx((1.0 / distance, 1e4 / (2.0 * distance**2)), rel=1e-12)
+    assert solved.potential(0.2, -0.09) == pytest.approx(100.0)
+    assert solved.field(0.2, -0.01)[1] == pytest.approx(100.0 / (3.35 * distance), rel=1e-9)
+    assert solved.outline_field(0.7) == pytest.approx(100.0 / distance, rel=1e-9)
+    assert solved.potential([0.2, 0.3], [[0.0], [0.05]]).shape == (2, 2)
+
+
+@pytest.mark.parametrize("gap", [1e-7, 1e-3])
+def test_the_smallest_gaps_need_no_small_cells(gap):
+    assert rigid_field([0.0, 0.5], [gap, gap]).force / eps_0 == pytest.approx(0.25 / gap**2, rel=1e-9)
+
+
+def test_touching_places_are_a_gap_in_series():
+    """Where all of the outline touches, the slab alone is left."""
+    solved = rigid_field([0.0, 1.0], [0.0, 0.0], slab=FILM)
+    s = 0.09 / 3.35
+    assert numbers(solved) == pytest.approx((1.0 / s, 1.0 / (2.0 * s**2)), rel=3e-6)
+
+
+def test_walls_up_and_down_in_any_order():
+    """A staircase is the same from the other side and from another start of its period."""
+    x, h = np.array([0, 1, 1, 2, 2, 3, 3, 5]) / 10.0, np.array([5, 5, 10, 10, 20, 20, 2, 2]) / 100.0
+    first = numbers(rigid_field(x, h))
+    assert numbers(rigid_field(0.5 - x[::-1], h[::-1])) == pytest.approx(first, rel=1e-5)
+    turned = np.array([0, 1, 1, 3, 3, 4, 4, 5]) / 10.0, np.array([20, 20, 2, 2, 5, 5, 10, 10]) / 100.0
+    assert numbers(rigid_field(*turned)) == pytest.approx(first, rel=1e-5)
+
+
+def test_coarse_points_are_solved_as_stated():
+    """Three points and the same polyline in many points are one outline."""
+    few = rigid_field([0.0, 0.25, 0.5], [0.2, 0.05, 0.2], slab=FILM)
+    x = np.linspace(0.0, 0.5, 21)
+    many = rigid_field(x, np.interp(x, [0.0, 0.25, 0.5], [0.2, 0.05, 0.2]), slab=FILM)
+    assert numbers(few) == pytest.approx(numbers(many), rel=1e-5)
+
+
+def discrete(x, height, slab=None, *, refine=0, order=3, growth=0.7):
+    thickness, eps_r = (slab.thickness, slab.eps_r) if slab else (0.0, 1.0)
+    mesh = make_mesh(Outline.of(x, height), thickness, thickness / eps_r, growth)
+    for _ in range(refine):
+        mesh = mesh.refined()
+    return mesh, Potential.of(Space(mesh, eps_r, order))
+
+
+def test_energy_and_force_converge_with_the_order_of_the_element():
+    """Twice the order: energy and virtual work are quadratic in the potential's error."""
+    case = (0.5, 0.2, 0.05)
+    errors = []
+    for refine in (0, 1):
+        _, solved = discrete(*grooves(*case), refine=refine, order=2)
+        found = np.array([solved.capacitance, -solved.force()]) / eps_0
+        errors.append(found / carter(*case) - 1.0)
+    assert np.all(errors[0][:1] > 0.0), "the energy comes from above"
+    rates = np.log2(np.abs(errors[0] / errors[1]))
+    assert np.all(rates > 3.5), f"order {rates} instead of 4"
+
+
+@pytest.mark.parametrize("slab", [None, FILM])
+def test_force_is_the_derivative_of_the_discrete_energy(slab):
+    x, height = grooves(0.5, 0.2, 0.05)
+    mesh, solved = discrete(x, np.asarray(height) + np.linspace(0.0, 0.01, 6), slab)
+    step = 1e-4
+
+    def energy(distance):
+        return Potential.of(Space(mesh.moved(distance), slab.eps_r if slab else 1.0)).capacitance / 2.0
+
+    near, far = (energy(k * step) - energy(-k * step) for k in (1, 2))
+    quotient = (8.0 * near - far) / (12.0 * step)
+    assert solved.force() == pytest.approx(quotient, rel=1e-7)
+
+
+def test_newtons_third_law():
+    """Force on the body and force on slab and electrode cancel; nothing drives sideways."""
+    mesh, solved = discrete([0.0, 0.2, 0.2, 0.5], [0.05, 0.1, 0.3, 0.12], FILM)
+    force = solved.force()
+    assert abs(force + solved.force(1.0 - mesh.lift)) < 1e-14 * abs(force)
+    assert abs(solved.force(direction=0)) < 1e-5 * abs(force)
+
+
+def test_bounds_of_touching_ridges():
+    """-6.3 and +3.3 percent around the exact value, as derived independently."""
+    solved = rigid_field(*ridges(0.0), slab=FILM)
+    low, high = np.array(solved.bounds) / solved.capacitance - 1.0
+    assert (round(100 * low, 1), round(100 * high, 1)) == (-6.3, 3.3)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_any_outline_lies_between_its_bounds(seed):
+    rng = np.random.default_rng(seed)
+    number = int(rng.integers(3, 7))
+    heights = rng.uniform(0.01, 1.0, number)
+    x = np.cumsum([0.1, 0.3, *rng.choice([0.0, 0.1, 0.3], number - 2)])
+    slab = (None, FILM, Layer(0.01, 50.0), Layer(2.0, 5.0))[seed % 4]
+    outline = Outline.of(x, heights, periodic=seed % 3 > 0)
+    thickness, eps_r = (slab.thickness, slab.eps_r) if slab else (0.0, 1.0)
+    low, high = capacitance_bounds(outline, thickness, eps_r)
+    mesh = make_mesh(outline, thickness, thickness / eps_r, 2.0)
+    capacitance = Potential.of(Space(mesh, eps_r, 2)).capacitance
+    assert low <= capacitance * (1.0 + 1e-12)
+    assert capacitance <= high * 1.02  # a coarse mesh is above
+
+
+def test_a_wall_in_the_middle_of_its_run_and_at_the_end_of_a_period():
+    """Low at one end and high at the other: rows end in the middle, on a point or beside one."""
+    x, height = np.array([0.0, 0.1, 0.4, 0.7, 0.8 - 1e-16]), np.array([0.1, 0.9, 0.9, 0.3, 0.9])
+    first = numbers(rigid_field(x, height))
+    moved = rigid_field([0.0, 0.0, 0.1, 0.4, 0.7, 0.8, 0.8], [0.9, 0.1, 0.9, 0.9, 0.3, 0.9, 0.9])
+    assert numbers(moved) == pytest.approx(first, rel=1e-9)
+    reversed_ = rigid_field(0.8 - x[::-1], height[::-1])
+    assert numbers(reversed_) == pytest.approx(first, rel=1e-5)
+
+
+def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch):
+    monkeypatch.setattr(rigid, "capacitance_bounds", lambda *_: (1.0, 2.0))
+    with pytest.raises(EvfemError, match="not between its bounds"):
+        rigid_field([0.0, 1.0], [0.1, 0.1])
+
+
+@pytest.mark.parametrize(
+    ("x", "height", "options", "said"),
+    [
+        ([0.0, 1.0], [0.1], {}, "same length"),
+        ([0.0, 1.0, 0.5], [0.1] * 3, {}, "do not decrease"),
+        ([0.0, 1.0], [0.1, -0.1], {}, "not negative"),
+        ([0.0, 1.0], [0.0, 0.1], {}, "would touch"),
+        ([0.0, 1.0, 1.0, 1.0, 2.0], [0.2, 0.2, 0.1, 0.3, 0.2], {}, "go one way"),
+        ([0.0, 0.0, 1.0], [0.3, 0.1, 0.2], {}, "go one way"),
+        ([0.0, 0.0, 1.0], [0.1, 0.3, 0.2], {"periodic": False}, "rise"),
+        ([0.0, 1.0], [0.1, np.nan], {}, "heights in mm"),
+        ([0.0, 1.0], [0.1, 0.1], {"slab": 0.09}, "a Layer"),
+        ([0.0, 1.0], [0.1, 0.1], {"slab": Layer([0.1, 0.2], 2.0)}, "one thickness"),
+        ([0.0, 1.0], [0.1, 0.1], {"voltage": np.inf}, "voltage"),
+    ],
+)
+def test_what_is_no_outline_is_refused(x, height, options, said):
+    with pytest.raises(InputError, match=said):
+        rigid_field(x, height, **options)
+
+
+def test_fields_are_known_in_slab_and_air_only():
+    solved = rigid_field([0.0, 1.0], [0.1, 0.1], slab=FILM)
+    for x, y in ((2.0, 0.0), (0.5, 0.2), (0.5, -0.1)):
+        with pytest.raises(InputError):
+            solved.potential(x, y)

@@ -1,0 +1,140 @@
+"""Runs under alternating voltage: the mean over the cycle, and charges resolved in time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.electrostatics import alternating_pressure, step_pressure
+
+SKIN = ev.Dielectric(1136.0, (), 2e-4)
+SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
+ELECTRICAL = ev.Electrical(0.30)
+SCREEN = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.4)
+FREQUENCY = 75.0
+
+
+def scene(drive, motion, voltage=70.0, **given):
+    finger = replace(SMOOTH, electrical=ELECTRICAL)
+    return ev.Scene(finger, SCREEN, ev.StrongTroxel(), voltage, motion, drive=drive, **given)
+
+
+def closed(result):
+    """What was given, and what became of it, relative to what the source gave."""
+    given = result.external_work + result.source_work
+    names = (
+        "stored_energy kinetic_energy field_energy friction_dissipation viscous_dissipation "
+        "leakage_dissipation integrator_dissipation snap_dissipation"
+    )
+    return np.abs(given - sum(result[name] for name in names.split())) / np.abs(result.source_work).max()
+
+
+def test_a_mean_without_losses_is_the_direct_voltage_bit_for_bit():
+    hover = [ev.Hover(0.2)]
+    plain = ev.simulate(scene(None, hover, 150.0))
+    driven = ev.simulate(scene(ev.Drive(frequency=50.0), hover, 150.0))
+    for name in ("electrostatic_force", "applied_force", "min_gap", "stored_energy"):
+        np.testing.assert_array_equal(plain[name], driven[name])
+
+
+def test_the_mean_of_a_hovering_pad_is_the_closed_form_at_its_nodes():
+    """Far off the outline is rigid, and the force is the sum over its nodes."""
+    drive = ev.Drive(frequency=FREQUENCY, skin="gabriel_dry", gap_conductivity=1e-8)
+    far = scene(drive, [ev.Hover(2.0)])
+    assert not ev.plan(far).has("tissue")
+    found = ev.simulate(far)
+    frame, mesh = found.frames[-1], far.finger.mesh(2)
+    gap = frame.gap[mesh.node_sets["pad"]]
+    traction = frame.electrostatic_traction[mesh.node_sets["pad"]]
+    given = {"skin": "gabriel_dry", "skin_thickness": 0.30, "insulator": ev.TOUCHSCREEN}
+    expected = alternating_pressure(gap, 70.0, FREQUENCY, **given, gap_conductivity=1e-8)
+    np.testing.assert_allclose(traction[traction > 0], expected[traction > 0], rtol=1e-12)
+    assert (traction > 0).sum() > 50
+
+
+def test_a_resolved_sine_has_the_mean_of_the_phasor():
+    """A rigid pad whose charges follow within the cycle, beside the mean drive: the straight parts of
+    the voltage cost (w h)^2 / 6.
+    """
+    steps = 48
+    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-4, resolved=True)
+    resolved = ev.simulate(scene(drive, [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]))
+    mean = ev.simulate(scene(replace(drive, resolved=False), [ev.Hover(2.0)]))
+    last = resolved.electrostatic_force[-steps:]
+    assert last.mean() == pytest.approx(mean.electrostatic_force[-1], rel=(2.0 * np.pi / steps) ** 2 / 3.0)
+    pulse = np.fft.rfft(last)
+    assert np.argmax(np.abs(pulse[1:])) + 1 == 2  # the force swings at twice the frequency
+
+
+def test_a_direct_voltage_leaks_as_the_closed_form_says():
+    drive = ev.Drive(skin=SKIN, gap_conductivity=1e-7, resolved=True)
+    waits = [ev.Hover(2.0), ev.Wait(1e-3, steps=5), ev.Wait(0.5, steps=5)]
+    found = ev.simulate(scene(drive, waits, 100.0))
+    pad = SMOOTH.mesh(2).node_sets["pad"]
+    for frame in found.frames:
+        gap, traction = frame.gap[pad], frame.electrostatic_traction[pad]
+        on = traction > 0
+        given = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": 0.30}
+        expected = step_pressure(
+            frame.time, gap[on], 100.0, **given, insulator=ev.TOUCHSCREEN, gap_conductivity=1e-7
+        )
+        np.testing.assert_allclose(traction[on], expected, rtol=1e-7)
+
+
+def test_the_balance_of_a_soft_hovering_pad_closes_with_the_source():
+    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-8, resolved=True)
+    found = ev.simulate(scene(drive, [ev.Hover(0.05), ev.Wait(1.0 / FREQUENCY, steps=20)]))
+    assert closed(found).max() < 1e-9
+    assert found.leakage_dissipation[-1] > 0.5 * found.source_work[-1] > 0.0
+    assert np.abs(found.electrostatic_work).max() > 0.0
+
+
+@pytest.mark.slow
+def test_the_balance_of_a_sliding_pad_closes_with_the_source():
+    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-8, resolved=True)
+    motion = [
+        ev.Press(force=0.05, steps=4),
+        ev.Slide(0.3, steps=3),
+        ev.Slide(20.0 / FREQUENCY, steps=20, speed=20.0),
+    ]
+    assert closed(ev.simulate(scene(drive, motion))).max() < 1e-6
+
+
+def test_without_time_or_leak_charges_change_nothing():
+    """Lossless layers under a slow ramp are those of the direct voltage at every step."""
+    wait = [ev.Hover(0.05), ev.Wait(0.1, steps=4)]
+    signal = ev.Sine(2.0, 100.0)
+    plain = ev.simulate(scene(None, wait, signal))
+    charged = ev.simulate(scene(ev.Drive(resolved=True), wait, signal))
+    np.testing.assert_allclose(charged.electrostatic_force, plain.electrostatic_force, rtol=1e-9)
+    assert charged.leakage_dissipation[-1] == 0.0
+
+
+def test_a_resumed_run_has_the_charges_of_the_uninterrupted_one():
+    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-7, resolved=True)
+    whole = scene(drive, [ev.Press(force=0.02, steps=2), ev.Wait(0.3 / FREQUENCY, steps=6)])
+
+    class Keep:
+        saved = None
+
+        def step(self, row, frame, checkpoint):
+            self.rows = [*getattr(self, "rows", []), dict(row)]
+            if row["step"] == 4:
+                self.saved = checkpoint()
+                self.first = list(self.rows)
+
+    keep = Keep()
+    straight = ev.simulate(whole, observers=[keep])
+    resumed = ev.simulate(whole, resume=ev.result.Saved(keep.saved, keep.first))
+    for name in ("electrostatic_force", "applied_force", "source_work", "field_energy"):
+        np.testing.assert_array_equal(resumed[name], straight[name])
+
+
+@pytest.mark.parametrize("coupling", ["staggered", "staggered_once"])
+def test_charges_go_with_both_couplings(coupling):
+    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-7, resolved=True)
+    motion = [ev.Hover(0.05), ev.Wait(0.25 / FREQUENCY, steps=5)]
+    together = ev.simulate(scene(drive, motion))
+    apart = ev.simulate(scene(drive, motion, coupling=coupling))
+    np.testing.assert_allclose(apart.electrostatic_force, together.electrostatic_force, rtol=1e-2)
