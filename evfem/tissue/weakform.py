@@ -52,7 +52,7 @@ class Tissue:
             (split(law, space.dim), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.loops = loops() if self.mu is not None and space.dim == 2 else None
+        self.loops = loops(space.dim) if self.mu is not None else None
 
     @cached_property
     def regions(self) -> list[tuple[Any, Integral]]:
@@ -170,11 +170,12 @@ class Tissue:
     def _looped_stress(self, loops: Any, u: Floats) -> tuple[Floats, Floats]:
         """`cell_stress` by the compiled loops."""
         cells = self.space.cells
-        means = np.empty((len(cells.nodes), 5, LANES))
+        components = 4 if self.space.dim == 2 else 6
+        means = np.empty((len(cells.nodes), components + 1, LANES))
         filled = blocked(self.pressure(u))
         loops.stresses(cells, np.ascontiguousarray(u), self._moduli[0], filled, means)
         found = unblocked(means, len(self.space.nodes))
-        return np.ascontiguousarray(found[:, :4]), np.ascontiguousarray(found[:, 4])
+        return np.ascontiguousarray(found[:, :-1]), np.ascontiguousarray(found[:, -1])
 
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
         """theta (E, Q) at u by the compiled loops, or its change along du (N, dim)."""
