@@ -22,7 +22,10 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces quality formats vtu msh file"),
+    "mesh": (
+        {"numpy", "scipy", "meshio"},
+        "hexahedron mesh archive faces solids quality formats vtu msh file",
+    ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
