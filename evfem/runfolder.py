@@ -24,7 +24,7 @@ from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.history import UNITS, WHOLE_UNITS, over_depth, read_rows
+from evfem.simulation.history import UNITS, WHOLE_UNITS, columns_of, over_depth, read_rows
 from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
 
 #: bytes of fields that are said before they are written
@@ -116,7 +116,8 @@ class RunFolder:
 
     def _write_history(self) -> None:
         self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
-        write_text(self.path / HISTORY, csv_header() + "".join(self._lines))
+        header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
+        write_text(self.path / HISTORY, header + "".join(self._lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.

@@ -92,3 +92,18 @@ def test_mesh_is_written(tmp_path, capsys):
     assert "hexahedron27" in capsys.readouterr().out
     mesh = meshfile.read(tmp_path / "tip.vtu")
     np.testing.assert_allclose(mesh.points, ev.Fingertip(ridges=False, resolution="coarse").mesh().points)
+
+
+def test_a_run_leaves_what_can_be_loaded(tmp_path, capsys):
+    """Columns of three dimensions with their names in `history.csv`, fields of the solid."""
+    lines = 'kind = "fingertip"\nridges = "none"\nresolution = "coarse"\n'
+    text = f"version = 1\n[finger]\n{lines}{REST}steps = 1\n".replace("0.2", "0.1")
+    (tmp_path / "tip.toml").write_text(text)
+    folder = tmp_path / "out"
+    assert main(["run", str(tmp_path / "tip.toml"), "--out", str(folder), "--no-plots"]) == 0
+    header, row = (folder / "history.csv").read_text().splitlines()
+    assert len(header.split(",")) == len(row.split(","))
+    result = ev.load(folder)
+    assert result["contact_area"][-1] > 1.0
+    assert result.frames[-1].displacement.shape == (len(result.mesh.points), 3)
+    assert result.normal_force[-1] == pytest.approx(result.applied_force[-1], rel=1e-6)
