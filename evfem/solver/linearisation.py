@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import FAINT, LONGER, NEIGHBOURS, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
+from evfem.common.constants import FAINT, LONGER, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
@@ -90,7 +90,7 @@ class Linearisation:
         if needed[self.candidates].sum() == needed.sum():
             return
         enough = np.sort(gap)[min(int(SPARE * needed.sum()), int(self.pad.free.sum()) - 1)]
-        wider = self.pad.free & ((gap <= max(enough, NEIGHBOURS * self.interface.length)) | needed)
+        wider = self.pad.free & ((gap <= max(enough, self.interface.neighbourhood)) | needed)
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
 
