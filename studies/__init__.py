@@ -26,6 +26,8 @@ NAMES = (
     "fig13",
     "participants",
     "uncertainty",
+    "friction_spectrum",
+    "stick_slip",
     "stability",
     "work_precision",
     "peers",
