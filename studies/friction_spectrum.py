@@ -122,7 +122,7 @@ def draw(series: list[Series]) -> Figure:
         for speed in sorted({float(one.name.split(".")[2].split("_")[0]) for one in series}):
             axes.axvline(speed / PITCH, color=COLOURS["neutral"], lw=0.6, zorder=0)
         axes.set(xlabel="frequency (Hz)")
-    left.set(ylabel="amplitude of tangential over normal force")
-    right.set(ylabel="the same over the height of the wave (1/mm)")
-    left.legend(fontsize=6.5)
+    left.set(ylabel="amplitude of friction over load")
+    right.set(ylabel="the same over the height (1/mm)", ylim=(0.03, 60.0))
+    right.legend(fontsize=6.5, loc="upper left", ncols=2)
     return figure
