@@ -28,6 +28,8 @@ NAMES = (
     "uncertainty",
     "frequency",
     "hypotheses",
+    "friction_spectrum",
+    "stick_slip",
     "stability",
     "work_precision",
     "peers",
