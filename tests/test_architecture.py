@@ -67,13 +67,15 @@ ROOMS = {
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
-        "texture generate library cleaning importing scans parametric touch estimators database commands",
+        "texture generate library cleaning importing scans parametric touch estimators database "
+        "estimate feeling commands",
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
         "fits tractions meshes movie",
     ),
+    "studio": ({"numpy"}, "state page runs server"),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (
