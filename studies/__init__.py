@@ -15,6 +15,7 @@ from evfem.errors import InputError, quoted
 NAMES = (
     "section321",
     "laws",
+    "fringe",
     "fig05",
     "fig06",
     "fig07",

@@ -168,9 +168,12 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
     parsed: Any = parse(SURFACES[kind], table, "surface")
     insulator = None if electrostatics is None else _insulator(electrostatics)
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
+    electrodes = getattr(electrostatics, "electrodes", None)
+    if electrodes is not None and kind != "flat":
+        raise InputError("electrostatics.electrodes", f"beside a surface of kind {kind}", "a flat surface")
     with at("surface"):
         if kind == "flat":
-            return Flat(**common) if insulator is None else Display(**common)
+            return Flat(**common) if insulator is None else Display(**common, electrodes=electrodes)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
         if kind in TEXTURES:
@@ -222,7 +225,9 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
     voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
-    same = {name: getattr(table, name) for name in ("air_layer", "direction", "field", "coupling")}
+    same = {
+        name: getattr(table, name) for name in ("air_layer", "direction", "field", "grounded", "coupling")
+    }
     same["roughness_gap"] = _roughness(table.roughness_gap)
     return {"law": law, "voltage": voltage, "drive": drive, **same}
 

@@ -162,6 +162,8 @@ class ElectrostaticsTable(Table):
     air_layer: bool = optional("true | false", True)
     direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
     field: Literal[FIELDS] = optional(" | ".join(FIELDS), FIELDS[0])  # type: ignore[valid-type]
+    electrodes: list[list[float]] | None = optional("rows [[from, to, share], ...] in mm, with gaps between")
+    grounded: bool = optional("true | false", True)
     coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
     roughness_gap: float | dict[str, Any] = optional(
         "a length in mm from 0 to 1, or a table [electrostatics.roughness_gap] with a law", 0.0
