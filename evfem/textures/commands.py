@@ -17,7 +17,7 @@ from evfem.textures.generate import Knobs, make
 from evfem.textures.importing import Source, from_csv, from_image, from_recording
 from evfem.textures.library import about, find, names, reference
 from evfem.textures.scans import from_scan
-from evfem.textures.texture import Texture, write
+from evfem.textures.texture import Texture, is_data, write
 from evfem.textures.touch import FrictionCurve, Touch, simulate_texture
 
 #: what each way of importing takes beside name, licence and note
@@ -130,6 +130,7 @@ def touch_of(given: argparse.Namespace) -> Touch:
 
 def _simulate(given: argparse.Namespace) -> None:
     texture, touch = find(given.name), touch_of(given)
+    _check_curve_file(given.out)
     with status(f"sliding over {texture.name}"):
         curve = simulate_texture(texture, touch)
     _curve(curve, given.out)
@@ -142,11 +143,17 @@ def _curve(curve: FrictionCurve, out: Path | None) -> None:
     print(f"{curve.source}: friction {low:.4g} to {high:.4g}, {mean:.4g} on average{band}", flush=True)
     if out is None:
         return
-    if out.suffix.lower() != ".csv":
-        raise InputError("--out", quoted(str(out)), "a file called .csv")
     rows = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
     write_text(out, csv_text([["x", "friction"], *rows]))
     print(out, flush=True)
+
+
+def _check_curve_file(out: Path | None) -> None:
+    """Raise InputError, before anything is computed, for a file that a curve does not go to."""
+    if out is not None and out.suffix.lower() != ".csv":
+        raise InputError("--out", quoted(str(out)), "a file called .csv")
+    if out is not None and is_data(out):
+        raise InputError("--out", f"{out}, which has the rows of a texture", "another file called .csv")
 
 
 def _database(given: argparse.Namespace) -> None:
