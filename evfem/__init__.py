@@ -20,6 +20,13 @@ _NAMES = {
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
     "calibration.result": ("FitResult",),
+    "contact.friction": (
+        "AdhesiveFriction",
+        "AgeingFriction",
+        "Coulomb",
+        "LoadIndexFriction",
+        "RateFriction",
+    ),
     "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
     "contact.textures": ("Grating", "SelfAffine"),
     "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),

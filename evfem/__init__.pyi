@@ -12,6 +12,11 @@ from evfem.calibration.measured import MeasuredValues as MeasuredValues
 from evfem.calibration.parameters import Parameter as Parameter
 from evfem.calibration.result import FitResult as FitResult
 from evfem.contact import surfaces as surfaces
+from evfem.contact.friction import AdhesiveFriction as AdhesiveFriction
+from evfem.contact.friction import AgeingFriction as AgeingFriction
+from evfem.contact.friction import Coulomb as Coulomb
+from evfem.contact.friction import LoadIndexFriction as LoadIndexFriction
+from evfem.contact.friction import RateFriction as RateFriction
 from evfem.contact.surfaces import Display as Display
 from evfem.contact.surfaces import Flat as Flat
 from evfem.contact.surfaces import Profile as Profile

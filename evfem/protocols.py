@@ -12,6 +12,7 @@ electrostatic law      ``Scene(law=...)``                        `ForceLaw`
 rough faces            ``Scene(roughness_gap=...)``              `RoughnessLaw`
 material               ``FingerPad(materials={region: ...})``    `StressLaw`, `EnergyLaw` or a `WeakForm`
 surface                ``Scene(surface=...)``                    `Surface`
+friction               ``Scene(friction_law=...)``               `FrictionLaw`
 voltage over time      ``Scene(voltage=...)``                    `TimeSignal`
 weak form              ``Scene.with_term(form(...), on=...)``    `WeakForm`
 observer               ``simulate(observers=[...])``             any of `Starting`, `Stepping`, `Finishing`
@@ -146,6 +147,20 @@ class CompleteSurface(Surface, Protocol):
 
     def shifted(self, y: float) -> Any:
         """The same surface at the height `y` (mm)."""
+
+
+@runtime_checkable
+class FrictionLaw(Protocol):
+    """How much shear a touching node carries before it slips, and while it does.
+
+    Optional: `timed` True for a law that depends on speed or age, so that slides need a speed.
+    """
+
+    def bound(self, pressure: Any, mu: Any, speed: Any, age: Any) -> Any:
+        """Largest shear traction in MPa, not negative, at contact pressures in MPa, coefficients of
+        the surface at the node's place, speeds of slip in mm/s (0 for a node that sticks, or where
+        no time passes) and times since it touched in s. Complex-safe, or it is differenced.
+        """
 
 
 @runtime_checkable

@@ -22,7 +22,7 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive quality formats vtu msh file"),
+    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces quality formats vtu msh file"),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -39,20 +39,21 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "surfaces textures own pad edge charging attraction signorini follower condensed stability",
+        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb "
+        "sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface linearisation pressure anderson findings "
+        "strategy state control condensation interface spatial linearisation pressure anderson findings "
         "equilibrium factorised relaxation stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "timescales plan",
+        "timescales spatial plan",
     ),
     "simulation": (
-        {"numpy", "threadpoolctl"},
+        {"numpy", "scipy", "threadpoolctl"},
         "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
@@ -96,7 +97,7 @@ LATE = {
     "SurfaceTopography",
 }
 #: compiled from C, without imports
-BUILT = {"evfem.tissue.kernels.loops"}
+BUILT = {"evfem.tissue.kernels.loops", "evfem.tissue.kernels.solids"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
 
 

@@ -49,6 +49,13 @@ MORE                    so many times the iterations may be used where the resid
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
+DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice as    discs
+                        many each time that they come again
+DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
+DISC_FALL               where they come again, a step after which the forces miss the laws by more  discs
+                        than this fraction of before is shortened
+DISC_ROUNDS             so often before the contact problem is given up                           discs
+DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
@@ -108,6 +115,8 @@ ALIKE = 1e-3
 MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
+DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
+DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 STABLE = 0.9
 LOST = 3
 ROUNDING = 1e-12

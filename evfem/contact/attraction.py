@@ -14,6 +14,9 @@ Trial states that penetrate count as touching, g = 0.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
 
+In three dimensions A_j is the node's projected area (`evfem.contact.skin`), forces are in N, and the
+direction is vertical.
+
 Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
 sees g + s, with p the node's own contact pressure, its pressing force over A_j. A node that is
 pressed by d lam_n more is pulled by :math:`p'(s)\,s'(p)\,d\lambda_n` more (`gain_on_pressing`).
@@ -30,6 +33,7 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
 from evfem.contact.pad import Pad, surface_state
+from evfem.contact.skin import Skin
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
 from evfem.tensor import derivative, mul, positive_part
@@ -61,7 +65,7 @@ class Attraction:
 
     law: Any
     layers: Any
-    pad: Pad
+    pad: Pad | Skin
     surface: Any
     direction: str = "vertical"
     air_layer: bool = True
@@ -77,29 +81,29 @@ class Attraction:
         """Charges (2, P) of an uncharged pad, (2, 0) where charges do not move."""
         return np.zeros((2, 0)) if self.charging is None else self.charging.none
 
-    def _seen(self, gap: Any, voltage: float, x: Floats) -> Any:
-        """The voltage that the law sees at gaps (P,) of nodes at x (P,): that of the charges, too."""
+    def _seen(self, gap: Any, voltage: float, position: Floats) -> Any:
+        """The voltage that the law sees at gaps (P,) of nodes at (P, dim): that of the charges, too."""
         if self.charging is None:
             return voltage
-        return self.charging.effective(gap, voltage, self.pad.length(x))
+        return self.charging.effective(gap, voltage, self.pad.tributary(position))
 
     def charged(
         self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
     ) -> Charged:
-        """The electric state at positions (P, 2): with the charges (2, P), or those at the end of
+        """The electric state at positions (P, dim): with the charges (2, P), or those at the end of
         the present step.
         """
         assert self.charging is not None
-        x = position[:, 0]
-        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + self._separation(x, pressing)
-        length = self.pad.length(x)
+        apart = self._separation(position, pressing)
+        gap = np.maximum(surface_state(self.surface, position).gap, 0.0) + apart
+        length = self.pad.tributary(position)
         found = self.charging.after(gap, voltage, length) if charges is None else charges
         return Charged(found, voltage, gap, length)
 
     def forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Nodal forces on the finger (P, 2); `touching` (P,) says who carries force without an air
+        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air
         layer.
         """
         pressed = None if pressing is None else pressing[None]
@@ -108,42 +112,46 @@ class Attraction:
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """`forces` at W places of a way (W, P, 2), from positions (W, P, 2), voltages (W,) and
+        """`forces` at W places of a way (W, P, dim), from positions (W, P, dim), voltages (W,) and
         contact forces (W, P).
         """
         if not voltages.any() and self.charging is None:
             return np.zeros_like(positions)
         frame = surface_state(self.surface, positions.reshape(-1, positions.shape[-1]))
-        x = positions[..., 0]
-        gaps = np.maximum(frame.gap, 0.0).reshape(x.shape) + self._separation(x, pressing)
-        pairs = [(gap, self._seen(gap, u, at)) for gap, u, at in zip(gaps, voltages.tolist(), x, strict=True)]
+        gaps = np.maximum(frame.gap, 0.0).reshape(positions.shape[:-1])
+        gaps = gaps + self._separation(positions, pressing)
+        at = zip(gaps, voltages.tolist(), positions, strict=True)
+        pairs = [(gap, self._seen(gap, u, position)) for gap, u, position in at]
         on = 1.0 if self.air_layer else touching.astype(float)
         pressure = np.array([self.law.traction(gap, voltage, self.layers) for gap, voltage in pairs])
-        weight = on * pressure * self.pad.length(x)
+        weight = on * pressure * self.pad.tributary(positions)
         if self.direction == "vertical":
-            return np.stack([np.zeros_like(weight), -weight], axis=-1)
+            forces = np.zeros_like(positions)
+            forces[..., 1] = -weight
+            return forces
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
-        sideways = [self._sideways(*each) for each in zip(x, potential, strict=True)]
+        sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
     def _sideways(self, x: Floats, potential: Floats) -> Floats:
         """Forces along x (P,) that lengthen the tributary lengths, at x (P,), by the potential (P,)."""
+        assert isinstance(self.pad, Pad)  # three dimensions have the vertical direction alone
         of, moved, value = self.pad.length_gradient(x)
         return np.asarray(-np.bincount(moved, potential[of] * value, x.size), dtype=float)
 
-    def _separation(self, x: Floats, pressing: Floats | None) -> Any:
-        """What rough faces keep between them at the nodes at x (..., P), in mm."""
+    def _separation(self, position: Floats, pressing: Floats | None) -> Any:
+        """What rough faces keep between them at the nodes at (..., P, dim), in mm."""
         if self.roughness is None:
             return 0.0
-        return self.roughness.separation(self._contact_pressure(x, pressing))
+        return self.roughness.separation(self._contact_pressure(position, pressing))
 
-    def _contact_pressure(self, x: Floats, pressing: Floats | None) -> Floats:
-        """Contact pressure in MPa of the nodes at x (..., P)."""
+    def _contact_pressure(self, position: Floats, pressing: Floats | None) -> Floats:
+        """Contact pressure in MPa of the nodes at (..., P, dim)."""
         if pressing is None:
-            return np.zeros(x.shape)
-        length = self.pad.length(x)
-        facing = length > 0.0
-        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, length, 1.0), 0.0)
+            return np.zeros(position.shape[:-1])
+        share = self.pad.tributary(position)
+        facing = share > 0.0
+        return np.where(facing, np.maximum(pressing, 0.0) / np.where(facing, share, 1.0), 0.0)
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
         """By how much the attraction of a node grows per contact force that presses it (P,): the
@@ -152,9 +160,9 @@ class Attraction:
         if self.roughness is None:
             return np.zeros(len(position))
         on = 1.0 if self.air_layer else touching.astype(float)
-        p = self._contact_pressure(position[:, 0], pressing)
+        p = self._contact_pressure(position, pressing)
         closer = separation_derivative(self.roughness, p)
-        rate = self._rate(self.roughness.separation(p), voltage, position[:, 0])
+        rate = self._rate(self.roughness.separation(p), voltage, position)
         return np.asarray(on * rate * closer)
 
     def negative_stiffness(
@@ -166,42 +174,40 @@ class Attraction:
         """
         gap = surface_state(self.surface, position).gap
         on = 1.0 if self.air_layer else touching.astype(float)
-        x = position[:, 0]
-        apart = np.maximum(gap, 0.0) + self._separation(x, pressing)
-        weakening = -on * self._rate(apart, voltage, x) * self.pad.length(x)
+        apart = np.maximum(gap, 0.0) + self._separation(position, pressing)
+        rate = self._rate(apart, voltage, position)
+        weakening = -on * rate * self.pad.tributary(position)
         return np.where((gap > TOUCHING) & (weakening > 0.0), weakening, 0.0)
 
-    def _rate(self, apart: Floats, voltage: float, x: Floats) -> Any:
-        """dp/dg (P,) in MPa/mm of nodes at x (P,), the charges of the present step following."""
+    def _rate(self, apart: Floats, voltage: float, position: Floats) -> Any:
+        """dp/dg (P,) in MPa/mm of nodes at (P, dim), the charges of the present step following."""
         if self.charging is None:
             return traction_derivative(self.law, apart, voltage, self.layers)
         law = self.law
-        seen = lambda g: law.traction(g, self._seen(g, voltage, x), self.layers)  # noqa: E731
+        seen = lambda g: law.traction(g, self._seen(g, voltage, position), self.layers)  # noqa: E731
         return derivative(seen, apart, GAP_STEP)
 
     def stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
-        component).
+        """Derivative of `forces` by the node positions, sparse (dim P, dim P), unknowns ordered
+        (node, component).
         """
-        size = position.shape[0]
+        size, dim = position.shape
         frame = surface_state(self.surface, position)
-        length = self.pad.length(position[:, 0])
         on = 1.0 if self.air_layer else touching.astype(float)
-        x = position[:, 0]
-        apart = np.maximum(frame.gap, 0.0) + self._separation(x, pressing)
-        p = on * self.law.traction(apart, self._seen(apart, voltage, x), self.layers)
+        apart = np.maximum(frame.gap, 0.0) + self._separation(position, pressing)
+        p = on * self.law.traction(apart, self._seen(apart, voltage, position), self.layers)
         dp = -self.negative_stiffness(position, voltage, touching, pressing)
-        of, moved, value = self.pad.length_gradient(position[:, 0])
+        of, moved, value = self.pad.tributary_gradient(position)
         nodes = np.arange(size)
-        rows = [2 * nodes + 1, 2 * nodes + 1, 2 * of + 1]
-        columns = [2 * nodes + 1, 2 * nodes, 2 * moved]
+        rows = [dim * nodes + 1, dim * nodes + 1, dim * of + 1]
+        columns = [dim * nodes + 1, dim * nodes, moved]
         values = [-dp, dp * frame.slope, -p[of] * value]
         if self.direction == "normal":
-            w = p * length
-            rows += [2 * nodes, 2 * nodes, 2 * of, 2 * moved, 2 * moved]
-            columns += [2 * nodes + 1, 2 * nodes, 2 * moved, 2 * of + 1, 2 * of]
+            w = p * self.pad.tributary(position)
+            rows += [2 * nodes, 2 * nodes, 2 * of, moved, moved]
+            columns += [2 * nodes + 1, 2 * nodes, moved, 2 * of + 1, 2 * of]
             values += [
                 dp * frame.slope,
                 w * frame.curvature - dp * frame.slope**2,
@@ -210,4 +216,4 @@ class Attraction:
                 (p * frame.slope)[of] * value,
             ]
         triplets = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-        return sparse.csr_matrix(triplets, shape=(2 * size, 2 * size))
+        return sparse.csr_matrix(triplets, shape=(dim * size, dim * size))

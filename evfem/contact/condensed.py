@@ -1,5 +1,6 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
-problem posed on it. For the plane: a node has one slip, and forces follow a profile over x.
+problem posed on it. For the plane, where a node has one slip; what differs in three dimensions is
+in `evfem.contact.spatial`.
 
 With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel
 under a prescribed force, the squared voltage under a prescribed friction force) that push with p,
@@ -29,6 +30,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -63,9 +65,11 @@ class Candidates:
     along normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes
     over x (c,) in 1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0
     for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
-    needs no other solver. The attraction weakens with a node's gap by `negative_stiffness` (c,)
-    N/mm per mm and is stronger by `gain_on_closing` (c,) N/mm where the gap is closed;
-    `roughness` says how it depends on the contact force.
+    needs no other solver. A law of friction other than Coulomb's gives its derivative by the
+    contact force as the coefficient, and beside it `cohesion` (c,) in N/mm and how much friction
+    grows with the slip of the step, `slip_stiffness` (c,) in N/mm per mm. The attraction weakens
+    with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
+    (c,) N/mm where the gap is closed; `roughness` says how it depends on the contact force.
     """
 
     surface: SurfaceState
@@ -78,6 +82,8 @@ class Candidates:
     gain_on_closing: Floats
     friction_slope: Floats
     roughness: Roughness | None = None
+    cohesion: Floats | None = None
+    slip_stiffness: Floats | None = None
 
     @cached_property
     def axes(self) -> Floats:
@@ -99,13 +105,15 @@ class Candidates:
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
         growth = sign * self.friction_slope * self.force[:, 0]
+        if self.slip_stiffness is not None:
+            growth = growth - (self.status >= FORWARD) * self.slip_stiffness * self.surface.stretch
         growth = np.where(growth * own < STABLE, growth, 0.0)
         return turned + growth[:, None] * axes[:, 1]
 
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements (2 c,), contact forces (c, 2) along n and t, statuses
+    """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses
     (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
     had to be scaled down.
     """
@@ -120,35 +128,42 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """The condensed tangent on (candidates, bone x, bone y) and the compliance of the candidates,
-    coupled by the attraction.
+    """The condensed tangent on (candidates, bone x, bone y[, bone z]) and the compliance of the
+    candidates, coupled by the attraction.
     """
 
     schur: Floats
     compliance: Floats
+    dim: int = 2
     _last: dict[bytes, Floats] = field(default_factory=dict, repr=False)
 
     @classmethod
-    def make(cls, schur: Floats, coupling: Floats | None) -> CondensedTangent:
-        """From S (m, m) and the attraction's stiffness between nodes (m - 2, m - 2), or None."""
-        inner = schur[:-2, :-2] if coupling is None else schur[:-2, :-2] - coupling
-        return cls(schur, _inverse(inner, symmetric=coupling is None))
+    def make(cls, schur: Floats, coupling: Floats | None, dim: int = 2) -> CondensedTangent:
+        """From S (m, m) and the attraction's stiffness between nodes (m - dim, m - dim), or None."""
+        inner = schur[:-dim, :-dim] if coupling is None else schur[:-dim, :-dim] - coupling
+        return cls(schur, _inverse(inner, symmetric=coupling is None), dim)
+
+    def rows(self, near: Ints) -> Ints:
+        """Rows of these candidates: in the plane y before x, in three dimensions node by node."""
+        if self.dim == 2:
+            return y_before_x(near)
+        return np.asarray((3 * near[:, None] + np.arange(3)).ravel())
 
     def among(self, near: Ints) -> Floats:
-        """Compliance among these candidates (2 k, 2 k), y before x; they are often those of the
+        """Compliance among these candidates, in the order of `rows`; they are often those of the
         last call.
         """
         key = near.tobytes()
         if key not in self._last:
-            rows = y_before_x(near)
+            rows = self.rows(near)
             self._last.clear()
             self._last[key] = self.compliance[np.ix_(rows, rows)]
         return self._last[key]
 
     @cached_property
     def bone_rows(self) -> Floats:
-        """Forces on the bone's x and y by forces on the candidates, (2, m - 2)."""
-        return self.schur[-2:, :-2] @ self.compliance
+        """Forces on the bone by forces on the candidates, (dim, m - dim)."""
+        return self.schur[-self.dim :, : -self.dim] @ self.compliance
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +171,7 @@ class ExtraUnknown:
     """A number that a step has to find beside the displacements, and the force on the bone that
     settles it.
 
-    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y) whose
+    `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y, 2 z) whose
     force shall be `force` (N/mm).
     """
 
@@ -170,7 +185,7 @@ class LinearContactStep:
     """One linear step of the condensed body: contact is solved on it, and the candidates'
     displacement comes back.
 
-    `residual` g (m,) of the forward solve; `bone` (2,) the bone's known increment; `unknowns` what
+    `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
     else moves the body; `snap`: nodes that the attraction pulls over the gap close at once;
     `timed`: time passes, and a shorter step is held by viscosity or inertia, where one without time
     must go the way it is pushed.
@@ -191,7 +206,7 @@ class LinearContactStep:
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
         status, solves = self.candidates.status.copy(), 0
-        own = np.diagonal(self.body.compliance)[1::2]
+        own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)
         )
@@ -209,7 +224,7 @@ class LinearContactStep:
                 break
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
-        force[near] = found.force.reshape(2, -1).T
+        force[near] = self._by_node(found.force)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
@@ -219,35 +234,44 @@ class LinearContactStep:
         unknown = self.unknowns[0]
         bone = self.bone.copy()
         bone[unknown.axis] += travel
-        S = self.body.schur[unknown.axis - 2]
-        own = travel * (unknown.push[unknown.axis - 2] + S[unknown.axis - 2])
-        found = S @ np.concatenate([solution.moved, bone]) - self.residual[unknown.axis - 2]
+        axis = unknown.axis - self.body.dim
+        S = self.body.schur[axis]
+        own = travel * (unknown.push[axis] + S[axis])
+        found = S @ np.concatenate([solution.moved, bone]) - self.residual[axis]
         return float(unknown.force + own - found)
 
     def _along_normal(self, moved: Floats) -> Floats:
-        return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, 2))
+        return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, self.body.dim))
+
+    @staticmethod
+    def _by_node(force: Floats) -> Floats:
+        """Forces (k, dim) from how the contact problem orders them."""
+        return force.reshape(2, -1).T
 
     def _free_motion(self) -> Floats:
-        """Candidates' motion without contact forces, and per unit of each extra unknown: (2 c, 1 +
-        p).
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1
+        + p).
         """
-        right = self.residual[:-2] - self._present - self.body.schur[:-2, -2:] @ self.bone
+        dim = self.body.dim
+        right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
         return self.body.compliance @ np.column_stack(
-            [right, *(unknown.push[:-2] for unknown in self.unknowns)]
+            [right, *(unknown.push[:-dim] for unknown in self.unknowns)]
         )
 
     @cached_property
     def _present(self) -> Floats:
-        """Present contact forces on the candidates (2 c,), in the laboratory frame."""
+        """Present contact forces on the candidates (dim c,), in the laboratory frame."""
         return np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
-        """Candidates' motion (2 c,) by forces (2 k,), y before x, on the near ones."""
-        force = np.zeros(2 * self.candidates.status.size)
-        force[y_before_x(near)] = pushed
+        """Candidates' motion (dim c,) by forces on the near ones, in the order of
+        `CondensedTangent.rows`.
+        """
+        force = np.zeros(self.body.dim * self.candidates.status.size)
+        force[self.body.rows(near)] = pushed
         return self.body.compliance @ force
 
-    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
+    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[Any, Floats]:
         """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y
         before x, that move the body, those of the follower stiffness included.
         """
@@ -278,7 +302,8 @@ class LinearContactStep:
         if known.interface_compliance.any():
             compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
-        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns)
+        cohesion = None if known.cohesion is None else known.cohesion[near]
+        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns, cohesion=cohesion)
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
             known.surface.normal_gap[near],
@@ -302,20 +327,34 @@ class LinearContactStep:
     ) -> ExtraUnknowns:
         """Balance of the bone along the unknowns' axes, as the equations that settle them."""
         C, W = near
-        axis = [unknown.axis - 2 for unknown in self.unknowns]
+        row, pivot, value = self._balance(rows, free)
+        through = follower.transposed(row)
+        row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
+        return ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, self._held(pivot, free), value)
+
+    def _balance(self, rows: Ints, free: Floats) -> tuple[Floats, Floats, Floats]:
+        """Forces on the bone along the unknowns' axes by forces on these rows of the candidates, by
+        the unknowns, and what is missing without both.
+        """
+        dim = self.body.dim
+        axis = [unknown.axis - dim for unknown in self.unknowns]
         S = self.body.schur[axis]
         pushes = np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
         wanted = np.array([unknown.force for unknown in self.unknowns])
         row = self.body.bone_rows[[unknown.axis for unknown in self.unknowns]][:, rows]
-        pivot = S[:, :-2] @ free[:, 1:] - pushes
-        value = self.residual[axis] + wanted - S[:, -2:] @ self.bone - S[:, :-2] @ free[:, 0]
-        through = follower.transposed(row)
-        row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
-        # a body that nothing holds has a zero here, whose rounding may be negative: let it fall, not rise
-        floor = UNHELD * np.abs(S[:, :-2] @ free[:, 1:]).max(initial=0.0)
+        pivot = S[:, :-dim] @ free[:, 1:] - pushes
+        value = self.residual[axis] + wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0]
+        return row, pivot, value
+
+    def _held(self, pivot: Floats, free: Floats) -> Floats:
+        """A body that nothing holds has a zero here, whose rounding may be negative: let it fall,
+        not rise.
+        """
+        dim = self.body.dim
+        axis = [unknown.axis - dim for unknown in self.unknowns]
+        floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
         own = np.diagonal(pivot)
-        pivot = pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
-        return ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, pivot, value)
+        return pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
 
 
 def _inverse(matrix: Floats, symmetric: bool) -> Floats:

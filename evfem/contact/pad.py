@@ -57,6 +57,15 @@ class Pad:
         found = np.bincount(nodes.ravel(), shared.ravel(), rows.size)
         return found.astype(float, copy=False).reshape(x.shape)
 
+    def tributary(self, position: Floats) -> Floats:
+        """`length` of positions (..., P, 2); the name that `evfem.contact.skin.Skin` has for areas."""
+        return self.length(position[..., 0])
+
+    def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
+        """`length_gradient` with respect to the unknowns, 2 j + a for component a of node j."""
+        of, moved, value = self.length_gradient(position[:, 0])
+        return of, 2 * moved, value
+
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
         """Derivative of the tributary lengths with respect to x, as triplets (node, moved node,
         value).
@@ -165,7 +174,7 @@ class SurfaceState:
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at current node positions (P, 2); `surface` has y set, so that h(x) =
+    """Surface frame at current node positions (P, dim); `surface` has y set, so that h(x) =
     surface.y + surface.height(x).
     """
     x = position[:, 0]

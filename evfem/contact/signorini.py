@@ -42,6 +42,9 @@ other slip) when it moves along its own friction. It passes through slip between
 one that sticks beside a pulling shear force would seem to open. No constant has to be chosen. What
 has not converged is never used.
 
+A bound of friction that is no multiple of the contact force (`evfem.contact.friction`) is linear
+here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
+
 If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
 solution; its negative stiffness is then scaled to 0.9 of the critical value
 (`solve_with_attraction`).
@@ -56,6 +59,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -115,7 +119,8 @@ class AttractionStiffness:
 @dataclass(frozen=True)
 class ContactProblem:
     """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients
-    (k,), optional extra_unknowns.
+    (k,), optional extra_unknowns, and the shear force that friction has without a pressing one,
+    `cohesion` (k,) in N/mm (None: none).
 
     The first k entries are normal (gap, pressing force), the last k tangential (slip, shear
     force).
@@ -126,11 +131,23 @@ class ContactProblem:
     friction: Floats
     extra_unknowns: ExtraUnknowns | None = None
     attraction: AttractionStiffness | None = None
+    cohesion: Floats | None = None
 
     @property
     def size(self) -> int:
         """Number of candidate nodes k."""
         return self.friction.size
+
+    @property
+    def resists(self) -> Any:
+        """Which nodes have friction (k,) bool."""
+        rough = self.friction > 0.0
+        return rough if self.cohesion is None else rough | (self.cohesion > 0.0)
+
+    def limit(self, normal: Floats) -> Floats:
+        """Largest shear force (k,) under pressing forces (k,)."""
+        limit = self.friction * normal
+        return limit if self.cohesion is None else limit + self.cohesion
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
         """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given
@@ -180,7 +197,7 @@ def lost_stability(problem: ContactProblem) -> bool:
 
 
 def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
-    status = np.where((problem.friction == 0.0) & (status != OPEN), FORWARD, status)
+    status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
     many = ACTIVE_SET_LIMIT // 3
     seen: set[bytes] = set()
     first = False
@@ -280,7 +297,8 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     k, C, extra = problem.size, problem.compliance, problem.extra_unknowns
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     # shear force per pressing force of slipping nodes: against the slip
-    ratio = problem.friction * ((status == BACKWARD).astype(float) - (status == FORWARD))
+    against = (status == BACKWARD).astype(float) - (status == FORWARD)
+    ratio = problem.friction * against
     attracted = np.zeros(0, dtype=np.int64)
     if problem.attraction is not None:
         attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
@@ -304,12 +322,17 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         own = np.arange(rows.size - attracted.size, rows.size)
         matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
         right[own] += problem.attraction.reference_gap[attracted]
+    known = drop
+    if problem.cohesion is not None:
+        shear = np.concatenate([np.zeros(k), problem.cohesion * against])
+        right -= C[rows] @ shear
+        known = drop + shear
     if extra is not None:
         row = extra.rows[:, rows]
         row[:, : active.size] *= 1.0 - gain
         row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
         matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
-        right = np.append(right, extra.right - extra.rows @ drop)
+        right = np.append(right, extra.right - extra.rows @ known)
     try:
         x = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
@@ -320,6 +343,8 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     drop[attracted] += x[contact : rows.size]
     drop[active] -= gain * x[: active.size]
     force[k:] += ratio * force[:k]
+    if problem.cohesion is not None:
+        force[k:] += problem.cohesion * against
     return force, drop, x[rows.size :]
 
 
@@ -329,7 +354,7 @@ def _next_statuses(
     """Statuses that the solution asks for, and by how much each node violates its own, in
     comparable units.
     """
-    k, mu = problem.size, problem.friction
+    k, resists = problem.size, problem.resists
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
     own_compliance = np.maximum(np.abs(np.diagonal(problem.compliance)[:k]), 1e-300)
     scale = max(np.abs(normal).max(initial=0.0), np.abs(gap / own_compliance).max(initial=0.0) * 1e-3, 1e-300)
@@ -341,11 +366,11 @@ def _next_statuses(
         wanted[where] = to[where]
         violation[where] = amount[where]
 
-    entering = np.where((mu > 0) & (slip == 0.0), STICK, np.where(slip < 0, BACKWARD, FORWARD))
+    entering = np.where(resists & (slip == 0.0), STICK, np.where(slip < 0, BACKWARD, FORWARD))
     change((status == OPEN) & (gap / own_compliance < -noise), entering, -gap / own_compliance)
-    beyond = np.abs(shear) - mu * normal
+    beyond = np.abs(shear) - problem.limit(normal)
     change((status == STICK) & (beyond > noise), np.where(shear < 0, FORWARD, BACKWARD), beyond)
     along = np.where(status == BACKWARD, slip, -slip) / own_compliance
-    change((status >= FORWARD) & (mu > 0) & (along > noise), np.full(k, STICK), along)
+    change((status >= FORWARD) & resists & (along > noise), np.full(k, STICK), along)
     change((status >= FORWARD) & (normal < -noise), np.full(k, OPEN), -normal)
     return wanted, violation

@@ -7,12 +7,13 @@ the compliance C of body and bone, local frames, and :math:`m = \pm\mu` of the s
 
 .. math:: A = C_{tt} - (C_{tn} + C_{tt} m)\,(C_{nn} + C_{nt} m)^{-1} C_{nt},
 
-the held forces eliminated; gaps of open nodes likewise. Three forces grow with such a motion, by
+the held forces eliminated; gaps of open nodes likewise. Four forces grow with such a motion, by
 a stiffness D of their own:
 
 - contact forces that turn with the profile, :math:`D = -\lambda_n (1 + \mu^2)\,h''/(1 + h'^2)^{3/2}`, which
   is positive on a crest; friction turns with the normal force that it needs,
 - friction whose coefficient falls along the way, :math:`D = -\lambda_n\,d\mu/ds`,
+- friction that falls with the speed, :math:`D = -(db/dv)/\Delta t`,
 - the attraction of open nodes, :math:`D = -A\,dp/dg` with their gaps.
 
 Together they grow `share` times as fast as what holds the tissue, the largest real eigenvalue of
@@ -33,6 +34,7 @@ from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ExtraUnknown
 #: the forces, by what they do
 SLOPES = "on the slopes of the profile the contact forces push the finger aside"
 FALLING = "friction falls along the way"
+FASTER = "friction falls with the speed"
 ATTRACTION = "the attraction grows as the gap closes"
 
 
@@ -55,10 +57,14 @@ def verge(step: LinearContactStep) -> Verge:
     turning = -normal * (1.0 + ratio**2) * (surface.curvature / surface.stretch**3)[slipping]
     slope = known.friction_slope[slipping] / surface.stretch[slipping]
     falling = np.sign(ratio) * normal * slope
+    faster = np.zeros(slipping.size)
+    if known.slip_stiffness is not None:
+        faster = -known.slip_stiffness[slipping]
     none, far = np.zeros(slipping.size), np.zeros(opened.size)
     grows = {
         SLOPES: np.concatenate([turning, far]),
         FALLING: np.concatenate([falling, far]),
+        FASTER: np.concatenate([faster, far]),
         ATTRACTION: np.concatenate([none, known.negative_stiffness[opened]]),
     }
     share, motion = _fastest(

@@ -60,8 +60,8 @@ class Drive:
     cycle, which is right where the finger is too slow to follow twice the frequency; resolved, the
     steps follow the voltage of the moment, and charges move.
 
-    >>> Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8).peak(70.7107)
-    100.00003...
+    >>> Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8).peak(50.0)
+    70.71067811865476
     """
 
     frequency: float | None = field(default=None, metadata=_FREQUENCY)
@@ -126,7 +126,7 @@ def harmonics() -> tuple[Floats, Floats]:
     """Orders and weights of the harmonics of a square wave, the sum of the weights being 1.
 
     >>> order, weight = harmonics()
-    >>> order[:3].tolist(), weight[:2].round(4).tolist(), round(weight.sum(), 12)
+    >>> order[:3].tolist(), weight[:2].round(4).tolist(), round(float(weight.sum()), 12)
     ([1.0, 3.0, 5.0], [0.8106, 0.0901], 1.0)
     """
     order = np.arange(1.0, HIGHEST, 2.0)
@@ -135,7 +135,8 @@ def harmonics() -> tuple[Floats, Floats]:
     ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
     begins = np.concatenate([np.arange(SINGLE), ends])
     sums = np.add.reduceat(weight, begins)
-    return np.exp(np.add.reduceat(weight * np.log(order), begins) / sums), sums
+    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / sums)
+    return np.concatenate([order[:SINGLE], mean[SINGLE:]]), sums
 
 
 def mean_law(

@@ -15,7 +15,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
-from evfem.electrostatics.laws import Layers
+from evfem.electrostatics.drive import CREST, Drive, mean_law
+from evfem.electrostatics.laws import Layer, Layers
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw
 
@@ -91,7 +92,8 @@ def share_not_renderable(position: Values, friction: Values, display_friction: f
 @dataclass(frozen=True)
 class Encoding:
     """A display with what is needed to encode friction as voltage: law, solid layers, area law,
-    own friction.
+    own friction. Voltages are effective ones; `crest` is the peak of the display's waveform over
+    them.
 
     The paper's (16a), (17), (19), (20a) are this with `Kaczmarek`, (16b), (20b) with
     `StrongTroxel`; (20a) and (20b) have a linear area law, where the voltage does not depend on
@@ -108,8 +110,31 @@ class Encoding:
     layers: Layers
     area: AreaLaw
     friction: float
+    crest: float = CREST["sine"]
+
+    @classmethod
+    def driven(
+        cls, law: ForceLaw, drive: Drive, solids: tuple[Layer, Layer], area: AreaLaw, friction: float
+    ) -> Encoding:
+        """With a `drive` at its frequency, through what skin and gap conduct; `solids` are stratum
+        corneum and insulator. Voltages stay effective ones, `peak` is that of the drive's waveform.
+
+        >>> from evfem.electrostatics.laws import FILM, Layer, StrongTroxel
+        >>> fast, slow = (
+        ...     Encoding.driven(StrongTroxel(), Drive(f, skin="gabriel_dry"), (Layer(0.38, 1.0), FILM),
+        ...                     AreaLaw(112.0), friction=0.5) for f in (1e5, 100.0))
+        >>> round(fast.voltage_for_friction(0.6) / slow.voltage_for_friction(0.6), 4)
+        1.0126
+        """
+        skin = drive.skin_layer(solids[0].thickness, solids[0].eps_r)
+        if drive.resolved:
+            raise InputError("drive", "resolved in time", "the mean over the cycle")
+        return cls(
+            *mean_law(law, drive, drive.frequency, (skin, solids[1])), area, friction, CREST[drive.waveform]
+        )
 
     def __post_init__(self) -> None:
+        above("crest", self.crest, 0.0, "a peak over effective voltage above zero")
         above("friction", self.friction, 0.0, "a friction coefficient above zero")
         one, two = (np.asarray(self.law.traction(0.0, u, self.layers)) for u in (1.0, 2.0))
         if not np.allclose(two, 4.0 * one, rtol=1e-9, atol=0.0):
@@ -122,6 +147,10 @@ class Encoding:
     def tangential_force(self, normal_force: Values, voltage: Values) -> Values:
         """F_t = mu_hd (F_n + F_e) in N in full slip, equations (1), (13), (16a), (16b)."""
         return plain(self.friction * np.asarray(normal_force + self.attraction(normal_force, voltage)))
+
+    def peak(self, voltage: Values) -> Values:
+        """Peak (V) of the alternating voltage whose effective value is `voltage` (V)."""
+        return plain(self.crest * np.asarray(voltage))
 
     def voltage_for_attraction(self, attraction: Values, normal_force: Values) -> Values:
         """U in V that attracts with `attraction` N at `normal_force` N, equation (17)."""

@@ -51,7 +51,11 @@ def ticks(length: float, speed: float) -> tuple[int, int]:
 
 
 def document(
-    profile: VoltageProfile, full_scale: float, speed: float, friction: tuple[float, float]
+    profile: VoltageProfile,
+    full_scale: float,
+    speed: float,
+    friction: tuple[float, float],
+    carrier: float | None = None,
 ) -> dict[str, Any]:
     r"""The file as Python objects: one friction perception with one curve band.
 
@@ -59,8 +63,8 @@ def document(
 
     `friction` is (mu_0, mu_1): the display's own coefficient, and that at `full_scale` volts,
     because attraction grows with the square of the voltage. A keyframe's amplitude times the
-    channel's gain is mu. `profile` has a length, `speed` is in mm/s; `signalfile.write_signal`
-    checks all this.
+    channel's gain is mu; the `carrier` (Hz) of the display stands in the description. `profile`
+    has a length, `speed` is in mm/s; `signalfile.write_signal` checks all this.
 
     >>> file = document(VoltageProfile([0.0, 10.0], [0.0, 2000.0]), 2000.0, 20.0, (0.5, 0.6))
     >>> channel = file["perceptions"][0]["channels"][0]
@@ -100,12 +104,13 @@ def document(
         "effect_library": [],
         "channels": [_channel(largest, band)],
     }
+    on = "" if carrier is None else f", on a carrier of {carrier!r} Hz"
     return {
         "version": "2025",
         "profile": "Main",
         "level": 1,
         "date": date.today().isoformat(),
-        "description": f"evfem: from {start!r} mm at {speed!r} mm/s, {full_scale!r} V full scale",
+        "description": f"evfem: from {start!r} mm at {speed!r} mm/s, {full_scale!r} V full scale{on}",
         "timescale": timescale,
         "avatars": [],
         "perceptions": [perception],

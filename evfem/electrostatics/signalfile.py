@@ -39,7 +39,8 @@ class Playback:
     `full_scale` (V) is the largest voltage the file can hold; `speed` (mm/s) is needed for .wav
     and .hjif; `friction`, the coefficients at 0 V and at `full_scale`, for .hjif. `rate` (Hz) is
     the WAV's, `carrier` (Hz) modulates it: a sine of amplitude `carrier_amplitude(U)`, which
-    attracts like the effective U. `pixel` (mm) is the width of a column of the friction map.
+    attracts like the effective U; a .hjif names it. `pixel` (mm) is the width of a column of the
+    friction map.
 
     >>> Playback(full_scale=2000.0, speed=-1.0)
     Traceback (most recent call last):
@@ -173,7 +174,8 @@ def _hjif(profile: VoltageProfile, playback: Playback) -> str:
         raise _missing("speed", "a speed in mm/s", ".hjif")
     if playback.friction is None:
         raise _missing("friction", "two friction coefficients, at 0 V and at full scale", ".hjif")
-    file = hjif.document(profile, playback.full_scale, playback.speed, playback.friction)
+    scale = playback.full_scale, playback.speed, playback.friction, playback.carrier
+    file = hjif.document(profile, *scale)
     return json.dumps(file, separators=(",", ":")) + "\n"
 
 

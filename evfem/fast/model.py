@@ -27,6 +27,7 @@ import evfem
 from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.storage import load_arrays, save_arrays
+from evfem.contact.friction import Coulomb
 from evfem.contact.pad import Pad, make_pad
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.electrostatics.signals import FollowForce
@@ -244,6 +245,9 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    if not isinstance(scene.friction_law, Coulomb):
+        given = type(scene.friction_law).__name__
+        raise InputError("surface.friction_law", given, "Coulomb with the fast model")
     if scene.drive is not None and scene.drive.resolved:
         raise InputError("drive", "resolved in time", "the mean over the cycle with the fast model")
     rough = roughness_of(scene.roughness_gap)

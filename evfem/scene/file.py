@@ -24,6 +24,7 @@ from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, particip
 from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
 from evfem.scene.keys import (
+    FRICTIONS,
     MOTIONS,
     ROUGHNESS,
     SURFACES,
@@ -122,6 +123,9 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     with mistakes.of_a_part():
         parts["surface"] = _surface(top.surface, folder, electrostatics)
     with mistakes.of_a_part():
+        if (law := top.surface.get("friction_law")) is not None:
+            parts["friction_law"] = _friction_law(law)
+    with mistakes.of_a_part():
         parts["motion"] = _motions(top.motion)
     with mistakes.of_a_part():
         parts["solver"] = _solver(parse(SolverTable, top.solver, "solver"))
@@ -166,7 +170,7 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
         if kind in TEXTURES:
-            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", *common}), **common)
+            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", "friction_law", *common}), **common)
         if (parsed.file is None) == (parsed.points is None):
             given = ABSENT if parsed.file is None else "file and points"
             raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
@@ -175,6 +179,15 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
         path = folder / parsed.file
         check_size("surface.file", path, LARGEST_TABLE)
         return Profile.from_csv(path, **common)
+
+
+def _friction_law(table: object) -> Any:
+    """The law of friction of the table [surface.friction_law]."""
+    key = "surface.friction_law"
+    if not isinstance(table, Mapping):
+        raise InputError(key, shown(table), "a table [surface.friction_law] with a kind")
+    model, cls = FRICTIONS[kind_of(table, key, FRICTIONS)]
+    return _build(cls, parse(model, table, key), key)
 
 
 def _insulator(table: ElectrostaticsTable) -> Layer:

@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeVar, get_type_hints
 from pydantic import BaseModel, ConfigDict, ValidationError, create_model
 from pydantic import Field as Key
 
+from evfem.contact.friction import KINDS
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import WAVEFORMS
 from evfem.electrostatics.laws import INSULATORS
@@ -95,6 +96,7 @@ class FlatTable(Table):
 
     kind: Literal["flat"]
     friction: float | list[list[float]] = optional(_FRICTION, 0.3)
+    friction_law: dict[str, Any] | None = optional("a table [surface.friction_law] with a kind")
     y: float | None = optional("a height in mm")
 
 
@@ -168,6 +170,7 @@ SolverTable = derived(Solver, strategy=(dict[str, Any], optional("a table [solve
 StrategyTable = derived(Strategy)
 OutputTable = derived(Output)
 
+FRICTIONS: Mapping[str, tuple[type[Table], type]] = {kind: (derived(cls), cls) for kind, cls in KINDS.items()}
 ROUGHNESS: Mapping[str, tuple[type[Table], type]] = {
     name: (derived(cls, law=(Literal[name], required("a law"))), cls) for name, cls in ROUGHNESS_LAWS.items()
 }

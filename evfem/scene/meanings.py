@@ -99,6 +99,7 @@ MATERIAL = {
 SURFACE = {
     "kind": Text("", "the kind of surface", "its name"),
     "friction": Text("", "Coulomb's coefficient, or its table over x (mm), linear in between"),
+    "friction_law": Text("", "what the coefficient means; without it Coulomb's law"),
     "y": Text("mm", "shift of the profile; without it the finger just touches at the start"),
     "terms": Text("", "sum of a sin(k x + phase); without it eq. (25) of the paper"),
     "file": Text("", "heights over x"),
@@ -134,6 +135,19 @@ ELECTROSTATICS = {
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
     "roughness_gap": Text("mm", "what rough skin keeps between itself and the insulator in contact"),
+}
+FRICTION = {
+    "pressure": Text("MPa", "contact pressure at which the coefficient is that of the surface"),
+    "index": Text("", "the force grows with this power of the load"),
+    "lowest": Text("MPa", "below it the coefficient stays; without it a hundredth of the pressure"),
+    "strength": Text("MPa", "shear traction that every place in real contact carries beside mu p"),
+    "full": Text("MPa", "contact pressure at which real contact is complete; without it the strength"),
+    "speed": Text("mm/s", "at which friction of sliding differs from that of sticking"),
+    "ratio": Text("", "friction of fast sliding over that of sticking"),
+    "exponent": Text("", "friction goes with this power of speed over that speed"),
+    "slowest": Text("mm/s", "below it that power stays; without it a hundredth of the speed"),
+    "fresh": Text("", "share of the friction that a place has when it touches"),
+    "time": Text("s", "time constant of the rest"),
 }
 ROUGHNESS = {
     "law": Text("", "how the gap depends on a node's contact pressure", "its name"),
@@ -194,6 +208,7 @@ MOTION = {
         "steps": _STEPS,
         "speed": Text("mm/s", "needed with dynamics other than quasistatic"),
         "hold": _HOLD,
+        "angle": Text("degrees", "from +x, of a fingertip; 90 is along the finger"),
     },
     "hover": {"gap": Text("mm", "of the undeformed outline to the surface"), "steps": _STEPS},
     "voltage": {"voltage": Text("V", "at the end, from the present one"), "steps": _STEPS, "hold": _HOLD},

@@ -4,6 +4,7 @@ N/mm, V, s).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
@@ -21,6 +22,7 @@ _SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True))
 _GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0))
 _VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6))
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
+_ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0))
 _STEPS, _HOLD = whole(), one_of(*get_args(Hold))
 
 
@@ -61,20 +63,33 @@ class Slide:
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
     which the load drifts (`evfem.scene.drift`). `speed` (mm/s) sets how much time passes; it is
-    needed with `dynamics` other than quasistatic.
+    needed with `dynamics` other than quasistatic. A finger in three dimensions slides at an `angle`,
+    in degrees from +x in the plane of the display, 90 being +z.
 
     >>> Slide(distance=5.0).steps
     100
+    >>> Slide(distance=2.0, angle=90.0).way
+    (0.0, 2.0)
     """
 
     distance: float = field(metadata=_DISTANCE)
     steps: int = field(default=100, metadata=_STEPS)
     speed: float | None = field(default=None, metadata=_SPEED)
     hold: Hold = field(default="indentation", metadata=_HOLD)
+    angle: float = field(default=0.0, metadata=_ANGLE)
     kind = "slide"
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @property
+    def way(self) -> tuple[float, float]:
+        """How far it goes along x and along z, in mm; quarter turns are exact."""
+        quarters, rest = divmod(self.angle, 90.0)
+        x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
+        for _ in range(int(quarters) % 4):
+            x, z = -z, x
+        return self.distance * x + 0.0, self.distance * z + 0.0
 
 
 @dataclass(frozen=True)

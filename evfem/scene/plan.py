@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.contact.friction import Coulomb
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
@@ -25,6 +26,7 @@ from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, skin_of
+from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
 from evfem.tissue.elements import elements_of_order
@@ -130,6 +132,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     could use.
     """
     check_parts(scene)
+    check_space(scene, mesh)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             raise InputError(
@@ -152,11 +155,11 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         element=element,
         nodes=len(mesh.points),
         cells=len(mesh.cells),
-        unknowns=2 * (len(mesh.points) - len(bone)) + 2,
+        unknowns=mesh.dim * (len(mesh.points) - len(bone)) + mesh.dim,
         pad_nodes=int(np.setdiff1d(pad, bone).size),
         steps=scene.total_steps,
         terms=terms,
-        solver=_solver(scene, terms),
+        solver=_solver(scene, mesh, terms),
         warnings=(*doubts(scene, mesh, moduli), *(text for text in others if text is not None)),
     )
 
@@ -176,7 +179,7 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     return Term(
         "tissue",
         True,
-        f"{laws}, plane strain{deep}, {stiffness}"
+        f"{laws}, {'plane strain' if mesh.dim == 2 else 'three dimensions'}{deep}, {stiffness}"
         + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
     )
 
@@ -209,11 +212,13 @@ def _contact(scene: Scene) -> Term:
 
 
 def _friction(scene: Scene) -> Term:
-    return Term(
-        "friction",
-        bool(scene.ground.has_friction),
-        "Coulomb" if scene.ground.has_friction else "friction coefficient is 0 everywhere",
-    )
+    if not scene.has_friction:
+        return Term("friction", False, "friction coefficient is 0 everywhere")
+    law = scene.friction_law
+    if isinstance(law, Coulomb):
+        return Term("friction", True, "Coulomb")
+    timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
+    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}")
 
 
 def _electricity(scene: Scene) -> Term:
@@ -276,7 +281,7 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
     return type(law).__name__
 
 
-def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
+def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...]:
     needed: dict[str, Any] = {term.name: term.needed for term in terms}
     if not needed["tissue"]:
         return ("the attraction is summed over the rigid outline",)
@@ -288,8 +293,12 @@ def _solver(scene: Scene, terms: tuple[Term, ...]) -> tuple[str, ...]:
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
         f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
-        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
+        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
+        if mesh.dim == 2
+        else "contact exact on the dense compliance of the candidates, Coulomb's disc, by sweeps and Newton",
     ]
+    if mesh.dim == 3:
+        lines.append(f"direct solver: {memory(mesh)}")
     stiff = [name for name, law in scene.finger.materials.items() if nearly_incompressible(split(law))]
     if stiff:
         lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Ints
 from evfem.contact.textures import SelfAffine
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
@@ -41,10 +42,10 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     slip one by one.
     """
     surface: Any = scene.ground
-    if surface.is_flat or not len(mesh.edges_of("pad")):
+    if surface.is_flat or not len(edges := _pad_edges(mesh)):
         return None
-    ends = mesh.points[mesh.edges_of("pad")[:, :2]]
-    spacing = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T))) / mesh.order
+    ends = mesh.points[edges]
+    spacing = float(np.median(np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1))) / mesh.order
     if isinstance(scene.surface, SelfAffine) and scene.surface.shortest < PER_WAVE * spacing:
         return (
             f"the shortest waves of the surface ({scene.surface.shortest:g} mm) have fewer than "
@@ -68,6 +69,18 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
             "or expect small steps and a long run"
         )
     return None
+
+
+def _pad_edges(mesh: Mesh) -> Ints:
+    """Ends (K, 2) of the pad's edges; in three dimensions of those of its faces that run more
+    across than along.
+    """
+    if mesh.dim == 2:
+        return mesh.edges_of("pad")[:, :2]
+    faces = mesh.faces_of("pad")[:, :4]
+    edges = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+    across = np.abs(np.diff(mesh.points[edges], axis=1)[:, 0])
+    return edges[across[:, 0] > across[:, 2]]
 
 
 def too_fast(scene: Scene) -> str | None:
@@ -111,7 +124,7 @@ def _instead(signal: TimeSignal) -> str:
 
 def way(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
-    position = np.cumsum([0.0, *(motion.distance for motion in scene.motion if isinstance(motion, Slide))])
+    position = np.cumsum([0.0, *(motion.way[0] for motion in scene.motion if isinstance(motion, Slide))])
     pad = mesh.points[mesh.node_sets["pad"], 0]
     first, last = pad.min() + position.min(), pad.max() + position.max()
     return np.linspace(first, last, int(np.clip((last - first) / step, 2, MOST)))

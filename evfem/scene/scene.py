@@ -25,12 +25,13 @@ from evfem.common.checks import (
 )
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
+from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.protocols import CompleteSurface, ForceLaw, RoughnessLaw, Surface, TimeSignal
+from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw, Surface, TimeSignal
 from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
@@ -153,8 +154,10 @@ class Scene:
     alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
     surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
     or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
-    `depth` (mm) is how deep the plane finger is meant to be; it changes no number but adds
-    `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
+    `friction_law` says what the surface's coefficient of friction means (`Coulomb`,
+    `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`, `AgeingFriction` or one's own). `depth`
+    (mm) is how deep the plane finger is meant to be; it changes no number but adds `Result.total`,
+    in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -167,6 +170,7 @@ class Scene:
     coupling: str = field(default="monolithic", kw_only=True)
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
+    friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
@@ -177,7 +181,8 @@ class Scene:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        for check in (_check_electrostatics, check_drive, _check_motion, _check_time, _check_dynamics):
+        checks = (_check_electrostatics, check_drive, _check_friction, _check_motion, _check_time)
+        for check in (*checks, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
         mistakes.report()
@@ -208,6 +213,11 @@ class Scene:
     def ground(self) -> CompleteSurface:
         """The surface with all that contact asks of it, derived where it is the user's own."""
         return completed(self.surface)
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether anything may resist sliding."""
+        return self.ground.has_friction or not isinstance(self.friction_law, Coulomb)
 
     @property
     def total_steps(self) -> int:
@@ -294,6 +304,17 @@ def _check_roughness(scene: Scene) -> None:
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
 
 
+def _check_friction(scene: Scene) -> None:
+    law = scene.friction_law
+    if isinstance(law, type) or not isinstance(law, FrictionLaw):
+        allowed = "Coulomb() or another law of friction, or an object with bound(pressure, mu, speed, age)"
+        raise InputError("surface.friction_law", quoted(law), allowed)
+    for i, motion in enumerate(scene.motion if getattr(law, "timed", False) else ()):
+        if isinstance(motion, Slide) and motion.speed is None:
+            allowed = f"a speed in mm/s, needed with {type(law).__name__}"
+            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
+
+
 def _check_motion(scene: Scene) -> None:
     pressed = False
     for i, motion in enumerate(scene.motion):
@@ -320,7 +341,7 @@ def _check_time(scene: Scene) -> None:
 
 def _check_dynamics(scene: Scene) -> None:
     solver = scene.solver
-    if solver.contact == "penalty" and scene.ground.has_friction and solver.penalty_tangential is None:
+    if solver.contact == "penalty" and scene.has_friction and solver.penalty_tangential is None:
         allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
         raise InputError("solver.penalty_tangential", ABSENT, allowed)
     if solver.dynamics == "quasistatic":

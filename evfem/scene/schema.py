@@ -214,6 +214,10 @@ def sections() -> list[Section]:
         _of_kind("electrostatics.signal", kind, model, meanings.SIGNAL, CLASSES[kind])
         for kind, model in SIGNALS.items()
     ]
+    frictions = [
+        _of_kind("surface.friction_law", kind, model, meanings.FRICTION, cls)
+        for kind, (model, cls) in keys.FRICTIONS.items()
+    ]
     return [
         section("", keys.SceneTable, meanings.SCENE),
         _finger(),
@@ -221,6 +225,7 @@ def sections() -> list[Section]:
         *_materials(),
         section("finger.electrical", keys.ElectricalTable, meanings.ELECTRICAL),
         *surfaces,
+        *frictions,
         section("electrostatics", keys.ElectrostaticsTable, meanings.ELECTROSTATICS),
         *signals,
         *_roughness(),
@@ -257,10 +262,11 @@ def schema() -> Schema:
         mesh.schema(materials=_by_region("material"), electrical=electrical),
     ]
     strategy = tables["solver.strategy"][0].schema()
+    friction = {"$ref": "#/definitions/friction"}
     top = tables[""][0].schema(
         version={"const": 1, "description": meanings.SCENE["version"].meaning},
         finger={"anyOf": fingers},
-        surface=one_of["surface"],
+        surface={"oneOf": [one.schema(friction_law=friction) for one in tables["surface"]]},
         electrostatics=tables["electrostatics"][0].schema(
             signal={"$ref": "#/definitions/signal"},
             roughness_gap={"anyOf": [{"type": "number"}, one_of["electrostatics.roughness_gap"]]},
@@ -274,6 +280,7 @@ def schema() -> Schema:
         table |= described[name]
     laws = tables["finger.materials.NAME"]
     definitions = {
+        "friction": one_of["surface.friction_law"],
         "material": one_of["finger.materials.NAME"],
         "layer": {"anyOf": [_without_law(laws[0]), {"$ref": "#/definitions/material"}]},
         "signal": {"oneOf": [_modulated(one) for one in tables["electrostatics.signal"]]},

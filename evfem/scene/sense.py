@@ -64,6 +64,8 @@ def check_parts(scene: Scene) -> None:
     for name, law in scene.finger.materials.items():
         if isinstance(law, Form) or not type(law).__module__.startswith("evfem."):
             _check_material(f"finger.materials.{name}", law)
+    if not type(scene.friction_law).__module__.startswith("evfem."):
+        _check_friction_law(scene.friction_law)
     voltage = largest_voltage(scene)
     if voltage > HIGHEST_VOLTAGE:
         raise InputError("electrostatics.voltage", voltage, f"a voltage in V up to {HIGHEST_VOLTAGE:g}")
@@ -144,6 +146,18 @@ def _check_rest(key: str, stress: Array, stiffness: float) -> None:
     largest = float(np.abs(stress).max())
     if largest > REST * abs(stiffness):
         raise InputError(key, f"a stress of {largest:.3g} MPa at rest", "no stress at F = 1")
+
+
+def _check_friction_law(law: Any) -> None:
+    """Whether a user's bound is finite, not negative, and a value for every node."""
+    key, what = "surface.friction_law", "bound(pressure, mu, speed, age)"
+    p, zero = np.array([0.0, 1e-4, 0.01]), np.zeros(3)
+    found = _evaluated(key, what, lambda pressure: law.bound(pressure, 0.3 + zero, zero, zero), p)
+    if found.shape not in ((), p.shape):
+        given = f"a bound of shape {found.shape} at pressures of shape {p.shape}"
+        raise InputError(key, given, "a value for every node")
+    if (found < 0.0).any():
+        raise InputError(key, f"a bound of {found.min():.3g} MPa", "values that are not negative")
 
 
 def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:

@@ -14,6 +14,7 @@ from typing import Any
 import tomli_w
 
 from evfem.common.views import changed
+from evfem.contact.friction import KINDS, Coulomb
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.dielectrics import SKINS
@@ -46,7 +47,7 @@ def dump(scene: Scene) -> str:
     tables = {
         "version": VERSION,
         "finger": _finger_table(scene.finger) | ({} if scene.depth is None else {"depth": scene.depth}),
-        "surface": _surface_table(scene.surface),
+        "surface": _surface_table(scene.surface) | _friction_law_key(scene.friction_law),
     }
     if scene.law is not None:
         tables["electrostatics"] = _electrostatics_table(scene)
@@ -116,6 +117,14 @@ def _surface_table(surface: Any) -> dict[str, Any]:
             return {"kind": kind, **own, **table}
     rows = zip(surface.x.tolist(), surface.samples.tolist(), strict=True)
     return {"kind": "profile", **table, "points": [list(row) for row in rows]}
+
+
+def _friction_law_key(law: Any) -> dict[str, Any]:
+    """The table of a law of friction in that of the surface; nothing for Coulomb's."""
+    if type(law) not in KINDS.values():
+        allowed = f"{', '.join(cls.__name__ for cls in KINDS.values())}, for a file"
+        raise InputError("surface.friction_law", type(law).__name__, allowed)
+    return {} if isinstance(law, Coulomb) else {"friction_law": {"kind": law.kind, **_changed(law)}}
 
 
 def _electrostatics_table(scene: Scene) -> dict[str, Any]:

@@ -48,6 +48,7 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
         "factor_duration": np.array(0.0 if at is None else at.duration),
         "factor_frozen": np.array(False if at is None else at.frozen),
         "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
+        "factor_status": np.zeros_like(state.status) if at is None else at.status,
         "factor_pressure": NO_PRESSURE if at is None else at.pressure,
         "duration": np.array(carried.duration),
     }
@@ -64,6 +65,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             frozen=bool(arrays["factor_frozen"]),
             begin=arrays["factor_begin"],
             duration=float(arrays["factor_duration"]),
+            status=arrays["factor_status"].astype(np.int64),
             pressure=arrays["factor_pressure"],
         )
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
@@ -106,7 +108,7 @@ def usable(saved: Saved, fresh: Mapping[str, Any], most_rows: int) -> dict[str, 
             raise _unusable(name)
     arrays = {name: saved.arrays[name] for name in fresh}
     pad = arrays["status"].size
-    for name, most in (("candidates", pad - 1), ("status", LAST_STATUS)):
+    for name, most in (("candidates", pad - 1), ("status", LAST_STATUS), ("factor_status", LAST_STATUS)):
         if arrays[name].size and not 0 <= arrays[name].min() <= arrays[name].max() <= most:
             raise _unusable(name)
     if (np.diff(arrays["candidates"]) <= 0).any():

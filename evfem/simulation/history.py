@@ -1,13 +1,14 @@
 """The history: one row for each requested step, its columns with their units and meanings.
 
 In the plane model forces are per mm of depth (N/mm), works and energies too (N, that is N mm/mm).
-Over a whole depth they are N and mJ, and widths are areas in mm2, under the same names.
+Over a whole depth they are N and mJ, and widths are areas in mm2, under the same names. Of a finger
+in three dimensions they are N and mJ at once; there are more columns (`SPATIAL`), and no widths.
 """
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -85,26 +86,31 @@ class History:
     seconds: Floats = field(metadata=column("s", "wall time"))
 
     @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of its columns."""
+        return COLUMNS
+
+    @property
     def rows(self) -> list[dict[str, Any]]:
         """The history as one dictionary per step, plain Python numbers."""
-        columns = [np.asarray(getattr(self, name)).tolist() for name in COLUMNS]
-        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+        columns = [np.asarray(self[name]).tolist() for name in self.columns]
+        return [dict(zip(self.columns, values, strict=True)) for values in zip(*columns, strict=True)]
 
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""
-        if name not in COLUMNS:
-            raise unknown("column", str(name), COLUMNS, readable(name))
+        if name not in self.columns:
+            raise unknown("column", str(name), self.columns, readable(name))
         return getattr(self, name)
 
     def table(self) -> Any:
         """The history with a row for each step: a `pandas.DataFrame`, or where pandas is not
         installed a numpy record array of the same columns; `table["normal_force"]` is one.
         """
-        return frame({name: np.asarray(self[name]) for name in COLUMNS})
+        return frame({name: np.asarray(self[name]) for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
         """Write the history as `evfem run` does (`history.csv`), whole or not at all."""
-        write_text(path, csv_header() + "".join(map(csv_line, self.rows)))
+        write_text(path, csv_header(self.columns) + "".join(map(csv_line, self.rows)))
 
 
 COLUMNS = tuple(spec.name for spec in fields(History))
@@ -112,6 +118,28 @@ COLUMNS = tuple(spec.name for spec in fields(History))
 UNITS: Mapping[str, str] = {spec.name: spec.metadata["unit"] for spec in fields(History)}
 WHOLE_UNITS: Mapping[str, str] = {spec.name: spec.metadata["whole"] for spec in fields(History)}
 MEANINGS: Mapping[str, str] = {spec.name: spec.metadata["meaning"] for spec in fields(History)}
+#: further columns of a finger in three dimensions -> unit and meaning
+SPATIAL: Mapping[str, tuple[str, str]] = {
+    "position_z": ("mm", "z of the bone"),
+    "tangential_force_z": ("N", "sum of contact forces, against +z"),
+    "contact_area": ("mm2", "of the convex hull of the touching nodes' shares"),
+    "real_contact_area": ("mm2", "sum of the touching nodes' shares"),
+}
+#: columns that it leaves empty
+WIDTHS = ("contact_width", "real_contact_width")
+SPATIAL_UNITS: Mapping[str, str] = {
+    **WHOLE_UNITS,
+    **dict.fromkeys(WIDTHS, "mm"),
+    **{name: unit for name, (unit, _) in SPATIAL.items()},
+}
+
+
+def columns_of(names: Iterable[str]) -> tuple[str, ...]:
+    """The columns, in their order, if these are all their names: those of the plane, or of three
+    dimensions too; else nothing.
+    """
+    found = set(names)
+    return next((columns for columns in (COLUMNS, (*COLUMNS, *SPATIAL)) if set(columns) == found), ())
 
 
 def over_depth(columns: Mapping[str, Any], depth: float) -> dict[str, Any]:
@@ -148,12 +176,12 @@ def csv_line(row: Row) -> str:
     >>> csv_line(dict.fromkeys(COLUMNS, 0) | {"step": 1, "motion": "press", "voltage": 0.1})[:25]
     '1,0,press,0.0,0.0,0.0,0.1'
     """
-    return csv_text([[_plain_value(name, row[name]) for name in COLUMNS]])
+    return csv_text([[_plain_value(name, row[name]) for name in columns_of(row)]])
 
 
-def csv_header() -> str:
+def csv_header(columns: Sequence[str] = COLUMNS) -> str:
     """The first line of history.csv."""
-    return csv_text([COLUMNS])
+    return csv_text([columns])
 
 
 def read_rows(text: str) -> list[dict[str, Any]]:
@@ -168,21 +196,24 @@ def read_rows(text: str) -> list[dict[str, Any]]:
     """
     found = csv.DictReader(text.splitlines(), strict=True)
     names = found.fieldnames or ()
-    if not set(NEEDED) <= set(names) <= set(COLUMNS):
+    columns = (*COLUMNS, *SPATIAL) if set(SPATIAL) <= set(names) else COLUMNS
+    if not set(NEEDED) <= set(names) <= set(columns):
         raise ValueError("no history")
-    unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in COLUMNS}
+    unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in columns}
     return [
-        {name: _value_of(name, row[name]) for name in COLUMNS} for row in (unknown_yet | row for row in found)
+        {name: _value_of(name, row[name]) for name in columns} for row in (unknown_yet | row for row in found)
     ]
 
 
 def _value_of(name: str, text: str) -> str | int | float:
-    return text if name == "motion" else int(text) if name in INTEGERS else float(text)
+    return text if name == "motion" else int(text) if name in INTEGERS else float(text or "nan")
 
 
 def _plain_value(name: str, value: Any) -> str | int | float:
     if name == "motion":
         return str(value)
+    if name in WIDTHS and np.isnan(value):
+        return ""
     return int(value) if name in INTEGERS else float(value)
 
 

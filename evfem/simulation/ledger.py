@@ -5,13 +5,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.pad import surface_state
+from evfem.contact.pad import Pad, surface_state
 from evfem.contact.signorini import FORWARD, OPEN
+from evfem.simulation.history import WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import SUMS, Books, Part, unloaded
@@ -44,7 +46,7 @@ class Ledger:
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
         touching = state.status != OPEN
-        width, real = model.pad.contact_widths(position[:, 0], touching)
+        real, extent = _extent(model, state, position, contact)
         pressing = state.contact_force[:, 0]
         return {
             "step": step,
@@ -60,8 +62,7 @@ class Ledger:
             "tangential_force": float(0.0 - contact[0]),
             "electrostatic_force": float(0.0 - attraction[1]),
             "electrostatic_force_x": float(attraction[0]),
-            "contact_width": width,
-            "real_contact_width": real,
+            **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
             "peak_contact_pressure": float((pressing / shares(model, position)).max()),
             "mean_contact_pressure": float(pressing[touching].sum() / real) if real > 0.0 else 0.0,
@@ -82,10 +83,29 @@ class Ledger:
         return attraction.charging.field_energy(at)
 
 
+def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tuple[float, dict[str, float]]:
+    """How much of the pad touches, in mm or mm2, and the columns that say so; in three dimensions
+    those along z with them.
+    """
+    if isinstance(model.pad, Pad):
+        width, real = model.pad.contact_widths(position[:, 0], state.touching)
+        return real, {"contact_width": width, "real_contact_width": real}
+    area, real = model.pad.areas(position, state.touching)
+    return real, {
+        **dict.fromkeys(WIDTHS, float("nan")),
+        "position_z": float(state.bone[2]),
+        "tangential_force_z": float(0.0 - contact[2]),
+        "contact_area": area,
+        "real_contact_area": real,
+    }
+
+
 def shares(model: Model, position: Floats) -> Floats:
-    """Current tributary lengths of the pad nodes (P,) in mm; infinite where there is none."""
-    length = model.pad.length(position[:, 0])
-    return np.where(length > 0, length, np.inf)
+    """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there
+    is none.
+    """
+    share = model.pad.tributary(position)
+    return np.where(share > 0, share, np.inf)
 
 
 def frame_of(model: Model, state: State, row: Row) -> Frame:
@@ -100,7 +120,6 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         return field
 
     stress, J = model.body.tissue.cell_stress(state.u)
-    xx, yy, zz, xy = stress.T
     status = np.minimum(state.status, FORWARD)
     return Frame(
         step=row["step"],
@@ -109,10 +128,25 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         displacement=state.u.copy(),
         gap=on_pad(surface.gap, np.nan),
         contact_pressure=on_pad(state.contact_force[:, 0] / share, 0.0),
-        shear_traction=on_pad(state.contact_force[:, 1] / share, 0.0),
-        electrostatic_traction=on_pad(np.hypot(*state.attraction.T) / share, 0.0),
+        shear_traction=on_pad(_shear(state) / share, 0.0),
+        electrostatic_traction=on_pad(reduce(np.hypot, state.attraction.T) / share, 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
-        von_mises=np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2),
+        von_mises=_von_mises(stress),
         cauchy_stress=stress,
         J=J,
     )
+
+
+def _shear(state: State) -> Floats:
+    """Shear forces (P,) along the profile; their magnitude in three dimensions."""
+    shear = state.contact_force[:, 1:]
+    return shear[:, 0] if shear.shape[1] == 1 else np.hypot(*shear.T)
+
+
+def _von_mises(stress: Floats) -> Floats:
+    """Equivalent stress (E,) of xx, yy, zz, xy[, yz, xz] (E, 4 or 6)."""
+    xx, yy, zz, xy = stress.T[:4]
+    shear = 3.0 * xy**2
+    for out_of_plane in stress.T[4:]:
+        shear = shear + 3.0 * out_of_plane**2
+    return np.asarray(np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + shear))

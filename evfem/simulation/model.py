@@ -13,7 +13,9 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
+from evfem.contact.friction import Coulomb
 from evfem.contact.pad import Pad, make_pad
+from evfem.contact.skin import Skin, make_skin
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
@@ -26,6 +28,7 @@ from evfem.scene.terms import Boundary
 from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
+from evfem.solver.spatial import SkinInterface
 from evfem.solver.state import Limits
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
@@ -43,15 +46,16 @@ class Model:
     scene: Scene
     mesh: Mesh
     body: Body
-    pad: Pad
+    pad: Pad | Skin
     surface: Any
     attraction: Attraction | None
     equilibrium: StepSolver
     first_gap: float
 
-    def bone(self, position: float, indentation: float) -> Floats:
-        """Translation of the bone (2,) in mm."""
-        return np.array([position, -(indentation + self.first_gap)])
+    def bone(self, position: float, indentation: float, position_z: float = 0.0) -> Floats:
+        """Translation of the bone (dim,) in mm."""
+        along = [position_z] if self.mesh.dim == 3 else []
+        return np.array([position, -(indentation + self.first_gap), *along])
 
     def indentation(self, bone: Floats) -> float:
         """Bone travel beyond first touch in mm, negative when hovering."""
@@ -66,7 +70,7 @@ def make_model(scene: Scene) -> Model:
     for warning in needed.warnings:
         notices.warn(warning)
     space = make_space(mesh, element)
-    pad = make_pad(mesh)
+    pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
     solver, laws = scene.solver, scene.finger.materials
@@ -79,11 +83,9 @@ def make_model(scene: Scene) -> Model:
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
     limits = Limits(solver.tolerance, solver.strategy, solver.threads)
-    kind = PenaltyInterface if solver.contact == "penalty" else Interface
-    interface = kind(pad, mesh.points, surface, solver.tolerance)
-    if isinstance(interface, PenaltyInterface):
-        normal = float(solver.penalty_normal or 0.0)
-        interface.penalties = (normal, solver.penalty_tangential or normal)
+    interface = make_interface(scene, mesh, pad, surface)
+    if not isinstance(scene.friction_law, Coulomb):
+        interface.law = scene.friction_law
     equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
     if needed.has("tissue"):
         factorised = FactorisedBody(body, interface, attraction, limits)
@@ -91,9 +93,22 @@ def make_model(scene: Scene) -> Model:
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 
+def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
+    """What joins pad and surface: exact contact, in the plane or in three dimensions, or penalties."""
+    solver = scene.solver
+    if isinstance(pad, Skin):
+        return SkinInterface(pad, mesh.points, surface, solver.tolerance)
+    if solver.contact == "exact":
+        return Interface(pad, mesh.points, surface, solver.tolerance)
+    interface = PenaltyInterface(pad, mesh.points, surface, solver.tolerance)
+    normal = float(solver.penalty_normal or 0.0)
+    interface.penalties = (normal, solver.penalty_tangential or normal)
+    return interface
+
+
 def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     """The surface with its height set (first touch where the scene leaves it open), and g0 in mm."""
-    x, y = outline_points.T
+    x, y = outline_points[:, 0], outline_points[:, 1]
     gap = float(np.min(y - surface.height(x)))
     if surface.y is None:
         return surface.shifted(gap), 0.0
@@ -105,7 +120,7 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     return surface, max(g0, 0.0)
 
 
-def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attraction:
+def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
     electrical = scene.finger.electrical
     thickness = None if electrical is None else electrical.stratum_corneum_thickness
@@ -115,9 +130,11 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad, surface: Any) -> Attract
                 "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
             )
             raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
-        from evfem.mesh.mesh import layer_thickness
+        from evfem.mesh import faces
+        from evfem.mesh import mesh as edges
 
-        thickness = layer_thickness(mesh, "stratum_corneum", pad.nodes)
+        kind = faces if mesh.dim == 3 else edges
+        thickness = kind.layer_thickness(mesh, "stratum_corneum", pad.nodes)
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
     thickness = np.broadcast_to(thickness, pad.nodes.shape).astype(float)

@@ -16,8 +16,9 @@ import numpy as np
 
 from evfem.common.views import plus
 from evfem.contact.signorini import OPEN, STICK
+from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import Encoding, share_not_renderable
-from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile, carrier_amplitude
+from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw, Observer, Surface
 from evfem.scene.motion import Press, Slide
@@ -41,6 +42,13 @@ class Recording:
     scene: Scene
     result: Result
     full_slip: float | None
+
+    @property
+    def peak_voltage(self) -> Array:
+        """Peak (V) of the waveform in every step, `result.voltage` being its effective value: that
+        of the scene's drive, or of a sine.
+        """
+        return np.asarray((self.scene.drive or Drive()).peak(self.result.voltage))
 
 
 def record(scene: Scene, observers: Sequence[Observer] = ()) -> Recording:
@@ -130,7 +138,7 @@ class Signal:
 
     `share_not_renderable`: share of the path on which the wish is below the display's own
     friction; while the finger still sticks at the start, that is no loss. Voltages in V:
-    `largest`, `rms` over the path, `carrier` (amplitude of a sinusoidal carrier at the largest).
+    `largest`, `rms` over the path, `carrier` (peak of the display's waveform at the largest).
     `error_of_display`: relative L2 error of the friction force by (16a), (16b) without the
     amplifier, `error_of_amplifier` the change it makes, relative to the wish; `share_limited` the
     share of the path on which it acts.
@@ -189,7 +197,7 @@ def voltage_for(
         share_not_renderable=share_not_renderable(x, reference.friction, display.friction * (1.0 - NOISE)),
         largest=largest,
         rms=profile.rms(float(x[0]), float(x[-1])),
-        carrier=carrier_amplitude(largest),
+        carrier=display.peak(largest),
         error_of_display=float(np.linalg.norm(felt - reference.tangential_force)) / size,
         error_of_amplifier=float(np.linalg.norm(limited - felt)) / size,
         share_limited=_share_apart(wish, profile),
@@ -207,12 +215,16 @@ def _share_apart(one: VoltageProfile, other: VoltageProfile) -> float:
 
 
 def replay(
-    reference: Recording, display: Surface, law: ForceLaw, voltage: VoltageProfile | FollowForce
+    reference: Recording,
+    display: Surface,
+    law: ForceLaw,
+    voltage: VoltageProfile | FollowForce,
+    drive: Drive | None = None,
 ) -> Recording:
     """The reference's finger, motion and solver on a display under a voltage.
 
     As in the paper the finger is pressed to the load that the reference had at the end of its
-    press, and slid in the same steps.
+    press, and slid in the same steps. A `drive` makes the effective voltage alternate.
     """
     motion = list(reference.scene.motion)
     kinds = [isinstance(part, Slide) for part in motion]
@@ -221,12 +233,16 @@ def replay(
         last_row = int(_slide_rows(reference.result)[0]) - 1
         load = float(reference.result.applied_force[last_row])
         motion[first - 1] = Press(force=load, steps=motion[first - 1].steps)
-    scene = replace(reference.scene, surface=display, law=law, voltage=voltage, motion=motion)
+    scene = replace(reference.scene, surface=display, law=law, voltage=voltage, motion=motion, drive=drive)
     return record(scene)
 
 
 def exact(
-    reference: Recording, display: Surface, law: ForceLaw, largest_voltage: float = 10_000.0
+    reference: Recording,
+    display: Surface,
+    law: ForceLaw,
+    largest_voltage: float = 10_000.0,
+    drive: Drive | None = None,
 ) -> Recording:
     """The display's own voltage that makes the coupled model reproduce the reference: exact
     encoding.
@@ -234,12 +250,13 @@ def exact(
     In every step of the slide U^2 is an unknown, 0 <= U <= `largest_voltage` (V), with F_t =
     reference as its equation; where that lies outside, the voltage stays at its limit. While part
     of the contact sticks, attraction hardly changes the friction force; a wish that then no
-    voltage meets leaves the voltage as it was. The voltage found is in `result.voltage`;
+    voltage meets leaves the voltage as it was. The voltage found, an effective one, is in
+    `result.voltage`, the peak of the `drive`'s waveform in `peak_voltage`;
     `Comparison.unmet` says where the wish was out of reach.
     """
     felt = apparent_friction(reference.result)
     wish = FollowForce(felt.position, felt.tangential_force, largest_voltage)
-    return replay(reference, display, law, wish)
+    return replay(reference, display, law, wish, drive)
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,11 +27,13 @@ from evfem.mesh.mesh import Mesh
 
 # public in `ev.result`, where they were before
 from evfem.simulation.history import COLUMNS as COLUMNS
-from evfem.simulation.history import DRIFT, History, column_of, load_drift, over_depth
+from evfem.simulation.history import DRIFT, History, column_of, columns_of, load_drift, over_depth
 from evfem.simulation.history import INTEGERS as INTEGERS
 from evfem.simulation.history import MEANINGS as MEANINGS
 from evfem.simulation.history import NEEDED as NEEDED
 from evfem.simulation.history import RESUMED as RESUMED
+from evfem.simulation.history import SPATIAL as SPATIAL
+from evfem.simulation.history import SPATIAL_UNITS as SPATIAL_UNITS
 from evfem.simulation.history import UNITS as UNITS
 from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
 from evfem.simulation.history import Row as Row
@@ -44,7 +46,7 @@ from evfem.simulation.provenance import versions as versions
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-4"
+CHECKPOINT_FORMAT = "evfem-checkpoint-5"
 #: what is shown of the last step
 SHOWN = (
     *("position", "indentation", "voltage"),
@@ -52,6 +54,11 @@ SHOWN = (
 )
 #: what is shown of it over a whole depth
 SHOWN_WHOLE = SHOWN[3:]
+#: and of a finger in three dimensions
+SHOWN_SPATIAL = (
+    *("position", "indentation", "voltage", "normal_force", "tangential_force", "tangential_force_z"),
+    *("electrostatic_force", "contact_area", "real_contact_area"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +66,8 @@ class Frame:
     """Fields of one step on N nodes and E cells; tractions in MPa, lengths in mm.
 
     `gap` is NaN and tractions are 0 off the pad; `contact_status` 0 open, 1 stick, 2 slip.
-    `cauchy_stress` holds the components xx, yy, zz, xy of the cell means; `J` is the volume ratio.
+    `cauchy_stress` holds the components xx, yy, zz, xy of the cell means, in three dimensions yz and
+    xz too; `J` is the volume ratio. There `shear_traction` is the magnitude of the shear.
     """
 
     step: int
@@ -83,11 +91,11 @@ class Frame:
 
 POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
 CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
-_SHAPES: dict[str, tuple[str | int, ...]] = {
+_SHAPES: dict[str, tuple[str, ...]] = {
     "displacement": ("N", "dim"),
     **dict.fromkeys(POINT_FIELDS, ("N",)),
 }
-_SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", 4), "J": ("E",)}
+_SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", "stresses"), "J": ("E",)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,11 +107,15 @@ class Result(History):
     `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
     the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
     the downward attraction.
+
+    Of a finger in three dimensions forces are in N, and `in_space` has its further columns
+    (`SPATIAL`): `result["position_z"]`, `result["tangential_force_z"]` and the contact areas.
     """
 
     frames: list[Frame]
     mesh: Mesh
     provenance: dict[str, Any] = field(default_factory=dict)
+    in_space: Mapping[str, Floats] = field(default_factory=dict)
 
     @classmethod
     def from_rows(
@@ -113,15 +125,28 @@ class Result(History):
         `COLUMNS`.
         """
         for row in rows:
-            if set(row) != set(COLUMNS):
+            if not columns_of(row):
                 odd = sorted(set(row) ^ set(COLUMNS))
                 raise InputError("row", f"missing or unknown {odd}", ", ".join(COLUMNS))
         columns = {name: column_of(name, [row[name] for row in rows]) for name in COLUMNS}
-        return cls(**columns, frames=list(frames), mesh=mesh, provenance=provenance)
+        further = SPATIAL if mesh.dim == 3 else ()
+        in_space = {name: column_of(name, [row[name] for row in rows]) for name in further}
+        return cls(**columns, frames=list(frames), mesh=mesh, provenance=provenance, in_space=in_space)
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The names of its columns."""
+        return (*COLUMNS, *self.in_space)
+
+    def __getitem__(self, name: str) -> Any:
+        """A column by its name."""
+        return self.in_space[name] if name in self.in_space else super().__getitem__(name)
 
     @property
     def units(self) -> Mapping[str, str]:
         """The unit of each column."""
+        if self.in_space:
+            return SPATIAL_UNITS
         return WHOLE_UNITS if WHOLE in self.provenance else UNITS
 
     @property
@@ -135,11 +160,11 @@ class Result(History):
         mm2, works and energies in mJ; lengths, pressures and fields are as they were.
 
         ``result.total.rows``, ``.table()``, ``.to_csv(path)`` and the plots then have these units too.
-        Raises InputError where the scene says no depth.
+        Raises InputError where the scene says no depth. A finger in three dimensions is whole.
         """
-        depth = self._known_depth
-        if WHOLE in self.provenance:
+        if self.in_space or WHOLE in self.provenance:
             return self
+        depth = self._known_depth
         columns = over_depth({name: self[name] for name in COLUMNS}, depth)
         return replace(self, **columns, provenance={**self.provenance, WHOLE: depth})
 
@@ -152,17 +177,17 @@ class Result(History):
 
     @property
     def contact_area(self) -> Floats:
-        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without
-        one.
+        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without one,
+        unless the finger is one in three dimensions.
         """
-        return self.total.contact_width
+        return self.in_space["contact_area"] if self.in_space else self.total.contact_width
 
     @property
     def real_contact_area(self) -> Floats:
         """Real contact area (mm2): `real_contact_width` over the depth. Raises InputError without
-        one.
+        one, unless the finger is one in three dimensions.
         """
-        return self.total.real_contact_width
+        return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
 
     @property
     def _known_depth(self) -> float:
@@ -177,8 +202,8 @@ class Result(History):
         steps = len(self.step)
         extremes = {}
         if steps:
-            peaks = (*SHOWN_WHOLE, "peak_contact_pressure")
-            extremes = {name: float(np.max(np.abs(getattr(self, name)))) for name in peaks}
+            peaks = (*self._shown[3:], "peak_contact_pressure")
+            extremes = {name: float(np.max(np.abs(self[name]))) for name in peaks}
         found = {
             "scene": scene.get("name", "scene"),
             "complete": steps == scene.get("total_steps", steps),
@@ -213,7 +238,7 @@ class Result(History):
         last = self._last
         parts = last[:3], last[3:5], last[5:7], last[7:9], last[9:]
         lines = ["; ".join(f"{key} {text}" for key, text in part) for part in parts]
-        lines[3] = f"over {self.depth:g} mm: {lines[3]}" if lines[3] else ""
+        lines[3] = f"over {self.depth:g} mm: {lines[3]}" if self._shows_total else lines[3]
         if (drift := self.load_drift) > DRIFT:
             lines.append(f"the load drifted by {drift:.1%} at a held indentation")
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
@@ -237,11 +262,15 @@ class Result(History):
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [*self._ends(SHOWN), *(self.total._ends(SHOWN_WHOLE) if self._shows_total else [])]
+        return [*self._ends(self._shown), *(self.total._ends(SHOWN_WHOLE) if self._shows_total else [])]
+
+    @property
+    def _shown(self) -> tuple[str, ...]:
+        return SHOWN_SPATIAL if self.in_space else SHOWN
 
     @property
     def _shows_total(self) -> bool:
-        return self.depth is not None and WHOLE not in self.provenance
+        return self.depth is not None and WHOLE not in self.provenance and not self.in_space
 
     def _ends(self, names: Sequence[str]) -> list[tuple[str, str]]:
         """Columns of the last row, in words."""
@@ -256,7 +285,7 @@ class Result(History):
         refuses.
         """
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
-        arrays |= {f"history/{name}": np.array(getattr(self, name)) for name in COLUMNS}
+        arrays |= {f"history/{name}": np.array(self[name]) for name in self.columns}
         for spec in fields(Frame):
             values = [getattr(frame, spec.name) for frame in self.frames]
             if values:
@@ -281,13 +310,14 @@ def load(path: str | Path) -> Result:
     try:
         columns = {name: _column_of(arrays, name) for name in COLUMNS}
         mesh = mesh_of(arrays)
+        in_space = {name: _column_of(arrays, name) for name in (SPATIAL if mesh.dim == 3 else ())}
         frames = _frames_from(arrays, mesh)
         provenance = json.loads(str(arrays["provenance"]))
-        if len({len(column) for column in columns.values()}) > 1:
+        if len({len(column) for column in (*columns.values(), *in_space.values())}) > 1:
             raise ValueError("columns of different length")
         if not isinstance(provenance, dict):
             raise ValueError("no provenance")
-        return Result(**columns, frames=frames, mesh=mesh, provenance=provenance)
+        return Result(**columns, frames=frames, mesh=mesh, provenance=provenance, in_space=in_space)
     except (KeyError, ValueError, TypeError, IndexError, RecursionError) as error:
         raise InputError("result", f"{path}, damaged: {error}", "a file written by Result.save") from error
 
@@ -345,7 +375,7 @@ class Checkpoint:
         try:
             owner, version = str(arrays["scene"]), str(arrays["version"])
             rows = json.loads(str(arrays["rows"]))
-            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows else []
+            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows and not columns_of(rows[0]) else []
             if owner == scene_digest and not odd:
                 _check_rows(rows)
         except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
@@ -367,7 +397,7 @@ def _check_rows(rows: Any) -> None:
     if not isinstance(rows, list) or not rows:
         raise ValueError("no rows")
     for step, row in enumerate(rows, 1):
-        if set(row) != set(COLUMNS):
+        if not columns_of(row) or set(row) != set(rows[0]):
             raise ValueError(f"columns of row {step}")
         numbers = [value for name, value in row.items() if name != "motion"]
         if row["step"] != step or not isinstance(row["motion"], str):
@@ -382,10 +412,11 @@ def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:
     if "frames/step" not in arrays:
         return []
     columns = {spec.name: arrays[f"frames/{spec.name}"] for spec in fields(Frame)}
-    size: dict[str | int, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
+    size: dict[str, int] = {"N": len(mesh.points), "E": len(mesh.cells), "dim": mesh.dim}
+    size["stresses"] = 6 if mesh.dim == 3 else 4
     count = len(columns["step"])
     for name, shape in _SHAPES.items():
-        expected = (count, *(size.get(n, n) for n in shape))
+        expected = (count, *(size[n] for n in shape))
         if columns[name].shape != expected:
             raise ValueError(f"{name} of shape {columns[name].shape} instead of {expected}")
     scalars = {"step": int, "time": float, "position": float}

@@ -7,6 +7,7 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -85,6 +86,8 @@ def simulate(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
+    import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
+
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
     with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
@@ -121,7 +124,7 @@ class Run:
     """A scene on its way: the model, the present state, the rows and frames so far."""
 
     def __init__(self, scene: Scene, resume: Saved | None) -> None:
-        self.scene, self.voltage = scene, applied(scene)
+        self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
@@ -131,6 +134,11 @@ class Run:
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         if resume is not None:
             self._restore(resume)
+
+    @cached_property
+    def voltage(self) -> Any:
+        """The voltage that the run follows: the scene's own, or that of the moment of its drive."""
+        return applied(self.scene)
 
     def voltage_at(self, position: float, time: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
@@ -172,12 +180,14 @@ class Run:
         if rows_before == 0:
             return {
                 "position": 0.0,
+                "position_z": 0.0,
                 "indentation": 0.0,
                 "applied_force": 0.0,
                 "voltage": self.voltage_at(0.0, 0.0),
             }
-        row = self.rows[rows_before - 1]
-        return {name: row[name] for name in ("position", "indentation", "applied_force", "voltage")}
+        row = {"position_z": 0.0} | self.rows[rows_before - 1]
+        names = ("position", "position_z", "indentation", "applied_force", "voltage")
+        return {name: row[name] for name in names}
 
     def _target(self, motion: Motion, start: dict[str, float], fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
@@ -185,7 +195,8 @@ class Run:
         def towards(name: str, end: float) -> float:
             return end if fraction == 1.0 else start[name] + fraction * (end - start[name])
 
-        position, indentation, force = start["position"], start["indentation"], None
+        position, position_z = start["position"], start["position_z"]
+        indentation, force = start["indentation"], None
         voltage = start["voltage"]
         if isinstance(motion, Press) and motion.force is not None:
             force = towards("applied_force", motion.force)
@@ -194,7 +205,9 @@ class Run:
         elif isinstance(motion, Hover):
             indentation = towards("indentation", -motion.gap)
         elif isinstance(motion, Slide):
-            position = towards("position", start["position"] + motion.distance)
+            x, z = motion.way
+            position = towards("position", start["position"] + x)
+            position_z = towards("position_z", start["position_z"] + z)
             force = start["applied_force"] if motion.hold == "force" else None
         elif isinstance(motion, VoltageRamp):
             voltage = towards("voltage", motion.voltage)
@@ -203,12 +216,12 @@ class Run:
             force = start["applied_force"] if motion.hold == "force" else None
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
-        bone = self.model.bone(position, indentation)
+        bone = self.model.bone(position, indentation, position_z)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
-        return Target(position, height, drive)
+        return Target(position, height, drive, z=position_z if bone.size == 3 else None)
 
     @staticmethod
     def _following(wish: FollowForce, position: float) -> FollowFriction:
@@ -224,7 +237,11 @@ class Run:
             if fraction == 1.0:
                 return replace(end, duration=duration)
             x = start.x + fraction * (end.x - start.x)
-            return Target(x, start.height.towards(end.height, fraction), drive(x, fraction), duration)
+            z = None
+            if start.z is not None and end.z is not None:
+                z = start.z + fraction * (end.z - start.z)
+            height = start.height.towards(end.height, fraction)
+            return Target(x, height, drive(x, fraction), duration, z)
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage

@@ -16,7 +16,8 @@ The history has
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
-- ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` over the slip s along the profile, with
+- ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
+  friction) over the slip s along the profile, with
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
@@ -74,6 +75,7 @@ from evfem.contact.charging import Charging, Flow
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.simulation.model import Model
+from evfem.solver.spatial import SkinInterface, slipped
 from evfem.solver.state import State
 
 SUMS = (
@@ -237,12 +239,12 @@ class Part:
             return 0.0
         charging = attraction.charging
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
-        grown = attraction.pad.length(end[:, 0]) - attraction.pad.length(begin[:, 0])
+        grown = attraction.pad.tributary(end) - attraction.pad.tributary(begin)
         pressed = self.old.contact_force[:, 0], self.new.contact_force[:, 0]
         work = 0.0
         for way, share in zip(WAY, SHARE, strict=True):
             position, pressing = begin + way * (end - begin), pressed[0] + way * (pressed[1] - pressed[0])
-            carried = charging.carried(attraction.pad.length(position[:, 0]))
+            carried = charging.carried(attraction.pad.tributary(position))
             at = attraction.charged(position, charging.old.voltage, pressing, carried)
             work += share * float(charging.energy_density(at) @ grown)
         return work
@@ -264,15 +266,16 @@ class Part:
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
-        slip, x0, x1 = self._slip, self._x[0], self._x[1]
-        length = np.abs(slip)
+        length, x0, x1 = self._slip_length, self._x[0], self._x[1]
         if not length.any():
             return 0.0
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
         way = SLIDE[:, None]
         normal = (1.0 - way) * before + way * after
-        mu = np.array([self._coefficient(x) for x in x0 + way * (x1 - x0)])
-        return float(PART @ np.sum(mu * normal * length, axis=1))
+        part, places = (self.old, self.new), x0 + way * (x1 - x0)
+        resists = self.model.equilibrium.interface.resistance
+        limit = np.array([resists(part, *each, slip) for each in zip(places, normal, strict=True)])
+        return float(PART @ np.sum(limit * length, axis=1))
 
     @cached_property
     def _x(self) -> tuple[Floats, Floats]:
@@ -300,6 +303,14 @@ class Part:
         carried = (status == STICK) & (np.abs(slip) > interface.tolerance * interface.length)
         forward = ((status == FORWARD) & (slip > 0.0)) | carried
         return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
+
+    @cached_property
+    def _slip_length(self) -> Floats:
+        """How far the pad nodes (P,) slip, in mm."""
+        interface = self.model.equilibrium.interface
+        if isinstance(interface, SkinInterface):
+            return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
+        return np.abs(self._slip)
 
     def _coefficient(self, x: Floats) -> Floats:
         """Friction coefficient of the pad nodes (P,) at the positions x (P,)."""
@@ -335,7 +346,15 @@ class Part:
             work += float(np.sum((at[1] - at[0]) * along))
         x = model.equilibrium.positions(carried.u)[:, 0]
         less = self._coefficient(x) - self._coefficient(self._x[1])
-        return work + float(np.sum(less * new.contact_force[:, 0] * np.sign(self._slip) * along[:, 0]))
+        return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
+
+    def _with_slip(self, along: Floats) -> Floats:
+        """The share (P,) of the way `along` (P, dim) that the pad nodes go the way they slip."""
+        interface = self.model.equilibrium.interface
+        if isinstance(interface, SkinInterface):
+            slip = slipped(interface, self.old, self.new) / np.maximum(self._slip_length, 1e-300)[:, None]
+            return np.asarray(np.sum(slip * along[:, ::2], axis=1))
+        return np.sign(self._slip) * along[:, 0]
 
 
 def _mean_work(before: Floats, after: Floats, moved: Floats) -> float:

@@ -92,7 +92,7 @@ class Force:
         return float(-self.force - reaction[1])
 
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
-        return (ExtraUnknown(-tangent.schur[:, -1], 1, -self.force),)
+        return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
     def towards(self, end: HeightControl, fraction: float) -> Force:
         assert isinstance(end, Force)
@@ -248,29 +248,32 @@ def sticks(state: State) -> bool:
 
 @dataclass(frozen=True)
 class Target:
-    """Where a step goes: x of the bone (mm), what settles its height and the voltage, and its
-    seconds.
+    """Where a step goes: x of the bone (mm), what settles its height and the voltage, its seconds,
+    and in three dimensions z of the bone (mm).
     """
 
     x: float
     height: HeightControl
     drive: VoltageControl
     duration: float = 0.0
+    z: float | None = None
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
-        """The bone at a given translation (2,), under a given voltage.
+        """The bone at a given translation (dim,), under a given voltage.
 
-        >>> Target.held(np.array([0.5, -0.1]), 100.0)
-        Target(x=0.5, height=Indentation(height=-0.1), drive=GivenVoltage(voltage=100.0), duration=0.0)
+        >>> Target.held(np.array([0.5, -0.1, 2.0]), 100.0).bone(np.zeros(3)).tolist()
+        [0.5, -0.1, 2.0]
         """
-        return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage))
+        z = float(bone[2]) if len(bone) == 3 else None
+        return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
 
     def bone(self, present: Floats) -> Floats:
-        """Translation of the bone (2,) as far as it is known; the `present` height where it is
+        """Translation of the bone (dim,) as far as it is known; the `present` height where it is
         not.
         """
-        return np.array([self.x, self.height.known(float(present[1]))])
+        along = [] if self.z is None else [self.z]
+        return np.array([self.x, self.height.known(float(present[1])), *along])
 
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""

@@ -37,7 +37,17 @@ from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Target, sticks
 from evfem.solver.interface import Interface
-from evfem.solver.state import NO_CHARGES, Balance, Folded, Limits, Record, Reusable, State, StepFailed
+from evfem.solver.state import (
+    NO_AGE,
+    NO_CHARGES,
+    Balance,
+    Folded,
+    Limits,
+    Record,
+    Reusable,
+    State,
+    StepFailed,
+)
 from evfem.solver.strategy import Strategy
 
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
@@ -144,6 +154,7 @@ class Statics:
             reaction=np.zeros(dim),
             velocity=still,
             last_increment=still,
+            age=NO_AGE if self.interface.law is None else np.zeros(nodes),
             charges=NO_CHARGES if self.attraction is None else self.attraction.no_charges,
         )
         attraction = self.attraction_at(state, state, voltage)
@@ -235,7 +246,7 @@ class Equilibrium(Statics):
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
-        self.interface.pins.begin(self.positions(old.u)[:, 0])
+        self.interface.begin(old, target.duration)
         target.drive.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
@@ -250,7 +261,7 @@ class Equilibrium(Statics):
                 raise StepFailed("the residual is not finite", history)
             if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):
                 self._refuse_fold(state)
-                return self.body.accepted(old, state)
+                return self.interface.aged(old, self.body.accepted(old, state))
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
             state = self.body.advance(old, state, target, balance)

@@ -189,9 +189,10 @@ class FactorisedBody:
             after = self._linear_step(old, state, target, balance, search=True)
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
-        height = mixed.bone[1] if target.height.free else after.bone[1]
+        bone = after.bone.copy()
+        bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
-        return replace(mixed, bone=np.array([after.bone[0], height]), voltage=voltage)
+        return replace(mixed, bone=bone, voltage=voltage)
 
     def _linear_step(
         self, old: State, state: State, target: Target, balance: Balance, search: bool = False
@@ -229,7 +230,7 @@ class FactorisedBody:
         known = self.interface.candidates(old, state, c, weakening, gain)
         if rough is not None:
             known = replace(known, roughness=rough.of(c))
-        return LinearContactStep(
+        return self.interface.contact_step(
             body=linearisation.tangent,
             candidates=known,
             residual=residual,
@@ -265,12 +266,13 @@ class FactorisedBody:
     def _limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target
     ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,), shortened where it is too long for a linear
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear
         step.
         """
         if not step.unknowns:
             return found, step.bone
-        bone = np.array([step.bone[0], found.extra[0]])
+        bone = step.bone.copy()
+        bone[1] = found.extra[0]
         missing = target.height.missing(float(state.bone[1]), state.reaction)
         flies = not found.status.any() and bone[1] * missing < 0.0
         if abs(bone[1]) > self.largest_bone_increment or flies:
@@ -290,7 +292,7 @@ class FactorisedBody:
         return float(np.clip(2.0 * gap, least, self.largest_bone_increment))
 
     def _searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (2,) at which the bone lacks least force, where no
+        """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
         travel settles it: an attraction that is extrapolated over a long way has none, for
         example.
 
@@ -350,10 +352,12 @@ class FactorisedBody:
                 raise StepFailed("cells would collapse", self.record.residuals)
         return fraction
 
-    def verge(self, state: State, target: Target) -> Verge:
+    def verge(self, state: State, target: Target) -> Verge | None:
         """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
-        where the way leads to, for the curvature of a profile may jump.
+        where the way leads to, for the curvature of a profile may jump. None in three dimensions.
         """
+        if state.bone.size == 3:
+            return None
         ahead = self.begin(state, target, frozen=False, start=state)
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))

@@ -17,11 +17,13 @@ def findings(body: Body, state: State, balance: Balance) -> str:
     """The largest out-of-balance forces and where they sit (current positions), the state of
     contact, and the smallest volume ratio of a cell.
     """
-    nodal = np.hypot(*_free(body, balance.forces).T)
+    nodal = np.linalg.norm(_free(body, balance.forces), axis=1)
     worst = np.argsort(nodal)[::-1][:NAMED]
     places = (body.space.mesh.points + state.u)[worst]
+    unit = "N/mm" if state.bone.size == 2 else "N"
+    at = [", ".join(f"{coordinate:.4g}" for coordinate in place) for place in places]
     forces = ", ".join(
-        f"{nodal[node]:.1e} N/mm at ({x:.4g}, {y:.4g})" for node, (x, y) in zip(worst, places, strict=True)
+        f"{nodal[node]:.1e} {unit} at ({where})" for node, where in zip(worst, at, strict=True)
     )
     opened, sticking = int((state.status == OPEN).sum()), int((state.status == STICK).sum())
     slipping = state.status.size - opened - sticking

@@ -9,15 +9,18 @@ and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CHANGES, HAIR, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
-from evfem.contact.condensed import Candidates
+from evfem.contact.condensed import Candidates, LinearContactStep
+from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.protocols import FrictionLaw
 from evfem.solver.state import State
 
 
@@ -64,9 +67,11 @@ class Pins:
         self.lower[new] = np.minimum(before, behind)
         self._side = side
 
-    def release(self, normal: Floats, shear: Floats, weak: float) -> bool:
-        """Let go of nodes whose shear force is below the lower limit; says whether there were any."""
-        return self.let_go(self.held & (np.abs(shear) < self.lower * normal - weak))
+    def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
+        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were
+        any.
+        """
+        return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
         """Let go of these nodes (P,) bool for the rest of the step; says whether there were any."""
@@ -89,7 +94,13 @@ def steps_of_friction(surface: Any, short: float) -> Floats:
 
 
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh."""
+    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
+
+    `contact_step` is the linear step in which its contact is solved.
+    """
+
+    contact_step = LinearContactStep
+    pad: Any
 
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -99,6 +110,13 @@ class Interface:
         self._segments = pad.segments
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
+        self.law: FrictionLaw | None = None
+        self.duration = 0.0
+
+    def begin(self, old: State, duration: float) -> None:
+        """A step of so many seconds starts from `old`."""
+        self.pins.begin(self.positions(old.u)[:, 0])
+        self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
@@ -132,7 +150,7 @@ class Interface:
         origin = self._origin(old)[c]
         slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
         friction = self.friction(old, c, np.where(self.pins.held[c], origin, position[:, 0]))
-        return Candidates(
+        known = Candidates(
             surface=surface,
             slip=slip,
             force=state.contact_force[c],
@@ -143,6 +161,52 @@ class Interface:
             negative_stiffness=negative_stiffness[c],
             gain_on_closing=gain_on_closing[c],
         )
+        return known if self.law is None else self._obeying(self.law, known, old, state, c)
+
+    def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
+        """The candidates c under a law of friction other than Coulomb's."""
+        slip = np.where(known.status >= FORWARD, known.slip, 0.0)
+        found = self._slipping(old, state, c, known.friction, slip).linearised(law)
+        normal = np.maximum(known.force[:, 0], 0.0)
+        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        return replace(
+            known,
+            friction=found.slope,
+            cohesion=found.offset,
+            slip_stiffness=found.by_speed / self.duration if self.duration > 0.0 else None,
+            friction_slope=known.friction_slope * by_place,
+        )
+
+    def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
+        """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
+        speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
+        length = self.lengths(self.positions(state.u)[:, 0])[nodes]
+        return Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+
+    def lengths(self, x: Floats) -> Floats:
+        """Tributary lengths of the pad nodes (P,) at x (P,), nowhere quite nothing, in mm."""
+        return np.maximum(self.pad.length(x), SHORTEST_LENGTH * self.length)
+
+    def age(self, old: State) -> Floats:
+        """How long every pad node has touched at the end of the step from `old` (P,) in s."""
+        return np.where(old.touching, old.age + self.duration, 0.0)
+
+    def aged(self, old: State, state: State) -> State:
+        """The accepted state with the ages of its nodes, if a law of friction may ask for them."""
+        if self.law is None:
+            return state
+        return replace(state, age=self.age(old))
+
+    def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
+        """Largest shear forces of the pad nodes (P,) at x (P,) under contact forces (P,), on a part of a
+        run between two states in which they slip by (P,).
+        """
+        old, new = part
+        mu = self.friction(old, np.arange(x.size), x)
+        if self.law is None:
+            return np.asarray(mu * normal)
+        seen = self._slipping(old, new, np.arange(x.size), mu, slip)
+        return replace(seen, normal=normal, length=self.lengths(x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds
@@ -186,7 +250,7 @@ class Interface:
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
-        if self.pins.release(state.contact_force[:, 0], state.contact_force[:, 1], weak):
+        if self.pins.release(self._lower_limit(old, state), state.contact_force[:, 1], weak):
             return False
         if self.pins.let_go(self._strayed(old, state, position[:, 0])):
             return False
@@ -195,8 +259,11 @@ class Interface:
         compliance = self.compliance(old)[active]
         slip = slip + compliance[:, 1] * (shear - old.contact_force[active, 1])
         x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
-        limit = self.friction(old, np.flatnonzero(active), x) * normal
-        status = state.status[active]
+        status, nodes = state.status[active], np.flatnonzero(active)
+        limit = self.friction(old, nodes, x) * normal
+        if self.law is not None:
+            moving = np.where(status == STICK, 0.0, slip)
+            limit = self._slipping(old, state, nodes, self.friction(old, nodes, x), moving).bound(self.law)
         sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
         sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
         slips = (
@@ -207,6 +274,13 @@ class Interface:
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())
+
+    def _lower_limit(self, old: State, state: State) -> Floats:
+        """Shear forces (P,) that hold a node on the smoother side of the jump that it is pinned to."""
+        lower = self.pins.lower
+        if self.law is None:
+            return np.asarray(lower * state.contact_force[:, 0])
+        return self._slipping(old, state, np.arange(lower.size), lower, np.zeros(lower.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):

@@ -83,7 +83,7 @@ class Linearisation:
         """
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
-        steep = self.negative_stiffness(state) > self.steep * self.pad.length(position[:, 0])
+        steep = self.negative_stiffness(state) > self.steep * self.pad.tributary(position)
         needed = self.pad.free & ((gap <= reach) | steep | (state.status != OPEN))
         if not needed.any():
             needed[np.argmin(gap)] = True
@@ -123,12 +123,13 @@ class Linearisation:
             self.factor.factorise(upper)
         except Singular as error:
             raise StepFailed(f"the tangent is singular ({error})", self.record.residuals) from error
-        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state))
+        dim = self.body.bone.size
+        self.tangent = CondensedTangent.make(self.factor.schur, self._coupling(state), dim)
         self.stiffest = float(upper[self.body.pattern.diagonal].max())
         dynamics = self.body.dynamics
         begin, seconds = (np.zeros_like(state.u), 0.0) if dynamics is None else dynamics.beginning
-        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds, state.pressure)
-        self._made_at = TangentPoint(*at)
+        at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
+        self._made_at = TangentPoint(*at, state.status, state.pressure)
         self.record.factorisations += 1
 
     def made_at(self, state: State) -> bool:
@@ -145,7 +146,7 @@ class Linearisation:
         self.touching, self.frozen = at.touching, at.frozen
         if self.body.dynamics is not None:
             self.body.dynamics.begin(at.begin, np.zeros_like(at.begin), at.duration)
-        self.factorise(replace(state, u=at.u, voltage=at.voltage, pressure=at.pressure))
+        self.factorise(replace(state, u=at.u, voltage=at.voltage, status=at.status, pressure=at.pressure))
 
     def _too_old(self, history: list[float]) -> bool:
         if len(history) < 2:
@@ -210,19 +211,21 @@ class Linearisation:
         """
         if self.attraction is None or state.voltage == 0.0 or self.frozen or self.attraction.charging:
             return None
-        position, c = self.interface.resting(state), self.candidates
+        position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]
         whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
-        unknowns = (2 * c[:, None] + np.array([0, 1])).ravel()
+        unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())
-        # nodes beyond the candidates move along with their neighbours, so that sliding changes no length
-        beyond = np.asarray(rows[:, 0::2].sum(axis=1)).ravel() - inner[:, 0::2].sum(axis=1)
+        # nodes beyond the candidates move along with their neighbours, so that sliding changes nothing
         index = np.arange(unknowns.size)
-        inner[index, 2 * (index // 2)] += beyond
-        normal = normals(surface_state(self.interface.surface, position[c]))
+        for a in (0, 2)[: dim - 1]:
+            beyond = np.asarray(rows[:, a::dim].sum(axis=1)).ravel() - inner[:, a::dim].sum(axis=1)
+            inner[index, dim * (index // dim) + a] += beyond
+        normal = np.zeros((c.size, dim))
+        normal[:, :2] = normals(surface_state(self.interface.surface, position[c]))
         own = self.negative_stiffness(state)[c, None, None] * normal[:, :, None] * normal[:, None, :]
-        blocks = inner.reshape(c.size, 2, c.size, 2)
+        blocks = inner.reshape(c.size, dim, c.size, dim)
         blocks[np.arange(c.size), :, np.arange(c.size)] -= own
-        stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-2]
+        stiffened = np.abs(inner).sum(axis=1) / np.diagonal(self.factor.schur)[:-dim]
         return inner if stiffened.max() > FAINT else None

@@ -69,7 +69,9 @@ class Relaxation:
             self.body.release(state.u, 0.0)
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
-        held = target if not target.drive.follows else replace(target, drive=GivenVoltage(state.voltage))
+        held = replace(target, duration=0.0)  # a snap takes no time
+        if target.drive.follows:
+            held = replace(held, drive=GivenVoltage(state.voltage))
         rate, slower, speed, quiet = 1.0, DRAG_CHANGE, 0.0, DRAG_REST
         for _ in range(DRAG_STEPS):
             self.body.release(state.u, rate)

@@ -13,6 +13,8 @@ from evfem.solver.strategy import Strategy
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
+#: the time since a node touched where nothing depends on it
+NO_AGE: Floats = np.zeros(0)
 #: the charges where the voltage is not resolved in time
 NO_CHARGES: Floats = np.zeros((2, 0))
 
@@ -44,7 +46,8 @@ class State:
     the attraction on the pad nodes (P, 2), the forces on the bone (2,), nodal velocities (N, 2) in
     mm/s, and the increment of the displacements in the step that led here (N, 2). While an
     equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
-    too (`evfem.solver.pressure`). Under a voltage resolved in time each pad node has two charges
+    too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
+    nodes have touched, `age` (P,) in s. Under a voltage resolved in time each pad node has two charges
     over eps_0 (2, P) in V/mm (`evfem.contact.charging`).
     """
 
@@ -58,6 +61,7 @@ class State:
     velocity: Floats
     last_increment: Floats
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
+    age: Floats = field(default_factory=lambda: NO_AGE)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
 
     @property
@@ -68,9 +72,10 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, 2), voltage, which pad nodes touched (P,),
-    whether the attraction was frozen, the time step's displacements at its beginning (N, 2) and
-    its seconds, and the pressure (E, Q) if that is an unknown.
+    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
+    when the step began, whether the attraction was frozen, the time step's displacements at its
+    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
+    that is an unknown.
     """
 
     u: Floats
@@ -79,6 +84,7 @@ class TangentPoint:
     frozen: bool
     begin: Floats
     duration: float
+    status: Ints
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
 
 

@@ -45,7 +45,7 @@ class Dynamics:
         self.viscosity = viscosity
         self.mass = None if density is None else Componentwise(mass_matrices(space) * density[:, None, None])
         self._inertia = None if self.mass is None else assembled(space, self.mass.matrices)
-        self.loops = loops() if viscosity is not None and space.dim == 2 else None
+        self.loops = loops(space.dim) if viscosity is not None else None
         self.step: float = 0.0
         self._u0 = self._v0 = np.zeros((space.size, space.dim))
         self._strain0: Any = None
@@ -127,7 +127,8 @@ class Dynamics:
         """
         if self.loops is not None:
             blocks, points = self.space.cells.weight.shape[:2]
-            strain = np.empty((blocks, points, 3, LANES))
+            dim = self.space.dim
+            strain = np.empty((blocks, points, dim * (dim + 1) // 2, LANES))
             self.loops.strains(self.space.cells, np.ascontiguousarray(u), strain)
             return strain
         return green_strain(deformation_gradient(self._damping.field(u)))[:, :, None]

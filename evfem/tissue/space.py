@@ -40,7 +40,7 @@ from evfem.mesh.hexahedron import EDGES, FACES, PLACES
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det
 from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.kernels.blocks import Cells, blocked
+from evfem.tissue.kernels.blocks import Cells, SolidCells, blocked
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -181,9 +181,9 @@ class Space:
         return self.sampled.of_mesh
 
     @cached_property
-    def cells(self) -> Cells:
+    def cells(self) -> Cells | SolidCells:
         """The same in blocks, for the compiled loops."""
-        return cells_of(self)
+        return cells_of(self) if self.dim == 2 else solid_cells_of(self)
 
     @cached_property
     def projection(self) -> Floats | None:
@@ -196,7 +196,7 @@ def cells_of(space: Space) -> Cells:
     pointwise = space.modes is None or space.psi is None
     E, n = space.nodes.shape
     sampled = space.sampled
-    assert isinstance(sampled, Gradients), "loops of the plane"
+    assert isinstance(sampled, Gradients), "no mean gradients in the plane"
     reference = sampled.reference[:0] if pointwise else sampled.reference
     inverse = sampled.inverse[:, :0] if pointwise else sampled.inverse
     psi = np.zeros((E, 0, 0)) if space.psi is None else space.psi
@@ -213,6 +213,26 @@ def cells_of(space: Space) -> Cells:
         blocked(inverse.reshape(E, S, 4)),
         blocked(psi),
         blocked(mean),
+    )
+
+
+def solid_cells_of(space: Space) -> SolidCells:
+    """A space of hexahedra in blocks."""
+    assert space.modes is not None, "hexahedra have modes of theta"
+    assert space.psi is not None
+    E, n = space.nodes.shape
+    nodes = blocked(space.nodes.astype(np.int32))
+    Q, M = space.weight.shape[1], space.modes.shape[2]
+    sampled = space.sampled
+    return SolidCells(
+        (space.size, len(nodes), n, Q, M),
+        nodes,
+        blocked(space.weight),
+        space.at.reference,
+        blocked(space.at.inverse.reshape(E, Q, 9)),
+        blocked(sampled.of_mesh[:, 0]) if isinstance(sampled, MeanGradients) else None,
+        blocked(space.psi),
+        blocked(np.einsum("eq,eqm->em", space.weight, space.modes)),
     )
 
 

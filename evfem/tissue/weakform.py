@@ -52,7 +52,7 @@ class Tissue:
             (split(law, space.dim), space.mesh.cells_of(name)) for name, law in laws.items()
         ]
         self.mu, self.lmbda = _neo_hookean_moduli(space, laws)
-        self.loops = loops() if self.mu is not None and space.dim == 2 else None
+        self.loops = loops(space.dim) if self.mu is not None else None
 
     @cached_property
     def regions(self) -> list[tuple[Any, Integral]]:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from .attractions import add_roughness, add_voltage, electrostatics
 from .bodies import TABLE_2_WIDTH, finger, width
 from .draws import Draw
-from .grounds import surface
+from .grounds import add_friction_law, surface
 from .tables import Tables, copied
 
 
@@ -30,6 +30,7 @@ def draw(seed: int, number: int) -> Tables:
         precision = random.one_of("single", "double")
         tables["output"] = {"every": random.whole(1, 5), "precision": precision, "compression": True}
     add_roughness(random, tables)
+    add_friction_law(random, tables)
     return copied(tables)
 
 

@@ -40,6 +40,30 @@ def surface(random: Draw, finger: Tables) -> Tables:
     return table
 
 
+def add_friction_law(random: Draw, tables: Tables) -> None:
+    """Perhaps a law of friction; where it asks for speeds, slides have them. Friction falls with the
+    speed only where inertia holds it.
+    """
+    if not random.chance(0.2):
+        return
+    kind = random.one_of("load_index", "adhesive", "rate", "ageing")
+    law: Tables = {"kind": kind}
+    if kind == "load_index":
+        law |= {"pressure": random.spread(3e-3, 0.05), "index": random.between(0.6, 1.3)}
+    elif kind == "adhesive":
+        law["strength"] = random.spread(5e-4, 0.01)
+    elif kind == "rate":
+        inertial = tables["solver"].get("dynamics") == "inertial"
+        law |= {"speed": random.spread(1.0, 100.0), "ratio": random.between(0.5 if inertial else 1.0, 1.5)}
+        law["exponent"] = random.between(0.0, 0.4)
+    else:
+        law |= {"fresh": random.between(0.1, 1.0), "time": random.spread(0.05, 10.0)}
+    tables["surface"]["friction_law"] = law
+    for motion in tables["motion"] if kind in ("rate", "ageing") else ():
+        if motion["kind"] == "slide":
+            motion.setdefault("speed", random.spread(1.0, 200.0))
+
+
 def _wave(random: Draw) -> list[float]:
     """Amplitude, wavenumber and phase of a wave."""
     wavenumber = 2.0 * np.pi / random.spread(0.6, 12.0)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.contact.friction import Coulomb
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.result import COLUMNS, Frame, Result
@@ -121,7 +122,7 @@ def balance(scene: Scene, result: Result) -> Broken | None:
 @check
 def cone(scene: Scene, result: Result) -> Broken | None:
     """On a level surface the sums lie within the cone of the largest friction coefficient."""
-    if not scene.ground.is_flat:
+    if not scene.ground.is_flat or not isinstance(scene.friction_law, Coulomb):
         return None
     mu = float(np.max(np.atleast_2d(scene.surface.friction)[:, -1]))  # type: ignore[attr-defined]
     beyond = np.abs(result.tangential_force) - mu * result.normal_force
@@ -253,16 +254,21 @@ def pull(scene: Scene, result: Result) -> Broken | None:
 def nodal_cone(scene: Scene, result: Result) -> Broken | None:
     """At every node of the pad shear is within the cone at its place; where it slips, on it.
 
-    At a jump, and within a steep ramp, any coefficient within `NEAR` will do.
+    At a jump, and within a steep ramp, any coefficient within `NEAR` will do. Frames do not know
+    speeds and ages.
     """
+    law = scene.friction_law
+    if getattr(law, "timed", False):
+        return None
     points = result.mesh.points[:, 0]
 
     def beyond(frame: Frame) -> float:
         x = points + frame.displacement[:, 0]
         coefficients = [scene.ground.friction_coefficient(x + shift) for shift in (-NEAR, 0.0, NEAR)]
         shear, slips = np.abs(frame.shear_traction), frame.contact_status == SLIP
-        outside = shear - np.max(coefficients, axis=0) * frame.contact_pressure
-        inside = np.min(coefficients, axis=0) * frame.contact_pressure - shear
+        p = np.maximum(frame.contact_pressure, 0.0)
+        bounds = [law.bound(p, mu, 0.0, 0.0) for mu in coefficients]
+        outside, inside = shear - np.max(bounds, axis=0), np.min(bounds, axis=0) - shear
         return _relative(np.maximum(outside, np.where(slips, inside, 0.0)), frame)
 
     return _frames("nodal cone", result, beyond, TOLERANCE)

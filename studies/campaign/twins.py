@@ -36,7 +36,7 @@ def free_of_path(scene: Scene) -> bool:
     depend on them, and so do attractions that lag behind by a step.
     """
     return (
-        not scene.ground.has_friction
+        not scene.has_friction
         and scene.solver.dynamics == "quasistatic"
         and scene.solver.contact == "exact"
         and scene.air_layer

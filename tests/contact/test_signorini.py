@@ -414,3 +414,46 @@ def test_the_bone_carries_the_attraction_that_contact_forces_add():
     whole = ContactProblem(problem.start, problem.compliance, problem.friction, extra)
     found = solve_with_attraction(whole, pull, np.array([STICK]))
     assert found.force[0] == pytest.approx(2.0 / 0.25, rel=1e-12)
+
+
+def adhering(slip, cohesion=0.5):
+    """A node pressed with 2 N/mm, of compliance 0.1, friction 0.3 and a shear force without load."""
+    start = np.array([-0.2, slip])
+    return ContactProblem(start, 0.1 * np.eye(2), np.array([0.3]), cohesion=np.array([cohesion]))
+
+
+@pytest.mark.parametrize(("slip", "status"), [(0.1, STICK), (0.12, FORWARD), (-0.12, BACKWARD)])
+def test_a_node_that_adheres_sticks_up_to_its_cohesion_more(slip, status):
+    """It sticks up to 0.3 2 + 0.5 = 1.1 N/mm, and slips with that."""
+    found = solve_contact(adhering(slip), np.array([STICK]))
+    assert found.status.tolist() == [status]
+    assert found.force[0] == pytest.approx(2.0, rel=1e-12)
+    assert found.force[1] == pytest.approx(
+        -slip / 0.1 if status == STICK else -np.sign(slip) * 1.1, rel=1e-12
+    )
+
+
+def test_cohesion_alone_is_friction_and_an_open_node_has_none():
+    alone = ContactProblem(np.array([-0.2, 0.04]), 0.1 * np.eye(2), np.zeros(1), cohesion=np.array([0.5]))
+    found = solve_contact(alone, np.array([FORWARD]))
+    assert found.status.tolist() == [STICK]
+    assert found.force[1] == pytest.approx(-0.4, rel=1e-12)
+    lifted = ContactProblem(np.array([0.2, 0.5]), 0.1 * np.eye(2), np.zeros(1), cohesion=np.array([0.5]))
+    opened = solve_contact(lifted, np.array([FORWARD]))
+    assert opened.status.tolist() == [OPEN]
+    assert not opened.force.any()
+
+
+def test_extra_unknowns_feel_the_cohesion():
+    """lam_t - 2 d = 3 with the lam_t = 0.3 2 + 0.5 of a backward slip."""
+    extra = ExtraUnknowns(
+        np.array([[0.0], [1.0]]), np.array([[0.0, 1.0]]), np.array([[-2.0]]), np.array([3.0])
+    )
+    problem = adhering(0.0)
+    whole = ContactProblem(
+        problem.start, problem.compliance, problem.friction, extra, cohesion=problem.cohesion
+    )
+    found = solve_contact(whole, np.array([STICK]))
+    assert found.status.tolist() == [BACKWARD]
+    assert found.force[1] == pytest.approx(1.1, rel=1e-12)
+    assert found.extra[0] == pytest.approx((1.1 - 3.0) / 2.0, rel=1e-12)

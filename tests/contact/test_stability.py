@@ -10,7 +10,7 @@ import pytest
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
 from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.contact.stability import ATTRACTION, FALLING, SLOPES, verge
+from evfem.contact.stability import ATTRACTION, FALLING, FASTER, SLOPES, verge
 
 KX, KY, LOAD = 0.4, 1.5, 0.3
 
@@ -72,6 +72,14 @@ def test_friction_that_falls_along_the_way_lets_go(status, falls):
     assert found.share == pytest.approx(LOAD * 2.0 / KX, rel=1e-12)
     assert found.cause == FALLING
     assert verge(point(status, friction=0.5, friction_slope=-falls)).share == 0.0
+
+
+@pytest.mark.parametrize(("grows", "share"), [(-0.6, 0.6 / KX), (0.6, 0.0)])
+def test_friction_that_falls_with_the_speed_lets_go(grows, share):
+    step = point(FORWARD, friction=0.5)
+    found = verge(replace(step, candidates=replace(step.candidates, slip_stiffness=np.array([grows]))))
+    assert found.share == pytest.approx(share, rel=1e-12)
+    assert share == 0.0 or found.cause == FASTER
 
 
 def test_an_attraction_that_weakens_with_the_gap_is_held_by_the_spring():

@@ -173,3 +173,24 @@ def test_scalars_give_floats_and_impossible_input_is_refused():
 
     with pytest.raises(InputError, match="square of the voltage"):
         display(law=Linear())
+
+
+@pytest.mark.parametrize("waveform", ["sine", "square"])
+def test_encoding_through_what_conducts_gives_back_the_friction(waveform):
+    """Effective and peak voltage by the mean of the drive, checked with the mean pressure itself."""
+    import evfem as ev
+
+    drive = ev.Drive(250.0, waveform, "gabriel_dry", 1e-8)
+    solids = (ev.Layer(0.30, 1650.0), ev.TOUCHSCREEN)
+    display = Encoding.driven(ev.StrongTroxel(), drive, solids, AreaLaw(112.0), friction=0.5)
+    voltage = display.voltage_for_friction(0.6)
+    assert display.tangential_force(0.7, voltage) == pytest.approx(0.6 * 0.7, rel=1e-12)
+    assert display.peak(voltage) == pytest.approx(voltage * (2**0.5 if waveform == "sine" else 1.0))
+    if waveform == "sine":
+        given = {"skin": "gabriel_dry", "skin_thickness": 0.30, "insulator": ev.TOUCHSCREEN}
+        pressure = ev.electrostatics.alternating_pressure(0.0, voltage, 250.0, **given, gap_conductivity=1e-8)
+        assert pressure * 112.0 == pytest.approx(0.2, rel=1e-12)
+    with pytest.raises(ev.InputError, match="resolved"):
+        Encoding.driven(
+            ev.StrongTroxel(), ev.Drive(250.0, resolved=True), solids, AreaLaw(112.0), friction=0.5
+        )

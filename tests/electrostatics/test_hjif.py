@@ -208,3 +208,10 @@ def test_the_command_writes_the_same_file(tmp_path):
     scale = ["--full-scale", "2000", "--speed", "20", "--friction", "0.5", "0.6"]
     assert cli.main(["signal", str(source), "--out", str(out), *scale]) == 0
     assert json.loads(out.read_text()) == json.loads(direct.read_text())
+
+
+def test_the_carrier_stands_in_the_description():
+    profile = VoltageProfile([0.0, 10.0], [0.0, 2000.0])
+    given = (profile, 2000.0, 20.0, (0.5, 0.6))
+    assert "carrier of 10000.0 Hz" in hjif.document(*given, 10_000.0)["description"]
+    assert "carrier" not in hjif.document(*given)["description"]

@@ -94,6 +94,8 @@ def test_every_key_of_the_models_has_its_row():
     assert found.pop(("finger", "parametric")) == {"participant", "depth"} | {
         spec.name for spec in fields(FingerPad) if spec.init
     }
+    for name, (model, _) in keys.FRICTIONS.items():
+        assert found.pop(("surface.friction_law", name)) == {*model.model_fields}
     for name, (model, _) in keys.ROUGHNESS.items():
         assert found.pop(("electrostatics.roughness_gap", name)) == set(model.model_fields)
     for name, law in LAWS.items():
@@ -118,6 +120,7 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
     ]
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
     written += [
+        meanings.FRICTION,
         meanings.ROUGHNESS,
         *meanings.MOTION.values(),
         meanings.SIGNAL,

@@ -31,7 +31,8 @@ STATE = State(
     velocity=numbers(N, 2),
     last_increment=numbers(N, 2),
 )
-POINT = TangentPoint(numbers(N, 2), 456.0, np.array([True, False, True, True]), True, numbers(N, 2), 0.25)
+TOUCHED, STATUS = np.array([True, False, True, True]), np.array([2, 0, 1, 3])
+POINT = TangentPoint(numbers(N, 2), 456.0, TOUCHED, True, numbers(N, 2), 0.25, STATUS)
 CARRIED = Reusable(np.array([0, 2, 3]), POINT, 0.75)
 
 

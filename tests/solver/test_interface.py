@@ -93,7 +93,7 @@ def test_a_pinned_node_is_let_go_below_the_lower_limit_and_for_good(table):
     _, pins = crossing(table, CHANGES)
     normal = np.full(3, 5.0)
     for shear, weak, free in ((1.1, 0.0, False), (-1.1, 0.0, False), (0.95, 0.1, False), (-0.95, 0.0, True)):
-        assert pins.release(normal, np.full(3, shear), weak) == free
+        assert pins.release(pins.lower * normal, np.full(3, shear), weak) == free
         assert pins.held[0] != free
     for x in (0.4, 0.2, 0.4, 0.2, 0.4):
         pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))

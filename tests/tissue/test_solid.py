@@ -2,11 +2,12 @@
 case.
 """
 
+import importlib.util
 from functools import cache
 
 import numpy as np
 import pytest
-from tools.grids import order, rectangle, solve, tangent_of
+from tools.grids import mixed_tangent_of, order, rectangle, solve, tangent_of
 from tools.laws import StressOnly, neo_hookean_stress
 from tools.solids import box
 
@@ -170,6 +171,74 @@ def test_rigid_motion_costs_nothing(element):
         stress, J = tissue.cell_stress(u)
         assert np.abs(stress).max() < 1e-13
         np.testing.assert_allclose(J, 1.0, rtol=1e-13)
+
+
+# -- compiled loops --------------------------------------------------------------------------------------
+
+
+def test_loops_of_hexahedra_are_used_where_they_were_built():
+    tissue = Tissue(box("hex8", (1, 1, 1)), {"lower": LAWS["neo_hookean"]})
+    built = importlib.util.find_spec("evfem.tissue.kernels.solids") is not None
+    assert (tissue.loops is not None) == built
+
+
+@every_element
+def test_compiled_tissue_is_the_form(element):
+    """Nine cells of two regions: forces, energy, tangents, pressures and their changes."""
+    space = box(element, (3, 3, 1), warp=bend, split=lambda x, y, z: x + y > 1.0)
+    laws = {"lower": NeoHookean(E=0.8, nu=0.3), "upper": NeoHookean(E=3.0, nu=0.4999)}
+    fast, plain = Tissue(space, laws), Tissue(space, laws)
+    plain.loops = None
+    u, du = wavy(space.mesh.points), wavy(space.mesh.points[:, ::-1])
+    q = np.random.default_rng(4).uniform(-0.2, 0.1, space.weight.shape)
+    for of in (
+        lambda tissue: tissue.forces(u),
+        lambda tissue: tangent_of(space, u, tissue).toarray(),
+        lambda tissue: mixed_tangent_of(tissue, u, q).toarray(),
+        lambda tissue: tissue.pressure(u),
+        lambda tissue: tissue.pressure_change(u, du),
+        lambda tissue: tissue.pressure_forces(u, q),
+        lambda tissue: np.array([tissue.energy(u), tissue.smallest_J(u)]),
+    ):
+        expected = of(plain)
+        np.testing.assert_allclose(of(fast), expected, atol=2e-12 * np.abs(expected).max())
+
+
+@every_element
+def test_compiled_viscosity_is_the_form(element):
+    """And its dissipation, in cells of different viscosity, one of which has none."""
+    space = box(element, (3, 3, 1), warp=bend)
+    start, u = wavy(space.mesh.points), wavy(space.mesh.points, 0.08)
+    eta = np.linspace(0.0, 0.3, len(space.nodes))
+    fast, plain = Dynamics(space, eta, None), Dynamics(space, eta, None)
+    plain.loops = None
+    for term in (fast, plain):
+        term.begin(start, 0 * u, 2e-3)
+    forces, K = plain.forces(u), tangent_of(space, u, plain).toarray()
+    np.testing.assert_allclose(fast.forces(u), forces, atol=1e-12 * np.abs(forces).max())
+    np.testing.assert_allclose(tangent_of(space, u, fast).toarray(), K, atol=1e-12 * np.abs(K).max())
+    assert fast.dissipation(u) == pytest.approx(plain.dissipation(u), rel=1e-12)
+
+
+@every_element
+def test_inverted_states_are_seen(element):
+    """A state turned inside out has negative J and forces that are not numbers."""
+    space = box(element, (2, 1, 1))
+    u = space.mesh.points * [-2.0, 0.0, 0.0]
+    for tissue in (Tissue(space, {"lower": LAWS[law]}) for law in ("neo_hookean", "yeoh")):
+        assert tissue.smallest_J(u) == pytest.approx(-1.0)
+        assert np.isnan(tissue.forces(u)).any()
+
+
+def test_loops_refuse_what_would_read_beyond_an_array():
+    space = box("hex8", (2, 1, 1))
+    tissue = Tissue(space, {"lower": LAWS["neo_hookean"]})
+    cells, out = space.cells, np.zeros((space.size, 3))
+    for wrong in (out[:-1], out.astype("f4"), out[:, :2].copy()):
+        with pytest.raises(ValueError, match="expected"):
+            tissue.loops.forces(cells, wrong, *tissue._moduli, out)
+    with pytest.raises(ValueError, match="kind"):
+        tissue.loops.forces(cells._replace(sizes=(space.size, 1, 20, 8, 1)), out, *tissue._moduli, out)
 
 
 # -- convergence ----------------------------------------------------------------------------------------

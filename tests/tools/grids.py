@@ -90,7 +90,7 @@ def tangent_of(space, u, *terms):
 
 def mixed_tangent_of(tissue, u, q):
     """The same of a tissue under a pressure q (E, Q) of the iterations."""
-    pattern = Pattern(tissue.space.nodes, 2)
+    pattern = Pattern(tissue.space.nodes, tissue.space.dim)
     data = pattern.zeros()
     tissue.add_tangent(u, pattern, data, q)
     return pattern.full(pattern.finish(data))

@@ -1,8 +1,8 @@
 """Cells in blocks of `LANES`, the last axis of every array, as the compiled element loops take them.
 
-The loops (`loops.c`) are built when the package is installed; where no compiler is, the weak forms
-do the same (`evfem.tissue.assembly`). Arrays: B blocks, n nodes of a cell, Q quadrature points, S
-samples of ln J, M modes of theta, L lanes.
+The loops (`loops.c`, in space `solids.c`) are built when the package is installed; where no
+compiler is, the weak forms do the same (`evfem.tissue.assembly`). Arrays: B blocks, n nodes of a
+cell, Q quadrature points, S samples of ln J, M modes of theta, L lanes.
 """
 
 from __future__ import annotations
@@ -37,10 +37,29 @@ class Cells(NamedTuple):
     mean: Floats
 
 
+class SolidCells(NamedTuple):
+    """A space of hexahedra in blocks. `sizes` (N, B, n, Q, M); `nodes`, `weight`, `reference` (Q, n,
+    3), `inverse` (B, Q, 9, L) and `mean` as in the plane; ln J is sampled at the points, `psi` (B, M,
+    Q, L), or once with `mean_gradient` (B, n, 3, L), the means of the shape gradients, `psi` (B, M,
+    1, L).
+    """
+
+    sizes: tuple[int, ...]
+    nodes: Ints
+    weight: Floats
+    reference: Floats
+    inverse: Floats
+    mean_gradient: Floats | None
+    psi: Floats
+    mean: Floats
+
+
 @cache
-def loops() -> Any:
-    """The compiled element loops, or None where they were not built."""
+def loops(dim: int = 2) -> Any:
+    """The compiled element loops of the plane or of space, or None where they were not built."""
     try:
+        if dim == 3:
+            return import_module("evfem.tissue.kernels.solids")
         return import_module("evfem.tissue.kernels.loops")
     except ImportError:
         return None

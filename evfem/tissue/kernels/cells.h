@@ -1,20 +1,13 @@
-/* Cells in vectors: LANES cells at a time, one in each lane; the arrays are laid out so by
-   `evfem.tissue.kernels.blocks`. With reference gradients g_k of the shape functions and A = dxi/dX at
-   a point, H = grad u = (sum_k u_k g_k^T) A and the shape gradients are A^T g_k. */
+/* Cells of the plane in vectors: LANES cells at a time, one in each lane. With reference gradients g_k
+   of the shape functions and A = dxi/dX at a point, H = grad u = (sum_k u_k g_k^T) A and the shape
+   gradients are A^T g_k. */
 
-#include <Python.h>
-#include <math.h>
-#include <stdint.h>
-#include <string.h>
+#include "lanes.h"
 
-#define LANES 8
+#define DIM 2
 #define MOST_NODES 9  /* of a cell */
 #define MOST_POINTS 9 /* where it is integrated, or ln J is sampled */
-#define FAR 0.028      /* of z^2: |ln J| about 1/3, where its series becomes too short */
-#define INLINE static inline __attribute__((always_inline))
 
-typedef double lanes __attribute__((vector_size(8 * LANES)));
-typedef lanes stored __attribute__((aligned(8))); /* as numpy's arrays are */
 typedef struct { lanes xx, xy, yx, yy; } tensor;
 
 /* Gradients of the shape functions at some points of all cells. */
@@ -34,15 +27,6 @@ typedef struct {
     const stored *psi;    /* (B, modes, sample.count) */
     const stored *mean;   /* (B, modes): a_m */
 } mesh;
-
-/* The numbers in the lanes of a vector in memory. */
-INLINE double *item(lanes *vector) { return (double *)vector; }
-
-INLINE double sum(lanes values) {
-    double total = 0.0;
-    for (int i = 0; i < LANES; i++) total += values[i];
-    return total;
-}
 
 /* -- at a point ------------------------------------------------------------------------------ */
 
@@ -89,25 +73,6 @@ INLINE void add_forces(tensor P, const double *g, const stored *A, int n, lanes 
 
 /* J - 1, with the digits that J loses where it is nearly 1 */
 INLINE lanes volume_change(tensor H) { return H.xx + H.yy + (H.xx * H.yy - H.xy * H.yx); }
-
-/* ln J = 2 artanh(z), z = e / (2 + e), by its series; exactly where |ln J| > 1/3. nan if J < 0. */
-INLINE lanes log_of_volume(lanes e) {
-    lanes z = e / (2.0 + e), s = z * z, p = s / 21.0 + 1.0 / 19.0;
-    p = p * s + 1.0 / 17.0;
-    p = p * s + 1.0 / 15.0;
-    p = p * s + 1.0 / 13.0;
-    p = p * s + 1.0 / 11.0;
-    p = p * s + 1.0 / 9.0;
-    p = p * s + 1.0 / 7.0;
-    p = p * s + 1.0 / 5.0;
-    p = p * s + 1.0 / 3.0;
-    lanes log_J = 2.0 * z * (p * s + 1.0);
-    double far = 0.0;
-    for (int i = 0; i < LANES; i++) far = e[i] > -1.0 && s[i] < far ? far : e[i] > -1.0 ? s[i] : 1.0;
-    if (!(far <= FAR))
-        for (int i = 0; i < LANES; i++) log_J[i] = log1p(e[i]);
-    return log_J;
-}
 
 INLINE tensor inverse_transposed(tensor H, lanes e) {
     lanes share = 1.0 / (1.0 + e);

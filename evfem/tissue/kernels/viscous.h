@@ -36,12 +36,6 @@ INLINE lanes viscous_stress(const mesh *m, Py_ssize_t b, int q, int n, const lan
     return w;
 }
 
-INLINE int any(lanes values) {
-    for (int i = 0; i < LANES; i++)
-        if (values[i] != 0.0) return 1;
-    return 0;
-}
-
 /* Nodal forces F S : grad v added to out (N, 2); returns what the step dissipates, S : (E - E0). */
 INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored *rate,
                              const stored *strain0, double *out) {

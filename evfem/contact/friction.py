@@ -1,0 +1,231 @@
+r"""Friction that depends on more than the place: the largest shear traction of a node.
+
+Coulomb's bound is :math:`\mu(x)\,p`, with the contact pressure p of the node and the coefficient of
+the surface at its place. A law replaces it by :math:`\tau(p, \mu, v, t)`, with the speed v at which
+the node slips and the time t since it touched; a node sticks up to :math:`\tau(p, \mu, 0, t)`.
+
+====================  ==================================================================  ===========
+law                   tau                                                                 kind
+====================  ==================================================================  ===========
+`Coulomb`             mu p                                                                coulomb
+`LoadIndexFriction`   mu p (p / pressure)^(index - 1)                                     load_index
+`AdhesiveFriction`    strength min(1, p / full) + mu p                                               adhesive
+`RateFriction`        mu p (ratio + (1 - ratio) exp(-v / speed)) (v / speed)^exponent     rate
+`AgeingFriction`      mu p (1 - (1 - fresh) exp(-t / time))                               ageing
+====================  ==================================================================  ===========
+
+`Linearised` is what the active set needs of a law at an iterate: per node the bound's derivative by
+the contact force, b', and what is left of it at no force, c, so that a slipping node carries
+:math:`\lambda_t = \mp(b'\lambda_n + c)`; its derivative by the slip of a time step, and by the place.
+Where the tangent would be negative without a load (a law that grows faster than the load), the
+chord from there takes its place.
+
+Sources: skin on smooth glass, load and ageing: doi:10.1098/rsif.2016.0935,
+doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Units: mm, MPa, s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Values, Within, check_fields, number, plain
+from evfem.protocols import FrictionLaw
+from evfem.tensor import derivative
+
+#: share of a law's own pressure and speed below which its power stays as it is, unless it is given: where
+#: friction rises without bound as the load vanishes, nodes at the edge of contact would wedge
+LOWEST = 0.01
+#: steps of differences of a law that drops imaginary parts: in MPa, of a coefficient, in mm/s
+PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
+_PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
+_SPEED = number("a speed in mm/s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
+_SHARE = number("a share from 0 to 1", Within(0.0, 1.0))
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Coulomb's law, which a scene has without any.
+
+    >>> Coulomb().bound(0.01, 0.3, 5.0, 0.0)
+    0.003
+    """
+
+    kind = "coulomb"
+    timed = False
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa."""
+        return mu * pressure
+
+
+@dataclass(frozen=True)
+class LoadIndexFriction:
+    """The force grows with the power `index` of the load: the coefficient is that of the surface at
+    `pressure` (MPa), and below `lowest` (MPa; None: a hundredth of it) what it is there.
+
+    >>> law = LoadIndexFriction(pressure=0.01, index=0.7)
+    >>> round(float(law.bound(0.02, 0.3, 0.0, 0.0) / law.bound(0.01, 0.3, 0.0, 0.0)), 12) == round(2**0.7, 12)
+    True
+    """
+
+    pressure: float = field(metadata=_PRESSURE)
+    index: float = field(metadata=number("an exponent from 0.1 to 3", Within(0.1, 3.0)))
+    lowest: float | None = field(default=None, metadata=_PRESSURE)
+    kind = "load_index"
+    timed = False
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa."""
+        lowest = LOWEST * self.pressure if self.lowest is None else self.lowest
+        return plain(mu * pressure * (_at_least(pressure, lowest) / self.pressure) ** (self.index - 1.0))
+
+
+@dataclass(frozen=True)
+class AdhesiveFriction:
+    """Every place in real contact resists with the shear `strength` (MPa) besides mu p. Contact is
+    complete from the pressure `full` on (MPa; None: the strength), and below it grows in proportion.
+
+    >>> AdhesiveFriction(strength=0.004).bound(np.array([0.002, 0.01]), 0.3, 0.0, 0.0).tolist()
+    [0.0026, 0.007]
+    """
+
+    strength: float = field(metadata=_PRESSURE)
+    full: float | None = field(default=None, metadata=_PRESSURE)
+    kind = "adhesive"
+    timed = False
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa."""
+        share = np.asarray(pressure) / (self.strength if self.full is None else self.full)
+        return plain(self.strength * np.where(share.real < 1.0, share, 1.0) + mu * pressure)
+
+
+@dataclass(frozen=True)
+class RateFriction:
+    """Friction of sliding at `speed` (mm/s): it falls from mu to `ratio` mu around it, and goes with
+    the power `exponent` of the speed, which below `slowest` (mm/s; None: a hundredth of `speed`)
+    counts as that.
+
+    >>> stribeck = RateFriction(speed=5.0, ratio=0.5)
+    >>> stribeck.bound(0.01, 0.4, np.array([0.0, 1e9]), 0.0).tolist()
+    [0.004, 0.002]
+    >>> power = RateFriction(speed=10.0, exponent=0.5)
+    >>> power.bound(0.01, 0.4, np.array([10.0, 40.0]), 0.0).tolist()
+    [0.004, 0.008]
+    """
+
+    speed: float = field(metadata=_SPEED)
+    ratio: float = field(default=1.0, metadata=number("a ratio from 0 to 100", Within(0.0, 100.0)))
+    exponent: float = field(default=0.0, metadata=number("an exponent from -2 to 2", Within(-2.0, 2.0)))
+    slowest: float | None = field(default=None, metadata=_SPEED)
+    kind = "rate"
+    timed = True
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa."""
+        slowest = LOWEST * self.speed if self.slowest is None else self.slowest
+        stribeck = self.ratio + (1.0 - self.ratio) * np.exp(-np.asarray(speed) / self.speed)
+        power = (_at_least(speed, slowest) / self.speed) ** self.exponent
+        return plain(mu * pressure * stribeck * power)
+
+
+@dataclass(frozen=True)
+class AgeingFriction:
+    """A place that has just touched resists with the share `fresh` of mu p; the rest comes with its
+    real area of contact, of first order with the `time` (s), sliding or not.
+
+    >>> law = AgeingFriction(fresh=0.2, time=6.7)
+    >>> law.bound(0.01, 0.5, 0.0, np.array([0.0, 20.0])).round(5).tolist()
+    [0.001, 0.0048]
+    """
+
+    fresh: float = field(metadata=_SHARE)
+    time: float = field(
+        default=6.7, metadata=number("a time in s, larger than 0", Within(0.0, 1e6, above=True))
+    )
+    kind = "ageing"
+    timed = True
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
+        """Largest shear traction in MPa."""
+        return plain(mu * pressure * (1.0 - (1.0 - self.fresh) * np.exp(-np.asarray(age) / self.time)))
+
+
+KINDS = {
+    cls.kind: cls for cls in (Coulomb, LoadIndexFriction, AdhesiveFriction, RateFriction, AgeingFriction)
+}
+
+
+def _at_least(value: Values, least: float) -> Any:
+    """The value, or `least` where it is below."""
+    value = np.asarray(value)
+    return np.where(value.real > least, value, least)
+
+
+@dataclass(frozen=True)
+class Slipping:
+    """k nodes as a law sees them: contact forces (k,) in N/mm, tributary lengths (k,) in mm,
+    coefficients of the surface (k,), speeds (k,) in mm/s and ages (k,) in s.
+    """
+
+    normal: Floats
+    length: Floats
+    mu: Floats
+    speed: Floats
+    age: Floats
+
+    @property
+    def pressure(self) -> Floats:
+        """Contact pressure (k,) in MPa."""
+        return np.maximum(self.normal, 0.0) / self.length
+
+    def bound(self, law: FrictionLaw) -> Floats:
+        """Largest shear forces (k,) in N/mm."""
+        return np.asarray(law.bound(self.pressure, self.mu, self.speed, self.age) * self.length)
+
+    def linearised(self, law: FrictionLaw) -> Linearised:
+        """How they depend on contact force, speed and coefficient."""
+        p = self.pressure
+        force = self.bound(law)
+        slope = self._derivative(law, "pressure")
+        offset = force - slope * p * self.length
+        over = offset < 0.0
+        slope = np.where(over, force / np.where(over, p * self.length, 1.0), slope)
+        by_speed = self._derivative(law, "speed") * self.length
+        by_mu = self._derivative(law, "mu") * self.length
+        return Linearised(slope, np.where(over, 0.0, offset), by_speed, by_mu)
+
+    def _derivative(self, law: FrictionLaw, by: Literal["pressure", "mu", "speed"]) -> Floats:
+        at = {"pressure": self.pressure, "mu": self.mu, "speed": self.speed, "age": self.age}
+        step = {"pressure": PRESSURE_STEP, "mu": COEFFICIENT_STEP, "speed": SPEED_STEP}[by]
+        found = derivative(lambda value: law.bound(**(at | {by: value})), at[by], step)
+        return np.broadcast_to(np.asarray(found, dtype=float), self.normal.shape)
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """The bound of k nodes near an iterate: `slope` (k,) times the contact force plus `offset` (k,)
+    in N/mm; its derivatives by speed, `by_speed` (k,) in N/mm per mm/s, and by the coefficient of
+    the surface, `by_mu` (k,) in N/mm.
+    """
+
+    slope: Floats
+    offset: Floats
+    by_speed: Floats
+    by_mu: Floats

@@ -1,0 +1,240 @@
+/* The loops for Python, in the plane and in space: of each a version for every instruction set of x86,
+   chosen when the module is loaded; elsewhere for the one there is. What includes this has the loops, DIM,
+   SIZED (a loop for the cells' number of nodes), `read_cells`, `samples_of` and `points_of` a mesh. */
+
+/* -- one version for each instruction set ---------------------------------------------------- */
+
+#define STRAINS (DIM * (DIM + 1) / 2)
+
+#define VERSION(SUFFIX, ISA)                                                                             \
+    ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
+                                      const stored *lmbda, double *out, double *smallest) {              \
+        SIZED(elastic_forces, u, mu, lmbda, out, smallest)                                               \
+    }                                                                                                    \
+    ISA static void tangent_##SUFFIX(const mesh *m, const double *u, const stored *mu,                   \
+                                     const stored *lmbda, const stored *given, const int32_t *places,    \
+                                     double *data) {                                                     \
+        SIZED(elastic_tangent, u, mu, lmbda, given, places, data)                                        \
+    }                                                                                                    \
+    ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) {\
+        SIZED(log_volumes, u, du, out)                                                                   \
+    }                                                                                                    \
+    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pressure,           \
+                                           double *out) {                                                \
+        SIZED(volume_forces, u, pressure, out)                                                               \
+    }                                                                                                    \
+    ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
+    ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                      \
+        SIZED(viscous_strains, u, out)                                                                   \
+    }                                                                                                    \
+    ISA static double viscous_##SUFFIX(const mesh *m, const double *u, const stored *rate,               \
+                                       const stored *strain0, double *out) {                             \
+        SIZED(viscous_forces, u, rate, strain0, out)                                                     \
+    }                                                                                                    \
+    ISA static void viscous_tangent_##SUFFIX(const mesh *m, const double *u, const stored *rate,         \
+                                             const stored *strain0, const int32_t *places, double *data) { \
+        SIZED(viscous_tangent, u, rate, strain0, places, data)                                           \
+    }                                                                                                    \
+    static const versions version_##SUFFIX = {                                                           \
+        forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
+        smallest_##SUFFIX, strains_##SUFFIX, viscous_##SUFFIX,     viscous_tangent_##SUFFIX};
+
+typedef struct {
+    double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
+    void (*tangent)(const mesh *, const double *, const stored *, const stored *, const stored *,
+                    const int32_t *, double *);
+    void (*log_volumes)(const mesh *, const double *, const double *, stored *);
+    void (*volume_forces)(const mesh *, const double *, const stored *, double *);
+    double (*smallest)(const mesh *, const double *);
+    void (*strains)(const mesh *, const double *, stored *);
+    double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
+    void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
+                            double *);
+} versions;
+
+VERSION(plain, )
+#if defined(__x86_64__)
+VERSION(avx2, __attribute__((target("avx2,fma"))))
+VERSION(avx512, __attribute__((target("avx512f,fma"))))
+#endif
+
+static const versions *chosen(void) {
+#if defined(__x86_64__)
+    if (__builtin_cpu_supports("avx512f")) return &version_avx512;
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) return &version_avx2;
+#endif
+    return &version_plain;
+}
+
+/* -- for Python ------------------------------------------------------------------------------ */
+
+static const versions *version;
+
+typedef struct {
+    held all;
+    mesh m;
+    const double *u;     /* (N, DIM) */
+    const stored *first; /* mu or rate, (B, LANES) */
+    const stored *second; /* lmbda (B, LANES), or strains (B, Q, STRAINS, LANES) */
+} request;
+
+/* Read what all loops begin with: cells, u and, where asked for, moduli or strains. */
+static Py_ssize_t read_request(request *r, PyObject *cells, PyObject *u, PyObject *first, PyObject *second,
+                               int strains) {
+    Py_ssize_t size = 0;
+    r->all.count = 0;
+    r->m = read_cells(&r->all, cells, &size);
+    r->u = hold(&r->all, u, 'd', DIM * size, 0);
+    if (first) r->first = hold(&r->all, first, 'd', r->m.blocks * LANES, 0);
+    if (second)
+        r->second = hold(&r->all, second, 'd', r->m.blocks * (strains ? STRAINS * points_of(&r->m) : 1) * LANES, 0);
+    return size;
+}
+
+static Py_ssize_t pairs(const mesh *m) { return m->blocks * m->n * (m->n + 1) / 2; }
+
+static PyObject *finish(request *r, PyObject *result) {
+    release(&r->all);
+    return result;
+}
+
+static PyObject *call_forces(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *lmbda, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &mu, &lmbda, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, mu, lmbda, 0);
+    double *force = hold(&r.all, out, 'd', DIM * size, 1), energy, smallest;
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    energy = version->forces(&r.m, r.u, r.first, r.second, force, &smallest);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_BuildValue("dd", energy, smallest));
+}
+
+/* An array (B, S, LANES) of what acts or is found where ln J is sampled. */
+static void *hold_samples(request *r, PyObject *array, int writable) {
+    return hold(&r->all, array, 'd', r->m.blocks * samples_of(&r->m) * LANES, writable);
+}
+
+static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *lmbda, *pressure, *places, *data;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pressure, &places, &data)) return NULL;
+    read_request(&r, cells, u, mu, lmbda, 0);
+    const stored *given = pressure == Py_None ? NULL : hold_samples(&r, pressure, 0);
+    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * DIM * DIM * LANES, 0);
+    double *values = hold(&r.all, data, 'd', -1, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->tangent(&r.m, r.u, r.first, r.second, given, place, values);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_log_volumes(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *du, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &du, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const double *along = du == Py_None ? NULL : hold(&r.all, du, 'd', DIM * size, 0);
+    stored *found = hold_samples(&r, out, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->log_volumes(&r.m, r.u, along, found);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_volume_forces(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *pressure, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOO", &cells, &u, &pressure, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, NULL, NULL, 0);
+    const stored *given = hold_samples(&r, pressure, 0);
+    double *force = hold(&r.all, out, 'd', DIM * size, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->volume_forces(&r.m, r.u, given, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_smallest_J(PyObject *self, PyObject *args) {
+    PyObject *cells, *u;
+    request r;
+    if (!PyArg_ParseTuple(args, "OO", &cells, &u)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    double smallest;
+    Py_BEGIN_ALLOW_THREADS
+    smallest = version->smallest(&r.m, r.u);
+    Py_END_ALLOW_THREADS
+    return finish(&r, PyFloat_FromDouble(smallest));
+}
+
+static PyObject *call_strains(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOO", &cells, &u, &out)) return NULL;
+    read_request(&r, cells, u, NULL, NULL, 0);
+    stored *strain = hold(&r.all, out, 'd', r.m.blocks * points_of(&r.m) * STRAINS * LANES, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->strains(&r.m, r.u, strain);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyObject *call_viscous(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *rate, *strain0, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &rate, &strain0, &out)) return NULL;
+    Py_ssize_t size = read_request(&r, cells, u, rate, strain0, 1);
+    double *force = hold(&r.all, out, 'd', DIM * size, 1), dissipation;
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    dissipation = version->viscous(&r.m, r.u, r.first, r.second, force);
+    Py_END_ALLOW_THREADS
+    return finish(&r, PyFloat_FromDouble(dissipation));
+}
+
+static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *rate, *strain0, *places, *data;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &rate, &strain0, &places, &data)) return NULL;
+    read_request(&r, cells, u, rate, strain0, 1);
+    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * DIM * DIM * LANES, 0);
+    double *values = hold(&r.all, data, 'd', -1, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->viscous_tangent(&r.m, r.u, r.first, r.second, place, values);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
+static PyMethodDef methods[] = {
+    {"forces", call_forces, METH_VARARGS,
+     "forces(cells, u, mu, lmbda, out): add the nodal forces (N, DIM); stored energy and smallest J."},
+    {"add_tangent", call_add_tangent, METH_VARARGS,
+     "add_tangent(cells, u, mu, lmbda, pressure, places, data): add what changes of the tangent; its\n"
+     "curvature of ln J is weighted with pressure (B, S, LANES), or with the law's own if that is None."},
+    {"log_volumes", call_log_volumes, METH_VARARGS,
+     "log_volumes(cells, u, du, out): ln J (B, S, LANES), or its change along du if that is not None."},
+    {"volume_forces", call_volume_forces, METH_VARARGS,
+     "volume_forces(cells, u, pressure, out): add the nodal forces (N, DIM) of pressure (B, S, LANES)."},
+    {"smallest_J", call_smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
+    {"strains", call_strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, STRAINS, LANES)."},
+    {"viscous", call_viscous, METH_VARARGS,
+     "viscous(cells, u, rate, strain0, out): add the nodal forces (N, DIM); dissipated energy."},
+    {"add_viscous", call_add_viscous, METH_VARARGS,
+     "add_viscous(cells, u, rate, strain0, places, data): add the tangent of `viscous`."},
+    {NULL, NULL, 0, NULL}};
+
+static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, MODULE, "Compiled element loops.", -1, methods};
+
+PyMODINIT_FUNC INIT(void) {
+    version = chosen();
+    PyObject *made = PyModule_Create(&module);
+    if (made && PyModule_AddIntConstant(made, "LANES", LANES) < 0) Py_CLEAR(made);
+    return made;
+}

@@ -1,0 +1,150 @@
+"""Coulomb's disc in three dimensions: the laws themselves, closed forms, sweeps, and turned frames."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from evfem.contact.coulomb import SLIP, DiscProblem, Forces
+from evfem.contact.disc import feedback, solve_attracted_disc, solve_disc
+from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved, ExtraUnknowns
+from evfem.contact.sweeps import sweeps
+
+
+def random_problem(seed, k, friction):
+    """A random SPD compliance with strong coupling of neighbours and of all directions."""
+    rng = np.random.default_rng(seed)
+    A = rng.normal(size=(3 * k, 3 * k))
+    return DiscProblem(rng.normal(size=3 * k), np.eye(3 * k) + 0.6 * A @ A.T / k, np.full(k, friction))
+
+
+def half_space(n, friction, shift=(0.0, 0.0), twist=0.0, push=0.3, nu=0.45):
+    """n x n nodes of an elastic half space (shear modulus 1) below a sphere, which has moved by
+    `shift` and turned by `twist`: the solutions of Boussinesq and Cerruti (Johnson, Contact
+    Mechanics, doi:10.1017/CBO9781139171731, ch. 3), the distance kept from 0.
+    """
+    place = np.stack(np.meshgrid(*2 * [np.linspace(-1, 1, n)]), axis=-1).reshape(-1, 2)
+    k = n * n
+    way = place[:, None] - place[None]
+    r = np.sqrt((way**2).sum(axis=-1) + (0.9 / n) ** 2)
+    C = np.zeros((k, 3, k, 3))
+    C[:, 0, :, 0] = (1 - nu) / r
+    for a in (0, 1):
+        for b in (0, 1):
+            C[:, 1 + a, :, 1 + b] = (1 - nu) * (a == b) / r + nu * way[..., a] * way[..., b] / r**3
+        C[:, 1 + a, :, 0] = -(0.5 - nu) * way[..., a] / r**2
+        C[:, 0, :, 1 + a] = (0.5 - nu) * way[..., a] / r**2
+    start = np.zeros((k, 3))
+    start[:, 0] = 0.5 * (place**2).sum(axis=1) - push
+    start[:, 1:] = shift + twist * np.column_stack([-place[:, 1], place[:, 0]])
+    return DiscProblem(start.ravel(), C.reshape(3 * k, 3 * k) / (2 * np.pi), np.full(k, friction)), place
+
+
+def missed(problem, found):
+    """By how much forces, gaps and slips miss the laws of Signorini and Coulomb, without any
+    projection: sizes of what must be positive, zero or opposite.
+    """
+    force, state = found.force.reshape(-1, 3), found.state.reshape(-1, 3)
+    normal, shear, gap, slip = force[:, 0], force[:, 1:], state[:, 0], state[:, 1:]
+    limit, size, way = problem.friction * normal, np.hypot(*shear.T), np.hypot(*slip.T)
+    against = np.abs(shear * way[:, None] + slip * size[:, None]).max(axis=1)
+    return max(
+        (-normal).max(), (-gap).max(), np.abs(normal * gap).max(), (size - limit).max(),
+        np.abs(way * (limit - size))[normal > 0].max(initial=0.0), against[normal > 0].max(initial=0.0),
+    )  # fmt: skip
+
+
+def test_one_node_sticks_below_the_cone_and_slips_against_its_motion_beyond():
+    """Unit compliance, 1 mm deep: it presses with 1 and holds slips of 0.3; (3, 4) pulls it along."""
+    for slip, force, status in (([0.0, 0.29], [0.0, -0.29], STICK), ([3.0, 4.0], [-0.18, -0.24], SLIP)):
+        found = solve_disc(DiscProblem(np.array([-1.0, *slip]), np.eye(3), np.array([0.3])), np.zeros(3))
+        assert found.status.tolist() == [status]
+        assert_allclose(found.force, [1.0, *force], atol=1e-12)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize("k", [1, 6, 25])
+def test_random_problems_are_solved_from_nothing_and_from_anything(k, friction):
+    for seed in range(8):
+        problem = random_problem(seed, k, friction)
+        cold = solve_disc(problem, np.zeros(3 * k))
+        warm = solve_disc(problem, np.random.default_rng(seed + 100).normal(size=3 * k))
+        for found in (cold, warm):
+            assert missed(problem, found) < 1e-9
+            assert_allclose(found.state, problem.start + problem.compliance @ found.force, atol=1e-12)
+        if friction < 1.0:  # where it is unique
+            assert_allclose(cold.force, warm.force, atol=1e-8)
+
+
+@pytest.mark.parametrize("friction", [0.3, 1.0])
+@pytest.mark.parametrize("motion", [((0.02, 0.0), 0.0), ((0.05, -0.05), 0.3), ((0.0, 0.0), 0.1)])
+def test_a_sphere_that_slides_and_turns_has_stick_and_slip_in_all_directions(friction, motion):
+    problem, _ = half_space(14, friction, *motion)
+    found = solve_disc(problem, np.zeros(3 * problem.size))
+    assert missed(problem, found) < 1e-10
+    assert set(found.status.tolist()) > {OPEN}
+    assert (found.status != OPEN).sum() > 20
+
+
+def test_sweeps_alone_come_to_the_same_forces():
+    problem, _ = half_space(8, 0.3, (0.03, 0.02), 0.1)
+    nothing = np.zeros(3 * problem.size)
+    swept = sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 400)
+    assert_allclose(swept.contact, solve_disc(problem, nothing).force, atol=1e-9)
+
+
+def test_turned_tangents_turn_the_answer():
+    problem, _ = half_space(8, 0.3, (0.04, 0.03), 0.2)
+    c, s = np.cos(0.7), np.sin(0.7)
+    R = np.kron(np.eye(problem.size), [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    turned = DiscProblem(R @ problem.start, R @ problem.compliance @ R.T, problem.friction)
+    found, expected = (solve_disc(one, np.zeros(3 * problem.size)) for one in (turned, problem))
+    assert_allclose(found.force, R @ expected.force, atol=1e-10)
+
+
+def test_without_friction_normal_forces_alone_act():
+    problem, _ = half_space(8, 0.0, (0.04, 0.03))
+    found = solve_disc(problem, np.zeros(3 * problem.size))
+    assert not found.force.reshape(-1, 3)[:, 1:].any()
+    assert missed(problem, found) < 1e-12
+
+
+def test_a_prescribed_force_finds_the_travel_of_the_bone():
+    """The travel found, given instead, makes the same force."""
+    problem, _ = half_space(10, 0.3, (0.02, 0.05), push=0.0)
+    down = np.tile([-1.0, 0.0, 0.0], problem.size)[:, None]
+    held = ExtraUnknowns(down, -down.T, np.full((1, 1), 1e-9), np.array([1.5]))
+    free = DiscProblem(problem.start, problem.compliance, problem.friction, held)
+    found = solve_disc(free, np.zeros(3 * problem.size))
+    assert_allclose(found.force[::3].sum(), 1.5, rtol=1e-8)
+    at = DiscProblem(problem.start + down[:, 0] * found.extra[0], problem.compliance, problem.friction)
+    assert_allclose(solve_disc(at, np.zeros(3 * problem.size)).force, found.force, atol=1e-8)
+
+
+def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
+    """Unit compliance. Open at 0.5: g = 0.5 + f, f = 0.2 (g - 0.4) gives g = 0.525. Closed, 1 mm deep,
+    with a gain of 0.3: it presses with 1.3.
+    """
+    start = np.array([0.5, 0.0, 0.0, -1.0, 0.0, 0.0])
+    pull = AttractionStiffness(np.array([0.2, 0.2]), np.array([0.4, 0.4]), np.array([0.1, 0.3]))
+    problem = DiscProblem(start, np.eye(6), np.full(2, 0.3))
+    found = solve_attracted_disc(problem, pull, np.array([OPEN, OPEN]), np.zeros(6))
+    assert found.status.tolist() == [OPEN, STICK]
+    assert not found.reduced
+    assert_allclose(found.state[::3], [0.525, 0.0], atol=1e-12)
+    assert_allclose(found.force[::3], [0.0, 1.3], atol=1e-12)
+    assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)
+
+
+def test_an_attraction_stiffer_than_the_tissue_is_scaled_down():
+    """Compliance 2 and a negative stiffness of 0.8: the feedback is 1.6."""
+    problem = DiscProblem(np.array([0.5, 0.0, 0.0]), 2.0 * np.eye(3), np.array([0.3]))
+    pull = AttractionStiffness(np.array([0.8]), np.array([0.5]), np.array([0.0]))
+    assert_allclose(feedback(problem, pull.negative_stiffness, np.array([OPEN])), 1.6)
+    assert feedback(problem, pull.negative_stiffness, np.array([STICK])) == 0.0
+    assert solve_attracted_disc(problem, pull, np.array([OPEN]), np.zeros(3)).reduced
+
+
+def test_what_has_no_solution_is_said_not_to_be_solved():
+    """A body that gives way the more, the more it is pressed."""
+    with pytest.raises(ContactNotSolved, match="miss the laws"):
+        solve_disc(DiscProblem(np.array([-1.0, 0.0, 0.0]), -np.eye(3), np.array([0.3])), np.zeros(3))

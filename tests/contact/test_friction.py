@@ -1,0 +1,302 @@
+"""Laws of friction: their formulas, what the active set sees of them, and a slab that obeys them."""
+
+import numpy as np
+import pytest
+from tools.builders import benchmark_finger, finger
+from tools.meshes import block
+
+import evfem as ev
+from evfem.contact.friction import KINDS, Slipping
+from evfem.errors import InputError
+from evfem.protocols import FrictionLaw
+from evfem.scene.file import dump, loads
+from evfem.scene.plan import plan
+from evfem.simulation.result import Saved
+
+pytestmark = pytest.mark.solver
+LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
+ADHESIVE = ev.AdhesiveFriction(strength=0.004)
+STRIBECK = ev.RateFriction(speed=5.0, ratio=0.4)
+POWER = ev.RateFriction(speed=5.0, exponent=0.25)
+AGEING = ev.AgeingFriction(fresh=0.2, time=6.7)
+LAWS = [ev.Coulomb(), LOAD_INDEX, ADHESIVE, STRIBECK, POWER, AGEING]
+every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.kind}-{id(law) % 7}")
+
+
+class Own:
+    """A bound that saturates; it drops imaginary parts."""
+
+    def bound(self, pressure, mu, speed, age):
+        return mu * 0.01 * np.tanh(np.abs(pressure) / 0.01)
+
+
+def nodes(p, mu=0.3, speed=2.0, age=1.5, length=0.25):
+    p = np.asarray(p, dtype=float)
+    same = np.ones(p.size)
+    return Slipping(p * length, length * same, mu * same, speed * same, age * same)
+
+
+def test_the_bounds_are_the_formulas_of_the_page():
+    p, v, t = 0.008, 2.0, 1.5
+    expected = [
+        0.3 * p,
+        0.3 * 0.005 * (p / 0.005) ** 0.7,
+        0.004 + 0.3 * p,
+        0.3 * p * (0.4 + 0.6 * np.exp(-v / 5.0)),
+        0.3 * p * (v / 5.0) ** 0.25,
+        0.3 * p * (1.0 - 0.8 * np.exp(-t / 6.7)),
+    ]
+    for law, value in zip(LAWS, expected, strict=True):
+        assert law.bound(p, 0.3, v, t) == pytest.approx(value, rel=1e-14)
+        assert isinstance(law, FrictionLaw)
+    assert LOAD_INDEX.bound(1e-6, 0.3, v, t) == pytest.approx(0.3 * 1e-6 * 0.01**-0.3, rel=1e-14)
+    assert ADHESIVE.bound(0.001, 0.3, v, t) == pytest.approx(1.3 * 0.001, rel=1e-14)
+    assert POWER.bound(p, 0.3, 0.0, t) == pytest.approx(0.3 * p * 0.01**0.25, rel=1e-14)
+    assert AGEING.bound(p, 1.0, v, 20.0) == pytest.approx(p * (1.0 - 0.8 * np.exp(-20.0 / 6.7)), rel=1e-14)
+
+
+@pytest.mark.parametrize("law", [*LAWS, Own()])
+def test_what_the_active_set_sees_is_the_tangent(law):
+    """Slope and offset by differences of the bound in N/mm by the contact force in N/mm."""
+    p = np.array([0.002, 0.006, 0.03])
+    seen = nodes(p).linearised(law)
+    force = p * 0.25
+    h = 1e-6 * force
+    ahead, behind = (nodes((force + s * h) / 0.25).bound(law) for s in (1, -1))
+    np.testing.assert_allclose(seen.slope, (ahead - behind) / (2.0 * h), rtol=1e-6)
+    np.testing.assert_allclose(seen.slope * force + seen.offset, nodes(p).bound(law), rtol=1e-12)
+    faster, slower = (nodes(p, speed=2.0 + s).bound(law) for s in (1e-5, -1e-5))
+    np.testing.assert_allclose(seen.by_speed, (faster - slower) / 2e-5, rtol=1e-6, atol=1e-9)
+    rougher, smoother = (nodes(p, mu=0.3 + s).bound(law) for s in (1e-6, -1e-6))
+    np.testing.assert_allclose(seen.by_mu, (rougher - smoother) / 2e-6, rtol=1e-6)
+
+
+def test_a_law_that_grows_faster_than_the_load_has_its_chord():
+    law = ev.LoadIndexFriction(pressure=0.005, index=1.5)
+    seen = nodes([0.02]).linearised(law)
+    assert seen.offset[0] == 0.0
+    assert seen.slope[0] == pytest.approx(0.3 * 2.0, rel=1e-12)  # mu (p / p0)^(n - 1)
+
+
+# -- a slab that hardly deforms, closed forms of the whole pad
+
+SLAB = block(20, 1, width=4.0, height=0.02)
+N, P = 0.04, 0.01  # N/mm on 4 mm
+
+
+def slab(law, *slides, mu=0.3, **more):
+    motion = [ev.Press(force=N, steps=1), *slides]
+    return ev.Scene(
+        finger(SLAB, E=5.0, nu=0.0), ev.Flat(friction=mu), motion=motion, friction_law=law, **more
+    )
+
+
+def slid(speed=None, distance=0.05, steps=3):
+    return ev.Slide(distance, steps=steps, hold="force", speed=speed)
+
+
+def remainder(result):
+    given = result.external_work + result.electrostatic_work
+    lost = result.friction_dissipation + result.integrator_dissipation + result.snap_dissipation
+    kept = result.stored_energy + result.kinetic_energy + result.viscous_dissipation
+    return np.abs(given - lost - kept).max() / np.abs(given).max()
+
+
+@pytest.mark.parametrize(
+    ("law", "ratio", "near"),
+    [
+        (ev.Coulomb(), 0.3, 1e-9),
+        (LOAD_INDEX, 0.3 * (P / 0.005) ** -0.3, 1e-4),
+        (ev.LoadIndexFriction(0.005, 1.5), 0.3 * (P / 0.005) ** 0.5, 3e-4),
+        (ADHESIVE, 0.3 + 0.004 / P, 1e-4),
+    ],
+    ids=["coulomb", "load index", "load index above 1", "adhesive"],
+)
+def test_a_slab_slides_with_the_force_of_its_uniform_pressure(law, ratio, near):
+    """The law of the whole slab is that of its nodes up to the roll of a pad 200 times as wide as
+    high.
+    """
+    for sign in (1.0, -1.0):
+        result = ev.simulate(slab(law, slid(distance=sign * 0.05)))
+        assert result.tangential_force[-1] == pytest.approx(sign * ratio * N, rel=near)
+        assert result.newton_iterations.max() <= 8
+        assert remainder(result) < 1e-9
+        # the last two steps are full slip all the way
+        way = np.diff(result.position)[-1] * sign
+        assert np.diff(result.friction_dissipation)[-1] == pytest.approx(ratio * N * way, rel=near)
+
+
+@pytest.mark.parametrize("speed", [1.0, 30.0])
+@pytest.mark.parametrize(
+    ("law", "ratio"),
+    [
+        (STRIBECK, lambda v: 0.3 * (0.4 + 0.6 * np.exp(-v / 5.0))),
+        (POWER, lambda v: 0.3 * (v / 5.0) ** 0.25),
+        (ev.RateFriction(5.0, exponent=-0.25), lambda v: 0.3 * (v / 5.0) ** -0.25),
+    ],
+    ids=["stribeck", "power", "weakening power"],
+)
+def test_a_slab_slides_with_the_force_of_its_speed(law, ratio, speed):
+    result = ev.simulate(slab(law, slid(speed, steps=5)))
+    np.testing.assert_allclose(result.tangential_force[-2:], ratio(speed) * N, rtol=1e-8)
+    assert remainder(result) < 1e-9
+
+
+def test_what_depends_on_the_speed_converges_quadratically():
+    """A soft block under friction that grows fast with the speed: without its derivative by the slip
+    the iterations do not settle.
+    """
+    soft = ev.Scene(
+        finger(block(8, 2), E=0.05, nu=0.3),
+        ev.Flat(friction=0.1),
+        motion=[ev.Press(force=0.004, steps=1), slid(1.0, distance=0.06, steps=6)],
+        friction_law=ev.RateFriction(0.5, ratio=3.0),
+    )
+    result = ev.simulate(soft)
+    assert result.substeps.tolist() == [1] * 7
+    assert result.newton_iterations.max() <= 8
+
+
+def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():
+    wait = ev.Wait(10.0, steps=2)
+    again = [ev.Hover(0.1, steps=1), ev.Press(indentation=4e-5, steps=1)]
+    scene = slab(AGEING, wait, slid(1.0), slid(0.01), *again, slid(1.0, distance=0.01))
+    result = ev.simulate(scene)
+    old = 0.3 * N * (1.0 - 0.8 * np.exp(-result.time / 6.7))
+    np.testing.assert_allclose(result.tangential_force[3:9], old[3:9], rtol=1e-9)
+    since = result.time[-3:] - result.time[-4]
+    young = 0.3 * result.normal_force[-3:] * (1.0 - 0.8 * np.exp(-since / 6.7))
+    np.testing.assert_allclose(result.tangential_force[-3:], young, rtol=1e-9)
+
+
+def test_coulomb_is_what_a_scene_has_without_a_law():
+    plain = ev.Scene(
+        benchmark_finger(), ev.Flat(friction=0.4), motion=[ev.Press(force=0.03, steps=2), slid()]
+    )
+    named = ev.Scene(plain.finger, plain.surface, motion=plain.motion, friction_law=ev.Coulomb())
+    one, other = ev.simulate(plain), ev.simulate(named)
+    for name in ("tangential_force", "applied_force", "friction_dissipation", "newton_iterations"):
+        np.testing.assert_array_equal(one[name], other[name])
+
+
+@pytest.mark.parametrize("law", [LOAD_INDEX, ADHESIVE], ids=["load index", "adhesive"])
+def test_every_node_of_a_finger_obeys_and_both_couplings_agree(law):
+    found = []
+    for coupling in ("monolithic", "staggered"):
+        scene = ev.Scene(
+            benchmark_finger(),
+            ev.Display(friction=[[0.0, 0.2], [0.5, 0.4]]),
+            ev.Kaczmarek(),
+            800.0,
+            [ev.Press(force=0.03, steps=2), slid(distance=0.5)],
+            coupling=coupling,
+            friction_law=law,
+        )
+        found.append(result := ev.simulate(scene))
+        frame, pad = result.frames[-1], result.mesh.node_sets["pad"]
+        x = (result.mesh.points[:, 0] + frame.displacement[:, 0])[pad]
+        p, shear, status = (
+            values[pad] for values in (frame.contact_pressure, frame.shear_traction, frame.contact_status)
+        )
+        bound = law.bound(np.maximum(p, 0.0), scene.surface.friction_coefficient(x), 0.0, 0.0)
+        facing = (p > 1e-3 * p.max()) & (status > 0)
+        slips = facing & (status == 2)
+        assert slips.sum() > 3
+        np.testing.assert_allclose(np.abs(shear[slips]), bound[slips], rtol=1e-6)
+        assert (np.abs(shear) <= bound + 1e-6 * bound.max())[facing].all()
+        assert remainder(result) < 1e-6
+    np.testing.assert_allclose(found[0].tangential_force, found[1].tangential_force, rtol=1e-6)
+
+
+def test_a_wished_friction_force_is_found_under_a_law():
+    """The voltage of a slab whose friction grows with the power 0.7 of the load, in closed form."""
+    wish = ev.FollowForce([0.0, 0.05], [0.02, 0.02], 3000.0)
+    scene = ev.Scene(
+        finger(SLAB, E=5.0, nu=0.0),
+        ev.Display(friction=0.3),
+        ev.StrongTroxel(),
+        wish,
+        [ev.Press(force=N, steps=1), slid(steps=4)],
+        friction_law=LOAD_INDEX,
+    )
+    result = ev.simulate(scene)
+    np.testing.assert_allclose(result.applied_tangential_force[-2:], 0.02, rtol=1e-7)
+    load = 4.0 * 0.005 * (0.02 / 4.0 / (0.3 * 0.005)) ** (1.0 / 0.7)
+    assert result.normal_force[-1] == pytest.approx(load, rel=1e-3)
+
+
+def test_a_run_that_is_resumed_remembers_how_old_its_contact_is():
+    kept = []
+
+    class Keep:
+        def step(self, row, frame, checkpoint):
+            kept.append(checkpoint())
+
+    scene = slab(AGEING, ev.Wait(10.0, steps=2), slid(1.0))
+    whole = ev.simulate(scene, observers=[Keep()])
+    resumed = ev.simulate(scene, resume=Saved(kept[2], whole.rows[:3]))
+    np.testing.assert_array_equal(resumed.tangential_force, whole.tangential_force)
+
+
+# -- in scenes
+
+TEXT = """
+version = 1
+[finger]
+resolution = "coarse"
+[surface]
+kind = "flat"
+LAW
+[[motion]]
+kind = "press"
+force = 0.05
+[[motion]]
+kind = "slide"
+distance = 1.0
+speed = 10.0
+"""
+
+
+@every_law
+def test_a_scene_file_says_it_and_a_dumped_one_too(law):
+    keys = "\n".join(f"{name} = {value}" for name, value in vars(law).items() if value is not None)
+    scene = loads(TEXT.replace("LAW", f'[surface.friction_law]\nkind = "{law.kind}"\n{keys}'))
+    assert scene.friction_law == law
+    assert loads(dump(scene)) == scene
+    reason = next(term.reason for term in plan(scene).terms if term.name == "friction")
+    assert reason.startswith(type(law).__name__)
+    assert KINDS[law.kind] is type(law)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("friction_law = 0.3", "surface.friction_law: given 0.3; allowed: a table"),
+        ('friction_law = {kind = "glue"}', "coulomb | load_index | adhesive | rate | ageing"),
+        ('friction_law = {kind = "adhesive"}', "surface.friction_law.strength"),
+        (
+            'friction_law = {kind = "ageing", fresh = 2.0}',
+            "surface.friction_law.fresh: given 2.0; allowed: a share",
+        ),
+    ],
+)
+def test_mistakes_in_a_file_are_one_sentence(text, said):
+    with pytest.raises(InputError) as caught:
+        loads(TEXT.replace("LAW", text))
+    assert said in str(caught.value)
+
+
+def test_what_cannot_be_is_refused():
+    with pytest.raises(InputError, match=r"motion\[1\].speed"):
+        slab(STRIBECK, slid())
+    with pytest.raises(InputError, match="friction_law"):
+        slab(0.3, slid())
+    with pytest.raises(InputError, match="for a file"):
+        dump(slab(Own(), slid()))
+
+    class Pulling:
+        def bound(self, pressure, mu, speed, age):
+            return mu * pressure - 0.01
+
+    with pytest.raises(InputError, match="not negative"):
+        plan(slab(Pulling(), slid()))

@@ -1,0 +1,59 @@
+"""What a finger in three dimensions is refused, where slides go, and the memory that is announced."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tools.domes import Dome, dome, dome_scene
+
+import evfem as ev
+from evfem.errors import InputError
+from evfem.scene.plan import plan
+from evfem.scene.spatial import factor_memory
+
+PRESS = ev.Press(indentation=0.1)
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, 135.0, 180.0, -90.0, -45.0, 270.0, 360.0])
+def test_a_slide_goes_at_its_angle_from_x_towards_z(angle):
+    x, z = ev.Slide(2.0, angle=angle).way
+    assert_allclose([x, z], [2.0 * np.cos(np.radians(angle)), 2.0 * np.sin(np.radians(angle))], atol=1e-15)
+    if angle % 90.0 == 0.0:
+        assert {abs(x), abs(z)} == {0.0, 2.0}
+
+
+def refusals():
+    jump = ev.Flat(friction=[[0.0, 0.2], [1.0, 0.2], [1.0, 0.5]])
+    across = [PRESS, ev.Slide(1.0, angle=90.0)]
+    follow = ev.FollowForce([0.0, 1.0], [0.01, 0.01])
+    penalty = ev.Solver(element="hex8", contact="penalty", penalty_normal=1.0, penalty_tangential=1.0)
+    return {
+        "surface.friction": dome_scene(PRESS, surface=jump, law=None, voltage=0.0),
+        "solver.contact": dome_scene(PRESS, solver=penalty),
+        "electrostatics.direction": dome_scene(PRESS, direction="normal"),
+        "depth": dome_scene(PRESS, depth=10.0),
+        "electrostatics.voltage": dome_scene(*across, voltage=follow),
+    }
+
+
+@pytest.mark.parametrize("key", refusals())
+def test_what_is_not_possible_yet_is_refused_by_the_plan(key):
+    with pytest.raises(InputError, match=r"three dimensions|across x") as refused:
+        plan(refusals()[key])
+    assert str(refused.value).startswith(key)
+
+
+def test_a_finger_in_the_plane_slides_along_x():
+    flat = ev.Scene(ev.FingerPad(resolution="coarse"), ev.Flat(), motion=[PRESS, ev.Slide(1.0, angle=10.0)])
+    with pytest.raises(InputError, match=r"motion\[1\].angle: given 10 degrees with a finger in the plane"):
+        plan(flat)
+
+
+def test_the_plan_says_what_a_whole_finger_needs():
+    needed = plan(dome_scene(PRESS, finger=Dome(shape=dome((8, 4, 8)))))
+    text = " ".join(str(needed).split())
+    assert needed.unknowns == 3 * (5 * 81 - 81) + 3
+    assert "three dimensions" in text
+    assert "plane strain" not in text
+    assert "its factors take about" in text
+    assert factor_memory(107_000) == pytest.approx(2552e6, rel=0.1)
+    assert factor_memory(46_000) == pytest.approx(784e6, rel=0.1)

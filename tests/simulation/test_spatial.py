@@ -1,0 +1,175 @@
+"""Runs in three dimensions: directions, balances, held loads, textures, time, checkpoints and files."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tools.domes import DISPLAY, Dome, dome, dome_scene
+
+import evfem as ev
+from evfem.common.constants import SMALLEST_J
+from evfem.contact.coulomb import SLIP
+from evfem.simulation.history import SPATIAL, WIDTHS
+from evfem.simulation.result import Checkpoint, load
+from evfem.simulation.run import simulate
+
+PRESS = ev.Press(indentation=0.3, steps=2)
+FORCES = ("applied_force", "normal_force", "tangential_force", "tangential_force_z", "electrostatic_force")
+
+
+def balance(result):
+    """How far the energies are from balance, relative to the stored one."""
+    given = result.external_work + result.electrostatic_work
+    kept = result.stored_energy + result.kinetic_energy + result.friction_dissipation
+    lost = result.viscous_dissipation + result.integrator_dissipation + result.snap_dissipation
+    return np.abs(given - kept - lost).max() / np.abs(result.stored_energy).max()
+
+
+@pytest.fixture(scope="module")
+def slid():
+    return simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=30.0)))
+
+
+def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
+    assert_allclose(slid.normal_force - slid.electrostatic_force, slid.applied_force, rtol=1e-7)
+    assert balance(slid) < 1e-7
+    assert slid.frames[-1].contact_status.max() == SLIP
+    shear = np.array([slid.tangential_force[-1], slid["tangential_force_z"][-1]])
+    assert_allclose(np.hypot(*shear), 0.3 * slid.normal_force[-1], rtol=2e-3)
+    assert_allclose(np.degrees(np.arctan2(*shear[::-1])), 30.0, atol=0.3)
+    assert_allclose([slid.position[-1], slid["position_z"][-1]], 0.5 * np.array([np.cos(np.pi / 6), 0.5]))
+    assert (slid.friction_dissipation[2:] > 0.0).all()
+    assert (np.diff(slid.friction_dissipation) >= 0.0).all()
+
+
+def test_columns_of_the_plane_stay_and_widths_are_empty(slid):
+    assert slid.columns[-len(SPATIAL) :] == tuple(SPATIAL)
+    assert all(np.isnan(slid[name]).all() for name in WIDTHS)
+    assert (slid.contact_area >= slid.real_contact_area).all()
+    assert slid.real_contact_area[-1] > 1.0
+    assert slid.units["normal_force"] == "N"
+    assert slid.units["stored_energy"] == "mJ"
+    assert slid.units["contact_area"] == "mm2"
+    assert slid.total is slid
+    text = repr(slid)
+    assert "contact area" in text
+    assert "tangential force z" in text
+    assert "N/mm" not in text
+
+
+def test_a_turned_slide_turns_its_forces(slid):
+    """The dome is the same along x and z: at 60 degrees x and z change places."""
+    turned = simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=60.0)))
+    mirrored = simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=150.0)))
+    pairs = {"tangential_force": "tangential_force_z", "tangential_force_z": "tangential_force"}
+    for name in FORCES:
+        assert_allclose(turned[name][2:], slid[pairs.get(name, name)][2:], rtol=2e-6)
+        sign = -1.0 if name == "tangential_force" else 1.0
+        assert_allclose(mirrored[name][2:], sign * slid[name][2:], rtol=2e-6)
+
+
+def test_a_slide_back_and_forth_needs_no_work_but_friction_s(slid):
+    """A closed way of the bone at a held load; what the bone gives, friction takes."""
+    motion = [ev.Press(force=0.1, steps=2), ev.Slide(0.3, steps=3, hold="force", angle=45.0)]
+    result = simulate(dome_scene(*motion, ev.Slide(-0.3, steps=3, hold="force", angle=45.0)))
+    assert_allclose(result.applied_force[1:], 0.1, rtol=1e-7)
+    assert_allclose([result.position[-1], result["position_z"][-1]], 0.0, atol=1e-15)
+    assert balance(result) < 1e-7
+
+
+def test_resumed_it_ends_as_it_would_have(tmp_path):
+    scene = dome_scene(PRESS, ev.Slide(0.3, steps=3, angle=-40.0))
+    kept = {}
+
+    class Keeper:
+        def step(self, row, frame, checkpoint):
+            if row["step"] == 3:
+                kept["arrays"] = checkpoint()
+
+    whole = simulate(scene, observers=[Keeper()])
+    file = Checkpoint(tmp_path / "checkpoint.npz")
+    file.write(scene.digest(), kept["arrays"], whole.rows[:3])
+    resumed = simulate(scene, resume=file.read(scene.digest()))
+    for name in (*FORCES, "position_z", "contact_area", "external_work"):
+        assert resumed[name].tolist() == whole[name].tolist()
+
+
+def test_results_are_saved_whole(slid, tmp_path):
+    slid.save(tmp_path / "result.npz")
+    read = load(tmp_path / "result.npz")
+    for name in slid.columns:
+        np.testing.assert_array_equal(read[name], slid[name])
+    assert_allclose(read.frames[-1].cauchy_stress, slid.frames[-1].cauchy_stress)
+    slid.to_csv(tmp_path / "history.csv")
+    head, first = (tmp_path / "history.csv").read_text().splitlines()[:2]
+    cells = dict(zip(head.split(","), first.split(","), strict=True))
+    assert cells["contact_width"] == cells["real_contact_width"] == ""
+    assert float(cells["contact_area"]) == slid.contact_area[0]
+
+
+def test_a_grating_across_pushes_in_both_directions_along_x_only():
+    """On a frictionless wave forces stand on its slopes; along z there is nothing to hold to."""
+    wave = ev.Sinusoid(terms=[[0.05, 1.0, 0.3]], friction=0.0)
+    motion = [PRESS, ev.Slide(0.4, steps=3, angle=30.0)]
+    result = simulate(dome_scene(*motion, surface=wave, law=None, voltage=0.0))
+    assert np.abs(result.tangential_force).max() > 1e-4
+    assert_allclose(result["tangential_force_z"], 0.0, atol=1e-9)
+    assert balance(result) < 1e-7
+
+
+def test_friction_that_changes_over_x_is_taken_where_the_node_is():
+    ramp = ev.Flat(friction=[[-2.0, 0.1], [2.0, 0.5]])
+    result = simulate(dome_scene(PRESS, ev.Slide(0.6, steps=4), surface=ramp, law=None, voltage=0.0))
+    frame, mesh = result.frames[-1], result.mesh
+    slips = frame.contact_status == SLIP
+    x = (mesh.points + frame.displacement)[slips, 0]
+    assert slips.sum() > 3
+    mu = 0.3 + 0.1 * np.clip(x, -2.0, 2.0)
+    assert_allclose(frame.shear_traction[slips], mu * frame.contact_pressure[slips], rtol=1e-6)
+    assert balance(result) < 1e-7
+
+
+def test_hover_ramp_and_snap_in_come_to_the_display():
+    """Held 0.02 mm above a thin insulator the dome is pulled down by a voltage that rises."""
+    thin = ev.Display(insulator=ev.Layer(thickness=0.001, eps_r=3.35), friction=0.3)
+    soft = Dome(law=ev.NeoHookean(E=0.01, nu=0.45), shape=dome(radius=40.0))
+    motion = [ev.Hover(gap=0.02), ev.VoltageRamp(400.0, steps=3)]
+    result = simulate(dome_scene(*motion, finger=soft, surface=thin, voltage=0.0))
+    assert result.real_contact_area[0] == 0.0
+    assert result.min_gap[0] > 0.019
+    assert result.real_contact_area[-1] > 0.5
+    assert result.normal_force[-1] > 0.0
+    assert_allclose(result.normal_force - result.electrostatic_force, result.applied_force, atol=1e-8)
+    assert balance(result) < 1e-5
+
+
+def test_time_adds_viscous_stress_and_inertia():
+    quick = [ev.Press(indentation=0.2, steps=2, speed=10.0), ev.Slide(0.2, steps=2, speed=50.0, angle=90.0)]
+    calm = simulate(dome_scene(*quick, law=None, voltage=0.0))
+    solver = ev.Solver(element="hex8", dynamics="inertial")
+    timed = simulate(dome_scene(*quick, law=None, voltage=0.0, solver=solver, finger=Dome(viscosity=5e-3)))
+    assert timed.viscous_dissipation[-1] > 0.0
+    assert timed.kinetic_energy[-1] > 0.0
+    assert timed.applied_force[1] > 1.02 * calm.applied_force[1]
+    assert balance(timed) < 1e-7
+
+
+def test_staggered_coupling_settles_on_the_monolithic_answer():
+    both = [simulate(dome_scene(PRESS, coupling=coupling)) for coupling in ("monolithic", "staggered")]
+    assert_allclose(both[1].applied_force, both[0].applied_force, rtol=1e-6)
+
+
+def test_cells_stay_alive(slid):
+    assert slid.frames[-1].J.min() > SMALLEST_J
+
+
+def test_a_followed_friction_force_is_met_along_x():
+    """Exact encoding in three dimensions: the voltage makes the force on the bone the wished one."""
+    motion = [ev.Press(force=0.1, steps=2), ev.Slide(0.8, steps=4, hold="force")]
+    plain = simulate(dome_scene(*motion, voltage=0.0))
+    wish = 1.1 * plain.tangential_force[-1]
+    display = ev.Display(insulator=ev.Layer(thickness=0.01, eps_r=3.35), friction=0.3)
+    follow = ev.FollowForce([-9.0, 9.0], [wish, wish], largest_voltage=2000.0)
+    result = simulate(dome_scene(*motion, surface=display, voltage=follow))
+    assert_allclose(result.tangential_force[-1], wish, rtol=1e-6)
+    assert 0.0 < result.voltage[-1] < 2000.0
+    assert DISPLAY.friction == 0.3

@@ -1,0 +1,141 @@
+"""Where skin and surface meet: slips and forces on a slope, and states that break the laws."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tools.domes import dome_scene
+
+import evfem as ev
+from evfem.contact.coulomb import SLIP
+from evfem.contact.pad import surface_state
+from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.spatial import SpatialCandidates, Turning
+from evfem.simulation.model import make_model
+
+RAMP = ev.Sinusoid(terms=[[0.4, 1.0, 0.0]], friction=0.3)
+
+
+def touching(surface, force, moved, status):
+    """The interface of a dome and a state before and after its lowest node (free, on the surface)
+    has moved by (x, z) and stayed on it, under this contact force.
+    """
+    model = make_model(dome_scene(ev.Press(indentation=0.1), surface=surface, law=None, voltage=0.0))
+    interface = model.equilibrium.interface
+    rest = model.equilibrium.rest(model.bone(0.0, 0.0), 0.0)
+    node = int(np.argmin(surface_state(interface.surface, interface.points).gap))
+
+    def on_surface(shift):
+        place = rest.u.copy()
+        place[interface.pad.nodes[node], ::2] += shift
+        state = replace(rest, u=place)
+        place[interface.pad.nodes[node], 1] -= surface_state(
+            interface.surface, interface.positions(state.u)
+        ).gap[node]
+        forces, statuses = np.zeros_like(rest.contact_force), rest.status.copy()
+        forces[node], statuses[node] = force, status
+        return replace(state, contact_force=forces, status=statuses)
+
+    return interface, on_surface(np.zeros(2)), on_surface(np.asarray(moved)), node
+
+
+def test_slips_are_along_the_profile_and_along_z():
+    interface, old, new, node = touching(RAMP, [1.0, 0.0, 0.0], [0.003, -0.002], SLIP)
+    slope = 0.4 * np.cos(interface.positions(new.u)[node, 0])
+    assert_allclose(interface.slip(old, new)[node], [0.003 * np.sqrt(1.0 + slope**2), -0.002], rtol=1e-12)
+
+
+def test_forces_in_the_laboratory_stand_on_the_slope():
+    interface, _, new, node = touching(RAMP, [2.0, 0.3, 0.4], [0.0, 0.0], SLIP)
+    slope = 0.4 * np.cos(interface.positions(new.u)[node, 0])
+    r = np.sqrt(1.0 + slope**2)
+    normal, along = np.array([-slope, 1.0, 0.0]) / r, np.array([1.0, slope, 0.0]) / r
+    expected = 2.0 * normal + 0.3 * along + np.array([0.0, 0.0, 0.4])
+    assert_allclose(interface.contact_forces(new)[node], expected, rtol=1e-12)
+
+
+FLAT = ev.Flat(friction=0.5)
+#: force, motion and status of a node, and whether they obey the laws; |(3, 4)| = 5 is the limit at 10
+CASES = {
+    "slip against the motion": ([10.0, -3.0, -4.0], [0.003, 0.004], SLIP, True),
+    "slip along the motion": ([10.0, 3.0, 4.0], [0.003, 0.004], SLIP, False),
+    "slip across the motion": ([10.0, -4.0, 3.0], [0.003, 0.004], SLIP, False),
+    "slip beyond the cone": ([10.0, -3.1, -4.1], [0.003, 0.004], SLIP, False),
+    "slip below the cone": ([10.0, -2.9, -3.9], [0.003, 0.004], SLIP, False),
+    "stick": ([10.0, 2.0, -4.0], [0.0, 0.0], STICK, True),
+    "stick that moves": ([10.0, 2.0, -4.0], [0.0, 1e-5], STICK, False),
+    "stick beyond the cone": ([10.0, 3.1, -4.1], [0.0, 0.0], STICK, False),
+    "pulling": ([-10.0, 0.0, 0.0], [0.0, 0.0], STICK, False),
+    "open": ([0.0, 0.0, 0.0], [0.1, 0.2], OPEN, True),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_state_obeys_the_laws_or_not(case):
+    force, moved, status, obeys = CASES[case]
+    interface, old, new, _ = touching(FLAT, force, moved, status)
+    assert interface.obeyed(old, new) is obeys
+
+
+def test_a_closed_node_must_be_on_the_surface():
+    interface, old, new, node = touching(FLAT, [10.0, 0.0, 0.0], [0.0, 0.0], STICK)
+    lifted = new.u.copy()
+    lifted[interface.pad.nodes[node], 1] += 1e-5
+    assert not interface.obeyed(old, replace(new, u=lifted))
+    assert interface.shallowest_penetration(replace(new, u=lifted - [0.0, 2e-2, 0.0], status=0 * new.status))
+
+
+def test_a_face_that_touches_and_turns_up_is_a_fold():
+    interface, old, _, node = touching(FLAT, [10.0, 0.0, 0.0], [0.0, 0.0], STICK)
+    assert interface.fold(replace(old, status=np.full_like(old.status, STICK))) is None
+    over = old.u.copy()
+    over[interface.pad.nodes[node], 0] += 3.0
+    place = interface.fold(replace(old, u=over, status=np.full_like(old.status, STICK)))
+    assert place is not None
+    assert abs(place) < 2.0
+
+
+def known(x, force):
+    """One slipping candidate at x on a curved ramp whose friction grows."""
+    x = np.array([x])
+    surface = surface_state(RAMP.shifted(0.0), np.column_stack([x, RAMP.height(x), 0.0 * x]))
+    zero, one = np.zeros(1), np.array([0.3 + 0.1 * x[0]])
+    return SpatialCandidates(surface, np.zeros((1, 2)), np.array([force]), np.array([SLIP]), one,
+                             np.zeros((1, 3)), zero, zero, np.array([0.1]))  # fmt: skip
+
+
+def test_a_force_turns_with_its_node_and_grows_with_friction():
+    """The derivative of lam_n n + mu(x) lam_n (cos a t1 + sin a t2), a held, is that of differences."""
+
+    def force(x):
+        mu = 0.3 + 0.1 * x
+        return np.einsum("a,ak->k", [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8], known(x, [0.0, 0.0, 0.0]).axes[0])
+
+    at, h = 0.7, 1e-5
+    mu = 0.3 + 0.1 * at
+    found = known(at, [2.0, 2.0 * mu * 0.6, 2.0 * mu * 0.8]).follower_rate(np.zeros(1))[0]
+    assert_allclose(found, (force(at + h) - force(at - h)) / (2 * h), atol=1e-8)
+
+
+def test_turning_forces_are_part_of_the_body():
+    """u = C (f + T u) for the compliance that comes back, and for motions that come from outside."""
+    rng = np.random.default_rng(3)
+    A, rate = rng.normal(size=(9, 9)), np.zeros((3, 3))
+    C, rate[[0, 2]] = np.eye(9) + 0.1 * A @ A.T, 0.1 * rng.normal(size=(2, 3))
+    turning, W = Turning.of(rate), rng.normal(size=(9, 1))
+    T = np.zeros((9, 9))
+    for node in range(3):
+        T[3 * node : 3 * node + 3, 3 * node] = rate[node]
+    whole = np.linalg.inv(np.eye(9) - C @ T)
+    found = turning.apply(C, W)
+    assert_allclose(found[0], whole @ C)
+    assert_allclose(found[1], whole @ W)
+    assert_allclose(turning.force(W[:, 0]), T @ W[:, 0])
+    assert_allclose(turning.transposed(W.T), W.T @ T)
+    assert turning.weaker(C) is None
+    strong = Turning.of(50.0 * np.abs(rate))
+    weaker = strong.weaker(C)
+    assert weaker is not None
+    largest = np.linalg.eigvals(C[:, ::3] @ np.zeros((3, 9)) + C @ (50.0 * np.abs(T))).real.max()
+    assert_allclose(weaker.rate, 0.9 / largest * strong.rate)
