@@ -274,7 +274,7 @@ class Part:
         normal = (1.0 - way) * before + way * after
         part, places = (self.old, self.new), x0 + way * (x1 - x0)
         resists = self.model.equilibrium.interface.resistance
-        limit = np.array([resists(part, *each, slip) for each in zip(places, normal, strict=True)])
+        limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
         return float(PART @ np.sum(limit * length, axis=1))
 
     @cached_property

@@ -34,6 +34,7 @@ class SkinInterface(Interface):
         self.length = pad.spacing(self.points)
         self._facing = pad.facing(self.points)
         self.pins = Pins(np.zeros((0, 3)), pad.nodes.size)
+        self.law, self.duration = None, 0.0
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 3)."""
