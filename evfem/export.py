@@ -132,13 +132,13 @@ def write_frame(
     def real(values: np.ndarray) -> np.ndarray:
         return np.ascontiguousarray(values, dtype=np.float32 if single else np.float64)
 
-    point_data = {"displacement": real(_three(frame.displacement))}
+    point_data = {"displacement": real(meshfile.three(frame.displacement))}
     point_data |= {name: real(getattr(frame, name)) for name in POINT_FIELDS}
     point_data["contact_status"] = np.asarray(frame.contact_status, dtype=np.int8)
     cell_data = {"region": [np.asarray(mesh.region, dtype=np.int32)]}
     cell_data |= {name: [real(getattr(frame, name))] for name in CELL_FIELDS}
     cells = np.asarray(mesh.cells, dtype=np.int32)
-    grid = meshio.Mesh(real(_three(mesh.points)), [(mesh.kind, cells)], point_data, cell_data)
+    grid = meshio.Mesh(real(meshfile.three(mesh.points)), [(mesh.kind, cells)], point_data, cell_data)
     with replacing(path) as temporary:
         write_vtu(str(temporary), grid, compression="zlib" if compressed else None)
         meshfile.add_region_names(temporary, mesh)
@@ -236,8 +236,3 @@ def instants(rows: Sequence[Mapping[str, Any]]) -> list[float]:
     for value in values.tolist():
         result.append(max(value, result[-1] + INSTANT) if result else value)
     return result
-
-
-def _three(vectors: np.ndarray) -> np.ndarray:
-    """(N, 2) vectors with a zero third component."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])

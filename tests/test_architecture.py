@@ -22,7 +22,10 @@ ROOMS = {
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
         "arrays constants notices views checks digest storage tables",
     ),
-    "mesh": ({"numpy", "scipy", "meshio"}, "hexahedron mesh archive faces quality formats vtu msh file"),
+    "mesh": (
+        {"numpy", "scipy", "meshio"},
+        "hexahedron mesh archive faces solids quality formats vtu msh file",
+    ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
         "fields forms elements moduli splitlaw ogden laws kernels.blocks "
@@ -39,8 +42,8 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed coulomb "
-        "sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed "
+        "coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},

@@ -408,7 +408,7 @@ class MeshedFinger:
             return raised(self._own)
         if self._own.order == 2:
             given = f"a linear element on a mesh of {self._own.kind}"
-            raise InputError("solver.element", given, "q2 or q2p1 (p2 on triangles)")
+            raise InputError("solver.element", given, "q2 or q2p1 (p2 on triangles, hex27p1 on hexahedra)")
         return self._own
 
     @cached_property

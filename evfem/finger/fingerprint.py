@@ -27,7 +27,8 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.tables import read_columns
+from evfem.common.checks import set_frozen
+from evfem.common.tables import numbers, read_columns
 from evfem.errors import InputError
 from evfem.finger.outline import Ridges, quintic
 
@@ -37,8 +38,9 @@ LOOP_TILT = 20.0
 ARCH_RISE, ARCH_WIDTH = 1.5, 2.5
 #: part of the fine rectangle, from its middle, in which ridges have their full height
 FULL = 0.875
-#: most values of a measured print
+#: most values of a measured print, and what one is
 MOST = 4_000_000
+ALLOWED = "increasing x and z (mm), and finite heights (mm) in one row for each z"
 
 
 def _loop(x: Floats, z: Floats) -> Floats:
@@ -78,14 +80,33 @@ class HeightMap:
     """A measured print: `height` (rows, columns) in mm at `z` (rows,) and `x` (columns,), both
     increasing; linear in between, its edges go on beyond them.
 
-    >>> flat = HeightMap(np.array([0.0, 1.0]), np.array([0.0, 2.0]), np.array([[0.0, 0.1], [0.0, 0.1]]))
+    >>> flat = HeightMap(x=[0.0, 1.0], z=[0.0, 2.0], height=[[0.0, 0.1], [0.0, 0.1]])
     >>> flat.depth(np.array([0.5, 3.0]), np.array([1.0, 1.0])).tolist()
     [0.05, 0.0]
     """
 
-    x: Floats
-    z: Floats
-    height: Floats
+    x: Any
+    z: Any
+    height: Any
+
+    def __post_init__(self) -> None:
+        x, z = (numbers(f"finger.ridges.{name}", getattr(self, name), ALLOWED) for name in ("x", "z"))
+        height = numbers("finger.ridges.height", self.height, ALLOWED, axes=2)
+        if min(len(x), len(z)) < 2 or (np.diff(x) <= 0.0).any() or (np.diff(z) <= 0.0).any():
+            raise InputError("finger.ridges", f"{len(x)} x and {len(z)} z", ALLOWED)
+        if height.shape != (len(z), len(x)) or height.size > MOST:
+            raise InputError("finger.ridges", f"heights in {' x '.join(map(str, height.shape))}", ALLOWED)
+        set_frozen(self, x=x, z=z, height=height)
+
+    def __repr__(self) -> str:
+        """Size and range."""
+        span = f"x {self.x[0]:.4g} to {self.x[-1]:.4g} mm, z {self.z[0]:.4g} to {self.z[-1]:.4g} mm"
+        return f"HeightMap({len(self.z)} x {len(self.x)} points, {span}, {np.ptp(self.height):.4g} mm high)"
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What it is made of, as a scene file can hold it."""
+        return {"x": self.x.tolist(), "z": self.z.tolist(), "height": self.height.tolist()}
 
     def depth(self, x: Floats, z: Floats) -> Floats:
         """Depth (mm) below the highest point at x, z."""

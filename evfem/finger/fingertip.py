@@ -275,10 +275,12 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
     given = tip.ridges
     if isinstance(given, HeightMap):
         return given
+    if isinstance(given, Mapping) and set(given) == {"x", "z", "height"}:
+        return HeightMap(**given)
     if isinstance(given, bool):
         return "along" if given else "none"
-    if given == "none" or given in PATTERNS:
-        return str(given)
+    if isinstance(given, str) and given in ("none", *PATTERNS):
+        return given
     if isinstance(given, str | os.PathLike) and Path(given).suffix:
         return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height)
     allowed = "false | none | " + " | ".join(PATTERNS) + " | the path of a csv file or of a grey image"

@@ -3,7 +3,8 @@
 Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, `nail` ...
 (nonzero: belongs). Files written here also carry the names of the regions as field data
 (`region:NAME` = number), so that no table is needed to read them back. Encoding of `.msh` files:
-physical groups of surfaces (regions) and of lines or points (sets of nodes).
+physical groups of surfaces (regions) and of lines or points (sets of nodes), or of volumes and
+surfaces.
 """
 
 from __future__ import annotations
@@ -28,8 +29,14 @@ from evfem.mesh.quality import check
 #: Prefix of the field data that carry the names of regions in a `.vtu` file.
 PREFIX = "region:"
 
-#: Dimension of the body's cells; those below it are kept only for the nodes of a physical group.
-BODY = 2
+#: what cells of a dimension are in physical groups of
+GROUPS: Mapping[int, str] = {2: "surface", 3: "volume"}
+#: kinds that are refused for what they lack
+LACKING: Mapping[str, str] = {
+    "quad8": "quad8 has no middle node: export quad9 or quad",
+    "hexahedron20": "a pressure pulls at the corners of hexahedron20's faces, which contact cannot: export "
+    "hexahedron27 or hexahedron",
+}
 
 _Names = dict[tuple[int, int], str]
 
@@ -47,17 +54,19 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
     raw = _parts(path)
     blocks = raw.blocks
     names = raw.names
-    solid = [k for k, (kind, cells) in enumerate(blocks) if _dimension(kind) >= BODY and len(cells)]
+    body = _body(raw)
+    solid = [k for k, (kind, cells) in enumerate(blocks) if _dimension(kind, body) >= body and len(cells)]
     kind = _one_kind(path, [blocks[k][0] for k in solid])
     cells = np.vstack([blocks[k][1] for k in solid]).astype(np.int64)
     if names:
-        region, region_names = _groups(path, raw, solid, names)
-        sets = _group_sets(raw, names)
+        region, region_names = _groups(path, raw, solid, names, body)
+        sets = _group_sets(raw, names, body)
     else:
         region, region_names = _numbers(path, raw, solid, regions)
         sets = {}
     sets.update(_point_sets(path, raw))
-    mesh = Mesh(_plane(path, raw.points), cells, kind, region, region_names, sets)
+    points = raw.points if body == 3 else _plane(path, raw.points)
+    mesh = Mesh(points, cells, kind, region, region_names, sets)
     return check(mesh, str(path))
 
 
@@ -79,20 +88,26 @@ def _parts(path: Path) -> Parts:
 
 def _one_kind(path: Path, kinds: list[str]) -> str:
     found = sorted(set(kinds))
-    if len(found) == 1 and found[0] in KINDS and _dimension(found[0]) == BODY:
+    if len(found) == 1 and found[0] in KINDS:
         return found[0]
-    allowed = "cells of one kind: quad, quad9, triangle or triangle6"
-    if "quad8" in found:
-        allowed += " (quad8 has no middle node: export quad9 or quad)"
+    allowed = f"cells of one kind: {', '.join(KINDS[:-1])} or {KINDS[-1]}"
+    allowed += "".join(f" ({LACKING[name]})" for name in found if name in LACKING)
     given = f"{path} with " + (" and ".join(found) if found else "no two-dimensional") + " cells"
     raise InputError("finger.mesh", given, allowed)
 
 
-def _dimension(kind: str) -> int:
+def _body(raw: Parts) -> int:
+    """Dimension of the body's cells, 2 or 3; cells below it are kept only for the nodes of a
+    physical group.
+    """
+    return max([2, *(CELLS[kind].dimension for kind, cells in raw.blocks if kind in CELLS and len(cells))])
+
+
+def _dimension(kind: str, body: int) -> int:
     """Of a kind of cell; kinds that only meshio knows count as parts of the body, and are refused
     there.
     """
-    return CELLS[kind].dimension if kind in CELLS else BODY
+    return CELLS[kind].dimension if kind in CELLS else body
 
 
 def _plane(path: Path, points: np.ndarray) -> np.ndarray:
@@ -106,22 +121,24 @@ def _plane(path: Path, points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(points[:, :2])
 
 
-def _groups(path: Path, raw: Parts, solid: list[int], names: _Names) -> tuple[Ints, dict[str, int]]:
+def _groups(
+    path: Path, raw: Parts, solid: list[int], names: _Names, body: int
+) -> tuple[Ints, dict[str, int]]:
     tag = np.concatenate([raw.cell_data[PHYSICAL][k] for k in solid])
-    region_names = {name: number for (dimension, number), name in names.items() if dimension == BODY}
+    region_names = {name: number for (dimension, number), name in names.items() if dimension == body}
     lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
     if lost:
         given = f"{path} with {int(np.isin(tag, lost).sum())} cells outside every named group"
-        raise InputError("finger.mesh", given, "every cell in a physical surface with a name")
+        raise InputError("finger.mesh", given, f"every cell in a physical {GROUPS[body]} with a name")
     present = set(np.unique(tag).tolist())
     return tag, {name: number for name, number in region_names.items() if number in present}
 
 
-def _group_sets(raw: Parts, names: _Names) -> dict[str, Ints]:
+def _group_sets(raw: Parts, names: _Names, body: int) -> dict[str, Ints]:
     sets: dict[str, Ints] = {}
     for (kind, cells), tag in zip(raw.blocks, raw.cell_data[PHYSICAL], strict=True):
         for (d, number), name in names.items():
-            if d == _dimension(kind) < BODY and len(nodes := np.unique(cells[tag == number])):
+            if d == _dimension(kind, body) < body and len(nodes := np.unique(cells[tag == number])):
                 sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
     return sets
 
@@ -213,8 +230,11 @@ def write(mesh: Mesh, path: str | os.PathLike[str]) -> None:
         writer(mesh, part)
 
 
-def _three(points: np.ndarray) -> np.ndarray:
-    return np.column_stack([points, np.zeros(len(points))])
+def three(vectors: np.ndarray) -> np.ndarray:
+    """Vectors (N, 2 or 3) with three components."""
+    if vectors.shape[1] == 3:
+        return vectors
+    return np.column_stack([vectors, np.zeros(len(vectors))])
 
 
 def _write_vtu(mesh: Mesh, path: Path) -> None:
@@ -225,7 +245,7 @@ def _write_vtu(mesh: Mesh, path: Path) -> None:
         point_data[name] = np.zeros(len(mesh.points), dtype=np.uint8)
         point_data[name][nodes] = 1
     out = meshio.Mesh(
-        _three(mesh.points),
+        three(mesh.points),
         [(mesh.kind, mesh.cells.astype(np.int32))],
         point_data,
         {"region": [mesh.region.astype(np.int32)]},
@@ -247,39 +267,41 @@ def add_region_names(path: Path, mesh: Mesh) -> None:
 
 
 def _write_msh(mesh: Mesh, path: Path) -> None:
-    """Gmsh's 2.2, with a physical group for each region and for each set of outer edges.
+    """Gmsh's 2.2, with a physical group for each region and for each set of outer edges or faces.
 
     The names are patched into the bytes because meshio keeps one group per name, while `nail` is
     both a region and a boundary.
     """
     import meshio
 
-    lines = "line3" if mesh.order == 2 else "line"
+    below = {2: ("line", "line3"), 3: ("quad", "quad9")}[mesh.dim][mesh.order - 1]
     numbers = {name: i for i, name in enumerate(mesh.region_names, 1)}
     table = np.zeros(max(mesh.region_names.values()) + 1, dtype=np.int32)
     for name, number in mesh.region_names.items():
         table[number] = numbers[name]
     blocks, tags = [(mesh.kind, mesh.cells)], [table[mesh.region]]
-    names = [f'2 {i} "{name}"' for name, i in numbers.items()]
+    names = [f'{mesh.dim} {i} "{name}"' for name, i in numbers.items()]
     for i, name in enumerate(mesh.node_sets, len(numbers) + 1):
-        edges = _all_edges(mesh, name)
-        blocks.append((lines, edges))
-        tags.append(np.full(len(edges), i, dtype=np.int32))
-        names.insert(0, f'1 {i} "{name}"')
+        facets = _all_facets(mesh, name)
+        blocks.append((below, facets))
+        tags.append(np.full(len(facets), i, dtype=np.int32))
+        names.insert(0, f'{mesh.dim - 1} {i} "{name}"')
     data = {"gmsh:physical": tags, "gmsh:geometrical": tags}
-    meshio.Mesh(_three(mesh.points), blocks, cell_data=data).write(path, file_format="gmsh22", binary=False)
+    meshio.Mesh(three(mesh.points), blocks, cell_data=data).write(path, file_format="gmsh22", binary=False)
     head = b"$EndMeshFormat\n"
     text = f"$PhysicalNames\n{len(names)}\n" + "\n".join(names) + "\n$EndPhysicalNames\n"
     path.write_bytes(path.read_bytes().replace(head, head + text.encode(), 1))
 
 
-def _all_edges(mesh: Mesh, name: str) -> Ints:
-    edges = mesh.edges_of(name)
-    lost = np.setdiff1d(mesh.node_sets[name], edges)
+def _all_facets(mesh: Mesh, name: str) -> Ints:
+    """The outer edges or faces of a set."""
+    facets = mesh.edges_of(name) if mesh.dim == 2 else mesh.faces_of(name)
+    lost = np.setdiff1d(mesh.node_sets[name], facets)
     if len(lost):
-        given = f"a .msh file for the set {name} with node {lost[0]}, which no outer edge of the set has"
-        raise InputError("--out", given, ".vtu, which carries sets of nodes (.msh: sets of outer edges)")
-    return edges
+        facet = "edge" if mesh.dim == 2 else "face"
+        given = f"a .msh file for the set {name} with node {lost[0]}, which no outer {facet} of the set has"
+        raise InputError("--out", given, f".vtu, which carries sets of nodes (.msh: sets of outer {facet}s)")
+    return facets
 
 
 READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vtu.read, ".msh": msh.read}

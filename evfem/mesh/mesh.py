@@ -173,7 +173,7 @@ class Mesh:
         """All faces of hexahedra once, (K, 4) corner nodes in rising order, and the faces of each
         cell, (E, 6).
         """
-        return _once(self.cells[:, FACES])
+        return once(self.cells[:, FACES])
 
     @cached_property
     def outer_faces(self) -> Ints:
@@ -187,7 +187,7 @@ class Mesh:
         return self._within(self.outer_faces, name)
 
 
-def _once(parts: Ints) -> tuple[Ints, Ints]:
+def once(parts: Ints) -> tuple[Ints, Ints]:
     """Edges or faces (E, m, k) of cells once, (K, k) corners in rising order, and their numbers in
     each cell, (E, m).
     """
@@ -230,7 +230,7 @@ def raised(mesh: Mesh) -> Mesh:
 
 def _raised_hexahedra(mesh: Mesh) -> Mesh:
     """The same in space: new nodes in the middles of edges, faces and cells."""
-    edges, edges_of_cell = _once(mesh.cells[:, EDGES])
+    edges, edges_of_cell = once(mesh.cells[:, EDGES])
     faces, faces_of_cell = mesh.faces
     starts = len(mesh.points) + np.cumsum([0, len(edges), len(faces)])
     points = [mesh.points] + [mesh.points[part].mean(axis=1) for part in (edges, faces, mesh.cells)]

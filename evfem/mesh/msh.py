@@ -17,6 +17,13 @@ from evfem.mesh.mesh import CELLS
 
 #: Gmsh's numbers of the kinds of cells
 KINDS: Mapping[int, str] = {kind.gmsh: name for name, kind in CELLS.items()}
+#: nodes of its quadratic hexahedra in VTK's order; its other cells have VTK's
+ORDER: Mapping[str, Ints] = {
+    "hexahedron20": np.array([*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15]),
+    "hexahedron27": np.array(
+        [*range(8), 8, 11, 13, 9, 16, 18, 19, 17, 10, 12, 14, 15, 22, 23, 21, 24, 20, 25, 26]
+    ),
+}
 PHYSICAL = "gmsh:physical"
 
 
@@ -43,7 +50,8 @@ def read(content: bytes) -> Parts:
     parts = Parts(points, [], cell_data={PHYSICAL: []})
     for kind in dict.fromkeys(kind for kind, _, _ in rows):
         same = [(cells, physical) for name, cells, physical in rows if name == kind]
-        parts.blocks.append((kind, place(np.concatenate([cells for cells, _ in same]))))
+        cells = place(np.concatenate([cells for cells, _ in same]))
+        parts.blocks.append((kind, cells[:, ORDER[kind]] if kind in ORDER else cells))
         parts.cell_data[PHYSICAL].append(np.concatenate([physical for _, physical in same]))
     parts.names = _names(sections.get(b"PhysicalNames", b""))
     return parts

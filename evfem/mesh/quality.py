@@ -1,20 +1,22 @@
-"""What a mesh in the plane must fulfil before anything is computed on it.
+"""What a mesh must fulfil before anything is computed on it.
 
 `check` asks one question after the other, in the order of the file, and every fault becomes one
-sentence; the shape of cells is their scaled Jacobian, at the end.
+sentence; what it asks of hexahedra alone is in `evfem.mesh.solids`. The shape of cells is their
+scaled Jacobian, at the end.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
+from evfem.mesh import solids
 from evfem.mesh.hexahedron import PLACES
-from evfem.mesh.mesh import KINDS, Mesh
+from evfem.mesh.mesh import CELLS, KINDS, Mesh
+from evfem.mesh.solids import Refuse, some
 
 #: Extent of a finger's outline in mm: other numbers mean other units.
 SMALLEST, LARGEST = 1.0, 200.0
@@ -22,11 +24,11 @@ SMALLEST, LARGEST = 1.0, 200.0
 SAME_PLACE = 1e-7
 #: Pairs of edges looked at for crossings: 4,000 edges of the outline, one of them as long as the finger.
 MOST_PAIRS = 8_000_000
-Refuse = Callable[[str, str], None]  # (fault, what is allowed): raises InputError
 
 
 def check(mesh: Mesh, source: str = "mesh") -> Mesh:
-    """The same mesh, its cells counter-clockwise and its set `pad` reduced to the outline.
+    """The same mesh, its cells counter-clockwise (hexahedra right-handed) and its set `pad` reduced
+    to the outline or surface.
 
     `source` names the mesh in messages. Raises `InputError` (key `finger.mesh`) for the first
     fault found: values, numbers of nodes, units, names, double and unused nodes, orientation,
@@ -39,24 +41,27 @@ def check(mesh: Mesh, source: str = "mesh") -> Mesh:
     _arrays(mesh, refuse)
     _extent(mesh, refuse)
     _nodes(mesh, refuse)
+    if mesh.dim == 3:
+        mesh = solids.oriented(mesh, refuse)
+        _shapes(mesh, refuse)
+        solids.connection(mesh, refuse)
+        solids.surface(mesh, refuse)
+        _names(mesh, refuse)
+        return solids.with_sets(mesh, refuse)
     mesh = _oriented(mesh, refuse)
     _shapes(mesh, refuse)
     _connection(mesh, refuse)
     _outline(mesh, refuse)
+    _names(mesh, refuse)
     return _with_sets(mesh, refuse)
 
 
-def _some(numbers: Ints) -> str:
-    listed = ", ".join(str(n) for n in numbers[:3])
-    return listed + (f" and {len(numbers) - 3} more" if len(numbers) > 3 else "")
-
-
 def _arrays(mesh: Mesh, refuse: Refuse) -> None:
-    if mesh.kind not in KINDS or mesh.dim != 2:
+    if mesh.kind not in KINDS or mesh.dim != CELLS[mesh.kind].dimension:
         refuse(f"{mesh.kind} cells", "cells of one kind: " + ", ".join(KINDS))
     bad = np.flatnonzero(~np.isfinite(mesh.points).all(axis=1))
     if len(bad):
-        refuse(f"no finite coordinates at node {_some(bad)}", "finite numbers")
+        refuse(f"no finite coordinates at node {some(bad)}", "finite numbers")
     if not len(mesh.cells):
         refuse("no cells", "at least one cell")
     if mesh.cells.min() < 0 or mesh.cells.max() >= len(mesh.points):
@@ -64,10 +69,10 @@ def _arrays(mesh: Mesh, refuse: Refuse) -> None:
     ordered = np.sort(mesh.cells, axis=1)
     bad = np.flatnonzero((ordered[:, 1:] == ordered[:, :-1]).any(axis=1))
     if len(bad):
-        refuse(f"the same node twice in cell {_some(bad)}", "different nodes in a cell")
+        refuse(f"the same node twice in cell {some(bad)}", "different nodes in a cell")
     bad = np.setdiff1d(mesh.region, list(mesh.region_names.values()))
     if len(mesh.region) != len(mesh.cells) or len(bad):
-        refuse(f"cells in the nameless region {_some(bad)}", "a named region for every cell")
+        refuse(f"cells in the nameless region {some(bad)}", "a named region for every cell")
 
 
 def _extent(mesh: Mesh, refuse: Refuse) -> None:
@@ -80,7 +85,7 @@ def _extent(mesh: Mesh, refuse: Refuse) -> None:
 def _nodes(mesh: Mesh, refuse: Refuse) -> None:
     unused = np.setdiff1d(np.arange(len(mesh.points)), mesh.cells)
     if len(unused):
-        refuse(f"{len(unused)} nodes that no cell uses (node {_some(unused)})", "only nodes of cells")
+        refuse(f"{len(unused)} nodes that no cell uses (node {some(unused)})", "only nodes of cells")
     radius = SAME_PLACE * float(np.ptp(mesh.points, axis=0).max())
     # first by boxes, for of many nodes in one place there would be too many pairs
     box = np.floor((mesh.points - mesh.points.min(axis=0)) / (0.5 * radius)).astype(np.int64)
@@ -110,7 +115,7 @@ def _oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
         return replace(mesh, cells=mesh.cells[:, order])
     bad = np.flatnonzero(area <= 0.0)
     if len(bad):
-        refuse(f"inverted or empty cells (cell {_some(bad)})", "all cells turning the same way round")
+        refuse(f"inverted or empty cells (cell {some(bad)})", "all cells turning the same way round")
     return mesh
 
 
@@ -118,7 +123,7 @@ def _shapes(mesh: Mesh, refuse: Refuse) -> None:
     shape = scaled_jacobian(mesh)
     bad = np.flatnonzero(shape <= 1e-6)
     if len(bad):
-        fault = f"tangled cells (cell {_some(bad)}, scaled Jacobian {shape.min():.3g})"
+        fault = f"tangled cells (cell {some(bad)}, scaled Jacobian {shape.min():.3g})"
         refuse(fault, "convex cells with mid-nodes near the middle of their edges")
 
 
@@ -224,11 +229,14 @@ def _across_and_along(a: Floats, b: Floats) -> tuple[Floats, Floats]:
     return across, (away * direction[:, None]).sum(axis=-1) / square
 
 
-def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
+def _names(mesh: Mesh, refuse: Refuse) -> None:
     have = ", ".join(sorted(mesh.node_sets)) or "none"
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
             refuse(f"no boundary {name} (it has {have})", "point data, or physical groups, `pad` and `bone`")
+
+
+def _with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
     if len(mesh.node_sets["bone"]) < 2:
         refuse("a bone of a single node", "a bone of at least two nodes, so that the finger cannot turn")
     pad = np.unique(mesh.edges_of("pad")).astype(np.int64)

@@ -9,7 +9,7 @@ csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.formats`)
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -243,29 +243,48 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     skin = _build(Electrical, parsed, "finger.electrical")
     if "mesh" in parts:
         return _meshed_finger(parts, skin, folder)
-    known = {spec.name: spec for spec in fields(FingerPad) if spec.init}
+    finger, sizes = FINGERS[kind_of({"kind": "pad"} | parts, "finger", FINGERS)]()
+    known = {spec.name: spec for spec in fields(finger) if spec.init}
     mistakes = Mistakes()
     mistakes.found += [
-        unknown_key(f"finger.{name}", name, [*known, "participant", "mesh", "depth"])
+        unknown_key(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
         for name in parts
-        if name not in (*known, "participant")
+        if name not in (*known, "kind", "participant")
     ]
     laws, given = parts.pop("materials", {}), {name: parts[name] for name in parts if name in known}
     with mistakes.of_a_part():
         given["materials"] = _materials(laws, TABLE_2)
     with mistakes.of_a_part(), at("finger"):
-        if isinstance(scan := given.get("ridge_scan"), str):
-            check_size("finger.ridge_scan", folder / scan, LARGEST_TABLE)
-            given["ridge_scan"] = folder / scan
+        scan = "ridge_scan" if finger is FingerPad else "ridges"
+        if isinstance(path := given.get(scan), str) and (finger is FingerPad or Path(path).suffix):
+            check_size(f"finger.{scan}", folder / path, LARGEST_TABLE)
+            given[scan] = folder / path
         if "participant" in parts:
-            given = participant_sizes(parts["participant"]) | given
-        pad = FingerPad(**given, **({"electrical": skin} if electrical else {}))
+            given = sizes(parts["participant"]) | given
+        made = finger(**given, **({"electrical": skin} if electrical else {}))
     mistakes.report()
-    return pad
+    return made
+
+
+def _pad() -> tuple[Any, Callable[[str], dict[str, Any]]]:
+    return FingerPad, participant_sizes
+
+
+def _tip() -> tuple[Any, Callable[[str], dict[str, Any]]]:
+    from evfem.finger.fingertip import Fingertip, tip_sizes
+
+    return Fingertip, tip_sizes
+
+
+#: kind of a finger -> its class, and the sizes of a participant's, loaded when they are asked for
+FINGERS: Mapping[str, Callable[[], tuple[Any, Callable[[str], dict[str, Any]]]]] = {
+    "pad": _pad,
+    "fingertip": _tip,
+}
 
 
 def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) -> MeshedFinger:
-    geometry = [name for name in table if name in {spec.name for spec in fields(FingerPad)}]
+    geometry = [name for name in table if name in {"kind", *(spec.name for spec in fields(FingerPad))}]
     geometry = [name for name in geometry if name not in MeshTable.model_fields]
     if geometry:
         raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")

@@ -231,8 +231,9 @@ def unknown_key(key: str, name: str, known: Sequence[str]) -> InputError:
 insulator_eps_r stands in [electrostatics]
     """
     mistake = unknown(key, name, known)
-    home = next((table for table, keys in HOMES.items() if name in keys), None)
-    if home is None or near(name, known):
+    home = next((table for table, keys in HOMES.items() if name in keys), "")
+    here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])  # whose other kinds may have it
+    if home.strip("[]") in ("", here) or near(name, known):
         return mistake
     return InputError(key, mistake.given, f"{mistake.allowed}; {name} stands in {home}")
 

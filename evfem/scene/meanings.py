@@ -42,6 +42,7 @@ SCENE = {
     "motion": Text("", "what happens, one table [[motion]] after the other"),
 }
 FINGER = {
+    "kind": Text("", "the cross-section of a finger, or a whole pad in space", "pad | fingertip"),
     "participant": Text("", "sizes of one of Table 1's fingers; other keys go before", "i to xi"),
     "width": Text("mm", "full width of the cross-section"),
     "height": Text("mm", "full height of the cross-section"),
@@ -70,6 +71,28 @@ FINGER = {
     "electrical": Text("", "the dielectric skin", f"{TABLE} [finger.electrical]"),
     "viscosity": Text("s", "relaxation time of materials without their own"),
     "depth": DEPTH,
+}
+FINGERTIP = {
+    name: FINGER[name]
+    for name in (
+        *("participant", "width", "height", "ridge_height", "ridge_width", "ridge_exponent", "ridge_phase"),
+        *("ridge_crest", "ridge_groove", "stratum_corneum_thickness", "epidermis_thickness"),
+        *("dermis_thickness", "bone_width", "bone_height", "bone_offset", "materials", "electrical"),
+        *("viscosity", "depth"),
+    )
+} | {
+    "length": Text("mm", "full length of the ellipsoid"),
+    "ridges": Text(
+        "",
+        "pattern of the fingerprint ridges, or a measured print",
+        "false | none | true | along | across | whorl | loop | arch, the path of a csv file with the "
+        "header x,z,height or of a grey image, or a table of x, z and rows of height",
+    ),
+    "ridge_pixel": Text("mm", "from point to point of a grey image"),
+    "bone_length": Text("mm", "full length of the bone"),
+    "rim": Text("", "whether the cut around the nail moves with the bone", "fixed | free"),
+    "posture": Text("degrees", "how far the tip is turned down"),
+    "resolution": Text("", "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more"),
 }
 MESHED_FINGER = {
     "mesh": Text("", "a mesh of your own, in mm"),

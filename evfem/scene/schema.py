@@ -156,23 +156,51 @@ def _from_fields(cls: type, **own: Any) -> type[Table]:
     return create_model(f"{cls.__name__}Keys", __base__=Table, **(found | own))
 
 
-def _finger() -> Section:
-    table: Any = (dict[str, Any], Default(default={}))
-    ranges = {
-        name: text._replace(allowed="{:g} to {:g}{}".format(*RANGES[name]), limits=Within(*RANGES[name][:2]))
-        for name, text in meanings.FINGER.items()
-        if name in RANGES
-    }
-    texts = meanings.FINGER | ranges
-    texts["resolution"] = texts["resolution"]._replace(allowed=" | ".join(RESOLUTIONS))
+def _pad() -> Section:
     scan = (str | dict[str, list[float]] | None, Default(default=None))
-    own = {"participant": (str | None, Default(default=None)), "materials": table, "electrical": table}
-    own |= {"ridge_scan": scan, "depth": DEPTH}
-    found = section("finger", _from_fields(FingerPad, **own), texts, "parametric")
+    kind = (str, Default(default="pad"))
+    model = _from_fields(FingerPad, **_own_keys(), kind=kind, ridge_scan=scan)
+    found = _ranged("parametric", model, meanings.FINGER, RANGES, tuple(RESOLUTIONS))
+    return _kind_first(found, "kind", "pad")
+
+
+def _tip() -> Section:
+    from evfem.finger.fingertip import TIP_RANGES, TIP_RESOLUTIONS, Fingertip
+
+    ridges = (bool | str | dict[str, list[Any]], Default(default="along"))
+    model = _from_fields(Fingertip, **_own_keys(), kind=(str, ...), ridges=ridges)
+    texts = meanings.FINGERTIP | {"kind": meanings.FINGER["kind"]._replace(allowed="fingertip")}
+    found = _ranged("fingertip", model, texts, TIP_RANGES, tuple(TIP_RESOLUTIONS))
+    return _kind_first(found, "kind", "fingertip")
+
+
+def _own_keys() -> dict[str, Any]:
+    """Keys of a parametric finger that are no fields, or other tables."""
+    table: Any = (dict[str, Any], Default(default={}))
+    return {
+        "participant": (str | None, Default(default=None)),
+        "materials": table,
+        "electrical": table,
+        "depth": DEPTH,
+    }
+
+
+def _ranged(
+    kind: str, model: type[Table], texts: Meanings, ranges: Mapping[str, Any], resolutions: tuple[str, ...]
+) -> Section:
+    """The keys of a parametric finger with their ranges."""
+    limited = {
+        name: text._replace(allowed="{:g} to {:g}{}".format(*ranges[name]), limits=Within(*ranges[name][:2]))
+        for name, text in texts.items()
+        if name in ranges
+    }
+    told = {**texts, **limited}
+    told["resolution"] = told["resolution"]._replace(allowed=" | ".join(resolutions))
+    found = section("finger", model, told)
     for key in found.keys:
         if key.name == "resolution":
-            key.schema["enum"] = list(RESOLUTIONS)
-    return found
+            key.schema["enum"] = list(resolutions)
+    return Section("finger", kind, found.keys)
 
 
 def _materials() -> list[Section]:
@@ -220,7 +248,8 @@ def sections() -> list[Section]:
     ]
     return [
         section("", keys.SceneTable, meanings.SCENE),
-        _finger(),
+        _pad(),
+        _tip(),
         section("finger", meshed, meanings.MESHED_FINGER, "mesh"),
         *_materials(),
         section("finger.electrical", keys.ElectricalTable, meanings.ELECTRICAL),
@@ -256,9 +285,10 @@ def schema() -> Schema:
         tables.setdefault(one.name, []).append(one)
     one_of = {name: {"oneOf": [one.schema() for one in found]} for name, found in tables.items()}
     electrical = tables["finger.electrical"][0].schema()
-    pad, mesh = tables["finger"]
+    pad, tip, mesh = tables["finger"]
     fingers = [
         pad.schema(materials=_by_region("layer"), electrical=electrical),
+        tip.schema(materials=_by_region("layer"), electrical=electrical),
         mesh.schema(materials=_by_region("material"), electrical=electrical),
     ]
     strategy = tables["solver.strategy"][0].schema()

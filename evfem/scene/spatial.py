@@ -42,9 +42,8 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
         allowed = "a number, or a table without jumps: a short ramp from one coefficient to the next"
         found.append(("surface.friction", f"a jump of the coefficient {SOLID}", allowed))
     if not isinstance(scene.friction_law, Coulomb):
-        found.append(
-            ("surface.friction_law", f"{type(scene.friction_law).__name__} {SOLID}", "Coulomb's law")
-        )
+        given = f"{type(scene.friction_law).__name__} {SOLID}"
+        found.append(("surface.friction_law", given, "Coulomb's law"))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.direction != "vertical":

@@ -75,14 +75,8 @@ def _finger_table(finger: Any) -> dict[str, Any]:
             "materials": finger.materials,
             "electrical": finger.electrical,
         }
-    elif isinstance(finger, FingerPad):
-        usual = FingerPad().materials
-        table = _changed(finger)
-        table["materials"] = {name: law for name, law in finger.materials.items() if law != usual[name]}
-        if isinstance(finger.ridge_scan, RidgeScan):
-            table["ridge_scan"] = finger.ridge_scan.columns
     else:
-        raise InputError("finger", type(finger).__name__, "FingerPad or MeshedFinger, for a file")
+        table = _parametric_finger(finger)
     if "materials" in table:
         table["materials"] = {name: _law_table(name, law) for name, law in table["materials"].items()}
     if "electrical" in table:
@@ -90,6 +84,26 @@ def _finger_table(finger: Any) -> dict[str, Any]:
     return {
         name: dict(v) if isinstance(v, Mapping) else v for name, v in table.items() if v not in (None, {})
     }
+
+
+def _parametric_finger(finger: Any) -> dict[str, Any]:
+    if isinstance(finger, FingerPad):
+        table = _changed(finger)
+        if isinstance(finger.ridge_scan, RidgeScan):
+            table["ridge_scan"] = finger.ridge_scan.columns
+    else:
+        from evfem.finger.fingerprint import HeightMap
+        from evfem.finger.fingertip import Fingertip
+
+        if not isinstance(finger, Fingertip):
+            allowed = "FingerPad, Fingertip or MeshedFinger, for a file"
+            raise InputError("finger", type(finger).__name__, allowed)
+        table = {"kind": "fingertip", **_changed(finger)}
+        if isinstance(finger.ridges, HeightMap):
+            table["ridges"] = finger.ridges.columns
+    usual = type(finger)().materials
+    table["materials"] = {name: law for name, law in finger.materials.items() if law != usual[name]}
+    return table
 
 
 def _law_table(region: str, law: Any) -> dict[str, Any]:

@@ -105,9 +105,10 @@ class Stepper:
 
     def solve(self, state: State, target: Target) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow."""
-        attraction, interface = self.equilibrium.attraction, self.equilibrium.interface
+        attraction = self.equilibrium.attraction
         if attraction is None or attraction.charging is None:
             return self._coupled(state, target)
+        interface = self.equilibrium.interface
         pressing = state.contact_force[:, 0]
         old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
         attraction.charging.begin(old, target.duration)

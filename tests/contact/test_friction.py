@@ -20,7 +20,9 @@ STRIBECK = ev.RateFriction(speed=5.0, ratio=0.4)
 POWER = ev.RateFriction(speed=5.0, exponent=0.25)
 AGEING = ev.AgeingFriction(fresh=0.2, time=6.7)
 LAWS = [ev.Coulomb(), LOAD_INDEX, ADHESIVE, STRIBECK, POWER, AGEING]
-every_law = pytest.mark.parametrize("law", LAWS, ids=lambda law: f"{law.kind}-{id(law) % 7}")
+every_law = pytest.mark.parametrize(
+    "law", LAWS, ids=["coulomb", "load_index", "adhesive", "stribeck", "power", "ageing"]
+)
 
 
 class Own:

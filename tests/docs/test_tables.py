@@ -24,7 +24,7 @@ def test_the_columns_are_those_of_the_history():
 
 
 def test_an_entry_says_type_unit_default_range_and_meaning():
-    (width,) = [key for one in schema.sections() for key in one.keys if key.name == "ridge_width"]
+    width, _ = [key for one in schema.sections() for key in one.keys if key.name == "ridge_width"]
     assert TABLES["entry"](width) == (
         "- `ridge_width`: number in mm; default `0.5`; 0.3 to 0.8 mm.\n  The pitch, from crest to crest."
     )

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from tools.solids import block
 
 from evfem.errors import InputError
 from evfem.mesh.faces import layer_thickness
 from evfem.mesh.mesh import raised
-from tools.solids import block
 
 
 def shell(order):

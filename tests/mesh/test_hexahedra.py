@@ -1,10 +1,19 @@
 """Hexahedra: faces with their normals outwards, what raising them adds, and sets of nodes."""
 
+from dataclasses import replace
+
+import meshio
 import numpy as np
+import pytest
 from tools.solids import SIDES, block
 
+import evfem as ev
+from evfem.errors import InputError
+from evfem.mesh import file as meshfile
+from evfem.mesh import msh
 from evfem.mesh.hexahedron import EDGES, FACES, MIRRORED, PLACES, face_nodes
-from evfem.mesh.mesh import raised
+from evfem.mesh.mesh import Mesh, raised
+from evfem.mesh.quality import check
 
 
 def test_middles_lie_between_their_corners():
@@ -60,3 +69,175 @@ def test_raised_hexahedra():
     low = np.flatnonzero(solid.points[:, 1] == 0.0)
     np.testing.assert_array_equal(solid.node_sets["bottom"], low)
     assert raised(solid) is solid
+
+
+# -- files and checks ------------------------------------------------------------------------------------
+
+
+def solid(order=1, divisions=(2, 2, 2), split=True):
+    """A block of two materials with pad and bone, 2 mm wide."""
+    upper = (lambda x, y, z: y > 1.0) if split else None
+    mesh = block(divisions, (2.0, 2.0, 2.0), jitter=0.2, split=upper)
+    sets = {"pad": mesh.node_sets["bottom"], "bone": mesh.node_sets["top"]}
+    mesh = replace(mesh, node_sets=sets)
+    return raised(mesh) if order == 2 else mesh
+
+
+@pytest.mark.parametrize("ending", [".vtu", ".msh"])
+@pytest.mark.parametrize("order", [1, 2])
+def test_files_bring_back_what_was_written(order, ending, tmp_path):
+    """Points, cells, names and sets; quadratic cells are untangled by the order of their nodes."""
+    mesh = solid(order)
+    meshfile.write(mesh, tmp_path / f"solid{ending}")
+    read = meshfile.read(tmp_path / f"solid{ending}")
+    np.testing.assert_allclose(read.points, mesh.points, atol=1e-14)
+    np.testing.assert_array_equal(read.cells, mesh.cells)
+    assert read.kind == mesh.kind
+    assert set(read.region_names) == set(mesh.region_names)
+    for name in mesh.region_names:
+        np.testing.assert_array_equal(read.cells_of(name), mesh.cells_of(name))
+    for name, nodes in mesh.node_sets.items():
+        np.testing.assert_array_equal(read.node_sets[name], nodes)
+
+
+def test_fingertips_pass_their_own_checks(tmp_path):
+    for ridges, order in (("none", 2), ("along", 1)):
+        mesh = ev.Fingertip(ridges=ridges, resolution="coarse").mesh(order)
+        assert check(mesh).cells is mesh.cells
+    meshfile.write(ev.Fingertip(ridges="none", resolution="coarse").mesh(), tmp_path / "tip.vtu")
+    finger = ev.MeshedFinger(tmp_path / "tip.vtu", ev.Fingertip().materials)
+    assert finger.mesh(2).kind == "hexahedron27"
+    with pytest.raises(InputError, match="hex27p1 on hexahedra"):
+        finger.mesh(1)
+
+
+def test_gmsh_has_its_own_order_of_a_quadratic_hexahedron():
+    """Middles of edges and faces as Gmsh's manual draws them (Node ordering, Hexahedron27)."""
+    edges = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]
+    faces = [(0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7)]
+    corner = PLACES[:8].astype(float)
+    middles = [corner[list(nodes)].mean(axis=0) for nodes in (*edges, *faces)]
+    gmsh = np.vstack([corner, middles, [[0, 0, 0]]])
+    np.testing.assert_array_equal(gmsh[msh.ORDER["hexahedron27"]], PLACES)
+    np.testing.assert_array_equal(gmsh[msh.ORDER["hexahedron20"]], PLACES[:20])
+
+
+def test_cells_with_twenty_nodes_are_refused_with_the_reason(tmp_path):
+    mesh = solid(2, (1, 1, 1), split=False)
+    meshio.Mesh(mesh.points, [("hexahedron20", mesh.cells[:, :20])]).write(tmp_path / "serendipity.vtu")
+    with pytest.raises(InputError, match="a pressure pulls at the corners"):
+        meshfile.read(tmp_path / "serendipity.vtu")
+
+
+def test_mixtures_and_tetrahedra_are_refused(tmp_path):
+    mesh = solid(1, (2, 1, 1), split=False)
+    tetra = [("hexahedron", mesh.cells[:1]), ("tetra", mesh.cells[1:, [0, 1, 3, 4]])]
+    for blocks in (tetra, tetra[1:]):
+        meshio.Mesh(mesh.points, blocks).write(tmp_path / "mixed.vtu")
+        with pytest.raises(InputError, match=r"one kind: .*hexahedron27"):
+            meshfile.read(tmp_path / "mixed.vtu")
+
+
+def test_left_handed_cells_are_turned():
+    for order in (1, 2):
+        mesh = solid(order)
+        turned = check(replace(mesh, cells=mesh.cells[:, MIRRORED[: mesh.cells.shape[1]]]))
+        np.testing.assert_array_equal(turned.cells, mesh.cells)
+
+
+def changed_cells(mesh, cell, nodes):
+    cells = mesh.cells.copy()
+    cells[cell] = nodes
+    return replace(mesh, cells=cells)
+
+
+def shifted(mesh):
+    """The mesh and a copy of it 2 mm aside, without common nodes."""
+    n = len(mesh.points)
+    sets = {name: np.concatenate([nodes, nodes + n]) for name, nodes in mesh.node_sets.items()}
+    points = np.vstack([mesh.points, mesh.points + np.array([2.5, 0.0, 0.0])])
+    region = np.tile(mesh.region, 2)
+    return replace(
+        mesh, points=points, cells=np.vstack([mesh.cells, mesh.cells + n]), region=region, node_sets=sets
+    )
+
+
+def hanging():
+    """A wide cell above two narrow ones that do not share its face; two more beside them join all."""
+    spans = [((0, 1), (0, 1)), ((1, 2), (0, 1)), ((2, 3), (0, 1)), ((2, 3), (1, 2)), ((0, 2), (1, 2))]
+    share = (PLACES[:8] + 1) // 2
+    corners = np.array([[(x[i], y[j], k) for i, j, k in share] for x, y in spans], dtype=float)
+    points, number = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+    sets = {"pad": np.flatnonzero(points[:, 1] == 0.0), "bone": np.flatnonzero(points[:, 1] == 2.0)}
+    cells, region = number.reshape(-1, 8), np.zeros(5, dtype=int)
+    return Mesh(points, cells, "hexahedron", region, {"tissue": 0}, sets)
+
+
+def loose_middle():
+    """A mid-node that one of its cells has as another node in nearly the same place."""
+    mesh = solid(2)
+    inner = np.setdiff1d(mesh.cells[:, 8:20], mesh.outer_faces)[0]
+    cell = np.flatnonzero((mesh.cells == inner).any(axis=1))[0]
+    nodes = np.where(mesh.cells[cell] == inner, len(mesh.points), mesh.cells[cell])
+    mesh = replace(mesh, points=np.vstack([mesh.points, mesh.points[inner] + 1e-3]))
+    return changed_cells(mesh, cell, nodes)
+
+
+def turned_inside_out():
+    mesh = solid()
+    return changed_cells(mesh, 0, mesh.cells[0, MIRRORED[:8]])
+
+
+def moved(node, by):
+    mesh = solid()
+    mesh.points[node] += by
+    return mesh
+
+
+def with_sets(**sets):
+    mesh = solid()
+    return replace(mesh, node_sets={**mesh.node_sets, **sets})
+
+
+FAULTY = {
+    "inverted or empty cells": turned_inside_out,
+    "tangled cells": lambda: moved(13, [0.7, 0.7, 0.7]),
+    "separate parts": lambda: shifted(solid()),
+    "on the face of nodes": hanging,
+    "different mid-nodes": loose_middle,
+    "same place": lambda: moved(0, [1e-9, 0.0, 1.0]),
+    "an extent of": lambda: replace(solid(), points=1e-3 * solid().points),
+    "no boundary bone": lambda: with_sets(bone=np.zeros(0, dtype=int)),
+    "without a face": lambda: with_sets(pad=np.array([0, 1])),
+    "a bone of 2 nodes": lambda: with_sets(bone=np.array([6, 7])),
+    "lies on the bone": lambda: with_sets(bone=np.arange(27)),
+}
+
+
+@pytest.mark.parametrize("said", list(FAULTY))
+def test_faults_have_a_sentence(said):
+    with pytest.raises(InputError, match=said) as caught:
+        check(FAULTY[said]())
+    assert caught.value.key == "finger.mesh"
+
+
+def test_a_pad_is_reduced_to_whole_faces():
+    mesh = with_sets(pad=np.append(solid().node_sets["pad"], 26))
+    np.testing.assert_array_equal(check(mesh).node_sets["pad"], solid().node_sets["pad"])
+
+
+def test_sets_of_single_nodes_have_no_place_in_msh(tmp_path):
+    with pytest.raises(InputError, match="no outer face of the set"):
+        meshfile.write(with_sets(tip=np.array([0])), tmp_path / "solid.msh")
+
+
+@pytest.mark.vtk
+def test_vtk_reads_the_cells_as_they_are_meant(tmp_path):
+    """Positive volumes that add up, of linear and quadratic cells."""
+    import pyvista
+
+    for order in (1, 2):
+        meshfile.write(solid(order), tmp_path / "solid.vtu")
+        volumes = pyvista.read(tmp_path / "solid.vtu").compute_cell_sizes()["Volume"]
+        assert volumes.min() > 0.0
+        assert volumes.sum() == pytest.approx(8.0, rel=1e-6)

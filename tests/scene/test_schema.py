@@ -15,6 +15,7 @@ from tools.meshes import square_mesh
 from evfem import templates
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
+from evfem.finger.fingertip import Fingertip
 from evfem.mesh import file as meshfile
 from evfem.scene import keys, meanings
 from evfem.scene import schema as scenes
@@ -91,9 +92,9 @@ def test_every_key_of_the_models_has_its_row():
     for place, model in models.items():
         assert found.pop(place) == set(model.model_fields), place
     assert found.pop(("finger", "mesh")) == {*keys.MeshTable.model_fields, "depth"}
-    assert found.pop(("finger", "parametric")) == {"participant", "depth"} | {
-        spec.name for spec in fields(FingerPad) if spec.init
-    }
+    for kind, cls in (("parametric", FingerPad), ("fingertip", Fingertip)):
+        own = {"kind", "participant", "depth"} | {spec.name for spec in fields(cls) if spec.init}
+        assert found.pop(("finger", kind)) == own
     for name, (model, _) in keys.FRICTIONS.items():
         assert found.pop(("surface.friction_law", name)) == {*model.model_fields}
     for name, (model, _) in keys.ROUGHNESS.items():
@@ -136,9 +137,10 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
 def test_the_defaults_are_those_of_a_scene(scene_schema):
     """Every default of the schema, written into a file, makes the scene that the bare file makes."""
     exact = SLIDE.replace('contact = "penalty"\npenalty_normal = 1.0\npenalty_tangential = 1.0\n', "")
-    bare, tried = loads(exact), 0
+    tried = 0
     for one in scenes.sections():
         elsewhere = one.name.startswith(ELSEWHERE) or one.kind == "mesh"
+        bare = loads(put(one, "kind", "fingertip", exact) if one.kind == "fingertip" else exact)
         for key in () if elsewhere else one.keys:
             if "default" in key.schema:
                 text = put(one, key.name, key.schema["default"], exact)
@@ -154,6 +156,8 @@ def put(section, key, value, text=SLIDE):
     table = tables["motion"][PLACES[section.kind]] if section.name == "motion" else tables
     for part in section.name.split(".") if section.name not in ("", "motion") else ():
         table = table[part]
+    if section.kind == "fingertip":
+        table["kind"] = "fingertip"
     table[key] = value
     return tomli_w.dumps(tables)
 

@@ -35,7 +35,7 @@ def test_the_travel_of_a_pressed_bone_is_an_unknown_that_pushes_with_the_bones_c
     side; the equation is that of the bone's y component.
     """
     schur = np.arange(16.0).reshape(4, 4)
-    (unknown,) = Force(5.0).unknowns(SimpleNamespace(schur=schur), 0.7)
+    (unknown,) = Force(5.0).unknowns(SimpleNamespace(schur=schur, dim=2), 0.7)
     np.testing.assert_array_equal(unknown.push, -schur @ [0.0, 0.0, 0.0, 1.0])
     assert (unknown.axis, unknown.force) == (1, -5.0)
 

@@ -170,7 +170,7 @@ def test_patience_trades_factorisations_for_iterations():
 class Unsettling(Steps):
     """Equilibria that are found all at once alone: rounds fail, or go to and fro."""
 
-    attraction = "some"
+    attraction = SimpleNamespace(charging=None)
     tolerance = 1e-8
 
     def __init__(self, fails):

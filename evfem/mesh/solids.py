@@ -1,0 +1,142 @@
+"""What a mesh of hexahedra must fulfil, in the order in which `evfem.mesh.quality` asks; every fault
+becomes one sentence.
+
+Whether two bodies overlap is found where a node of the surface lies on another cell's face (which
+also finds nodes that hang on a larger neighbour); bodies that run through each other elsewhere are not
+found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.mesh.hexahedron import EDGES, MIRRORED, face_nodes
+from evfem.mesh.mesh import Mesh, once
+
+Refuse = Callable[[str, str], None]  # (fault, what is allowed): raises InputError
+#: a node lies on a face if it is nearer to it than this part of the face's size
+ON_FACE = 1e-6
+#: triangles of a quad around its middle, by its corners
+_AROUND = ((0, 1), (1, 2), (2, 3), (3, 0))
+
+
+def some(numbers: Ints) -> str:
+    """The first of the numbers, and how many more there are.
+
+    >>> some(np.array([3, 5, 8, 9]))
+    '3, 5, 8 and 1 more'
+    """
+    listed = ", ".join(str(n) for n in numbers[:3])
+    return listed + (f" and {len(numbers) - 3} more" if len(numbers) > 3 else "")
+
+
+def oriented(mesh: Mesh, refuse: Refuse) -> Mesh:
+    """Cells right-handed if all of them were left-handed; a mixture is refused."""
+    corner = mesh.points[mesh.cells[:, :8]]
+    middles = corner[:, face_nodes(1)].mean(axis=2)
+    volume = np.linalg.det(middles[:, 1::2] - middles[:, ::2])
+    if (volume < 0.0).all():
+        return replace(mesh, cells=mesh.cells[:, MIRRORED[: mesh.cells.shape[1]]])
+    bad = np.flatnonzero(volume <= 0.0)
+    if len(bad):
+        refuse(f"inverted or empty cells (cell {some(bad)})", "all cells turning the same way round")
+    return mesh
+
+
+def connection(mesh: Mesh, refuse: Refuse) -> None:
+    """Refuse cells that overlap, neighbours with different mid-nodes, and separate parts."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces, of_cell = mesh.faces
+    cells_of_face = np.bincount(of_cell.ravel())
+    if (cells_of_face > 2).any():
+        nodes = _listed(faces[np.argmax(cells_of_face > 2)])
+        refuse(f"more than two cells on the face of nodes {nodes}", "cells that do not overlap")
+    turns = np.bincount(of_cell.ravel(), weights=_turns(mesh.cell_faces[..., :4]).ravel())
+    folded = (cells_of_face == 2) & (turns != 0.0)
+    if folded.any():
+        nodes = _listed(faces[np.argmax(folded)])
+        refuse(f"two cells on the same side of the face of nodes {nodes}", "cells that do not overlap")
+    if mesh.order == 2:
+        edges, _ = once(mesh.cells[:, EDGES])
+        middles, centres = np.unique(mesh.cells[:, 8:20]), np.unique(mesh.cells[:, 20:26])
+        if len(middles) != len(edges) or len(centres) != len(faces):
+            fault = "neighbouring cells with different mid-nodes on a common edge or face"
+            refuse(fault, "one mid-node per edge and face")
+    cell = np.repeat(np.arange(len(of_cell), dtype=np.int32), 6)
+    face = of_cell.ravel().astype(np.int32)
+    ones = np.ones(of_cell.size, dtype=np.int8)
+    table = coo_array((ones, (cell, face)), shape=(len(of_cell), len(faces))).tocsr()
+    parts, _ = connected_components(table @ table.T, directed=False)
+    if parts > 1:
+        refuse(f"{parts} separate parts", "one body, its cells joined by common faces")
+
+
+def _turns(corners: Ints) -> Floats:
+    """1 or -1 (E, 6): which way round the corners (E, 6, 4) go from the one with the lowest number."""
+    first = corners.argmin(axis=2)[..., None]
+    after = np.take_along_axis(corners, (first + 1) % 4, axis=2)
+    before = np.take_along_axis(corners, (first + 3) % 4, axis=2)
+    return np.where(after < before, 1.0, -1.0)[..., 0]
+
+
+def _listed(nodes: Ints) -> str:
+    return ", ".join(map(str, nodes[:-1])) + f" and {nodes[-1]}"
+
+
+def surface(mesh: Mesh, refuse: Refuse) -> None:
+    """Refuse a surface that touches itself: nodes on a face of a cell that has them not."""
+    from scipy.spatial import cKDTree
+
+    faces = mesh.outer_faces
+    if not len(faces):
+        refuse("no outer face", "a body with a surface")
+    corner = mesh.points[faces[:, :4]]
+    middle = corner.mean(axis=1)
+    size = np.linalg.norm(corner - middle[:, None], axis=2).max(axis=1)
+    nodes = np.unique(faces)
+    near = cKDTree(mesh.points[nodes]).query_ball_point(middle, size)
+    face = np.repeat(np.arange(len(faces)), [len(found) for found in near])
+    node = nodes[np.concatenate(near).astype(int)]
+    strange = (faces[face] != node[:, None]).all(axis=1)
+    face, node = face[strange], node[strange]
+    on = np.zeros(len(face), dtype=bool)
+    for a, b in _AROUND:
+        triangle = np.stack([middle[face], corner[face, a], corner[face, b]], axis=1)
+        on |= _on_triangle(mesh.points[node], triangle, ON_FACE * size[face])
+    if on.any():
+        first = np.argmax(on)
+        nodes_of_face = _listed(faces[face[first], :4])
+        fault = f"a surface that touches itself: node {node[first]} on the face of nodes {nodes_of_face}"
+        refuse(fault, "cells that do not overlap, and no node on another cell's face")
+
+
+def _on_triangle(points: Floats, triangle: Floats, near: Floats) -> Floats:
+    """Whether each of the points (K, 3) lies on its triangle (K, 3, 3), by a distance `near` (K,)."""
+    away, u, v = points - triangle[:, 0], triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
+    normal = np.cross(u, v)
+    square = (normal**2).sum(axis=1)
+    first = (np.cross(away, v) * normal).sum(axis=1) / square
+    second = (np.cross(u, away) * normal).sum(axis=1) / square
+    height = np.abs((away * normal).sum(axis=1)) / np.sqrt(square)
+    return np.asarray((height < near) & (first > -1e-9) & (second > -1e-9) & (first + second < 1.0 + 1e-9))
+
+
+def with_sets(mesh: Mesh, refuse: Refuse) -> Mesh:
+    """The mesh with its set `pad` reduced to whole outer faces."""
+    bone = mesh.points[mesh.node_sets["bone"]]
+    if len(bone) < 3:
+        refuse(
+            f"a bone of {len(bone)} nodes", "a bone of at least three nodes, so that the finger cannot turn"
+        )
+    pad = np.unique(mesh.faces_of("pad")).astype(np.int64)
+    if not len(pad):
+        refuse("a pad without a face of the surface", "a pad of whole faces: all their nodes in `pad`")
+    if np.isin(pad, mesh.node_sets["bone"]).all():
+        refuse("a pad that lies on the bone", "a pad with nodes that can move")
+    return replace(mesh, node_sets={**mesh.node_sets, "pad": pad})

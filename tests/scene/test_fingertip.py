@@ -1,0 +1,94 @@
+"""A whole pad in scene files: the kind, its keys, paths, participants, and back to the file."""
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem import meshfile
+from evfem.cli import main
+from evfem.errors import InputError
+from evfem.scene.file import dump, loads
+
+REST = """
+[surface]
+kind = "flat"
+[[motion]]
+kind = "press"
+indentation = 0.2
+"""
+
+
+def scene(finger, folder="."):
+    return loads(f"version = 1\n[finger]\n{finger}{REST}", folder)
+
+
+def test_kind_chooses_the_finger():
+    assert isinstance(scene('kind = "fingertip"').finger, ev.Fingertip)
+    for text in ("", 'kind = "pad"'):
+        assert isinstance(scene(text).finger, ev.FingerPad)
+    with pytest.raises(InputError, match=r"finger.kind: given .toe.; allowed: pad \| fingertip"):
+        scene('kind = "toe"')
+
+
+def test_keys_are_the_fields():
+    text = 'kind = "fingertip"\nlength = 24.0\nridges = "whorl"\nrim = "free"\nresolution = "coarse"\n'
+    finger = scene(text + "[finger.materials.dermis]\nE = 0.1\n[finger.electrical]\n").finger
+    assert finger.length == 24.0
+    assert finger.ridges == "whorl"
+    assert finger.rim == "free"
+    assert finger.materials["dermis"].E == 0.1
+    assert scene('kind = "fingertip"\nridges = false').finger.ridges == "none"
+
+
+def test_participants_have_their_sizes():
+    own = scene('kind = "fingertip"\nparticipant = "ii"\nridges = "none"\nbone_length = 15.0').finger
+    other = ev.Fingertip.participant("ii", ridges=False)
+    assert (own.width, own.length, own.bone_length) == (other.width, other.length, 15.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ('kind = "fingertip"\nnail_width = 11.0', "finger.nail_width"),
+        ('kind = "fingertip"\nridge_scan = "scan.csv"', "finger.ridge_scan"),
+        ('kind = "fingertip"\nridges = "nowhere.csv"', "finger.ridges"),
+        ('kind = "fingertip"\nrim = "loose"', "finger.rim"),
+        ('kind = "fingertip"\n[finger.materials.nail]\nE = 17.0', "finger.materials.nail"),
+        ('kind = "pad"\nlength = 22.5', "finger.length"),
+        ('kind = "pad"\nridges = "whorl"', "finger.ridges"),
+        ('kind = "fingertip"\nmesh = "pad.vtu"', "finger.kind"),
+    ],
+)
+def test_mistakes_name_their_key(text, key):
+    with pytest.raises(InputError) as caught:
+        scene(text)
+    assert caught.value.key == key
+
+
+def test_scenes_come_back_from_the_file(tmp_path):
+    x = np.linspace(-3.0, 3.0, 7)
+    print_ = 0.05 * np.random.default_rng(3).random((7, 7))
+    fingers = [
+        ev.Fingertip(ridges="loop", posture=20.0, materials={"dermis": ev.Yeoh(c1=0.01, nu=0.45)}),
+        ev.Fingertip(ridges=False, resolution="coarse", electrical=ev.Electrical(0.3, 1000.0)),
+        ev.Fingertip(ridges=ev.HeightMap(x, x, print_), resolution="coarse"),
+    ]
+    for finger in fingers:
+        one = ev.Scene(finger, ev.Flat(), motion=ev.Press(indentation=0.2))
+        assert loads(dump(one), tmp_path).digest() == one.digest()
+
+
+def test_paths_are_relative_to_the_file(tmp_path):
+    (tmp_path / "print.csv").write_text("x,z,height\n-1,-1,0\n1,-1,0\n-1,1,0.1\n1,1,0.1\n")
+    finger = scene('kind = "fingertip"\nridges = "print.csv"\nresolution = "coarse"', tmp_path).finger
+    assert finger.ridges.height.tolist() == [[0.0, 0.0], [0.1, 0.1]]
+
+
+def test_mesh_is_written(tmp_path, capsys):
+    (tmp_path / "tip.toml").write_text(
+        f'version = 1\n[finger]\nkind = "fingertip"\nridges = "none"\nresolution = "coarse"\n{REST}'
+    )
+    assert main(["mesh", str(tmp_path / "tip.toml"), "--out", str(tmp_path / "tip.vtu")]) == 0
+    assert "hexahedron27" in capsys.readouterr().out
+    mesh = meshfile.read(tmp_path / "tip.vtu")
+    np.testing.assert_allclose(mesh.points, ev.Fingertip(ridges=False, resolution="coarse").mesh().points)
