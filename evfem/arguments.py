@@ -65,6 +65,7 @@ def parser() -> argparse.ArgumentParser:
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),
         ("signal", "write a voltage signal as .wav, .png, .hjif or .csv", _signal_options),
         ("texture", "list, make, import, slide over and estimate textures", _texture_options),
+        ("studio", "open a page in the browser, from a texture to a voltage", _studio_options),
         ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
     ):
         options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
@@ -168,7 +169,8 @@ def _texture_options(texture: argparse.ArgumentParser) -> None:
         ("show", "say what a texture is and where it is from", _texture_argument),
         ("make", "make a texture by a generator", _make_options),
         ("import", "make a texture from a csv file, a WAV, an image or a scan", _import_options),
-        ("simulate", "slide a finger over a texture by the full model", _touch_options),
+        ("simulate", "slide a finger over a texture by the full model", _simulate_options),
+        ("estimate", "estimate a friction curve from the database", _estimate_options),
         ("database", "compute the database of the estimators", _database_options),
     ):
         options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
@@ -245,7 +247,35 @@ def _touch_options(command: argparse.ArgumentParser) -> None:
     }
     _numbers(command, options)
     out = command.add_argument("--out", type=Path, metavar="FILE", help="csv file for the friction curve")
-    _complete(out, FILES)
+    signal = command.add_argument(
+        "--signal", type=Path, metavar="FILE", help="file for the display's voltage; its ending says as what"
+    )
+    for path in (out, signal):
+        _complete(path, FILES)
+    _device_options(command)
+
+
+def _device_options(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--law", default="kaczmarek", help="kaczmarek or strong_troxel; default: kaczmarek")
+    command.add_argument("--insulator", default="film", help="film or touchscreen; default: film")
+    options = {
+        "display": (0.25, "MU", "coefficient of the display"),
+        "voltage-max": (None, "V", "largest effective voltage of the amplifier"),
+        "slew": (None, "V/S", "how fast the effective voltage can change"),
+    }
+    _numbers(command, options)
+
+
+def _simulate_options(command: argparse.ArgumentParser) -> None:
+    _touch_options(command)
+    command.add_argument("--exact", action="store_true", help="the voltage by the coupled model itself")
+
+
+def _estimate_options(command: argparse.ArgumentParser) -> None:
+    _touch_options(command)
+    methods = ("best", "average", "linear", "rbf")
+    said = "default: the best one for this finger"
+    command.add_argument("--method", choices=methods, default="best", help=said)
 
 
 def _database_options(command: argparse.ArgumentParser) -> None:
@@ -255,6 +285,11 @@ def _database_options(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
     )
+
+
+def _studio_options(studio: argparse.ArgumentParser) -> None:
+    studio.add_argument("--port", type=int, default=8321, metavar="N", help="0: any; default: 8321")
+    studio.add_argument("--no-browser", action="store_true", help="do not open a browser")
 
 
 def _init_options(init: argparse.ArgumentParser) -> None:

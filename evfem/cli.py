@@ -134,6 +134,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
         "mesh": _mesh,
         "signal": _signal,
         "texture": _texture,
+        "studio": _studio,
         "schema": _schema,
     }[name]
 
@@ -338,6 +339,13 @@ def _texture(given: argparse.Namespace) -> int:
     from evfem.textures.commands import run
 
     run(given)
+    return DONE
+
+
+def _studio(given: argparse.Namespace) -> int:
+    from evfem.studio.server import serve
+
+    serve(given.port, not given.no_browser)
     return DONE
 
 

@@ -7,7 +7,7 @@ Vector" shows the deformed finger. Cells keep the VTK node order of the mesh.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from evfem.common.arrays import Ints
 from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -97,25 +98,47 @@ def ordinal(number: int) -> str:
 def frame_size(mesh: Mesh, single: bool = False, compressed: bool = False) -> int:
     """Bytes of the file of one frame, to within its tags; with compression at most."""
     real = 4 if single else 8
+    stresses = 4 if mesh.dim == 2 else 6
     nodes = len(mesh.points) * ((6 + len(POINT_FIELDS) - 1) * real + 1)  # a byte for the contact status
-    cells = len(mesh.cells) * (4 * mesh.cells.shape[1] + 4 + 8 + 4 + 6 * real)  # offset, type, region
+    cells = len(mesh.cells) * (
+        4 * mesh.cells.shape[1] + 4 + 8 + 4 + (2 + stresses) * real
+    )  # offset, type, region
     share = COMPRESSED if compressed else 1.0
     return round(share * (nodes + cells) * 4 / 3) + TAGS  # base64
 
 
-def paraview(result: Result, path: str | Path) -> Path:
+def paraview(result: Result, path: str | Path, *, skin: bool = False) -> Path:
     """Write the frames of `result` as a series: `path` (.pvd) and one .vtu for each frame beside
-    it.
+    it; of a finger in three dimensions the `skin` alone, if that is asked for.
 
-    Returns the path of the index. Raises InputError for another ending, StorageError when the disk
-    refuses.
+    Returns the path of the index. Raises InputError for another ending, and for the skin of a
+    cross-section; StorageError when the disk refuses.
     """
-    series = ParaViewSeries(path)
+    series = ParaViewSeries(path, skin=skin)
     rows = {row["step"]: row for row in result.rows}
     for frame in result.frames:
         series.add(rows[frame.step], frame, result.mesh)
     series.write_index()
     return series.path
+
+
+def skin_of(mesh: Mesh) -> tuple[Mesh, Ints, Ints]:
+    """The surface of the pad of hexahedra as a mesh of quads in space, its nodes (P,) in the solid's
+    mesh, and the cell behind each face (K,).
+
+    Raises InputError for the mesh of a cross-section.
+    """
+    if mesh.dim != 3:
+        raise InputError("skin", f"the mesh of a cross-section ({mesh.kind})", "a finger in three dimensions")
+    _, of_cell = mesh.faces
+    behind = np.nonzero(np.bincount(of_cell.ravel())[of_cell] == 1)[0]
+    outer = mesh.outer_faces
+    on_pad = np.isin(outer, mesh.node_sets["pad"]).all(axis=1)
+    nodes, cells = np.unique(outer[on_pad], return_inverse=True)
+    behind = behind[on_pad]
+    kind = "quad" if mesh.order == 1 else "quad9"
+    faces = cells.reshape(-1, outer.shape[1])
+    return Mesh(mesh.points[nodes], faces, kind, mesh.region[behind], mesh.region_names), nodes, behind
 
 
 def write_frame(
@@ -165,7 +188,7 @@ class ParaViewSeries:
     Files are named after the index: fields.pvd, fields_00001.vtu, ... The value of an entry is the
     time if time passes, else the position; see `instants`. `earlier` rows belong to a run that is
     continued: their .vtu files, where present, stay in the index. `single` and `compressed` as in
-    `write_frame`.
+    `write_frame`; with `skin` the files hold the pad's surface alone.
     """
 
     def __init__(
@@ -175,9 +198,10 @@ class ParaViewSeries:
         *,
         single: bool = False,
         compressed: bool = False,
+        skin: bool = False,
     ) -> None:
         self.path = Path(path)
-        self.single, self.compressed = single, compressed
+        self.single, self.compressed, self.skin = single, compressed, skin
         if self.path.suffix != ".pvd":
             raise InputError("path", str(path), "a file name that ends in .pvd")
         self._mesh: Mesh | None = None
@@ -200,6 +224,10 @@ class ParaViewSeries:
     def add(self, row: Row, frame: Frame, mesh: Mesh) -> None:
         """Write the fields of one step; the index follows with `write_index`."""
         path = self.frame_path(frame.step)
+        if self.skin:
+            mesh, nodes, behind = skin_of(mesh)
+            fields = {name: getattr(frame, name)[nodes] for name in ("displacement", *POINT_FIELDS)}
+            frame = replace(frame, **fields, **{name: getattr(frame, name)[behind] for name in CELL_FIELDS})
         write_frame(mesh, frame, path, single=self.single, compressed=self.compressed)
         self._rows = [old for old in self._rows if old["step"] < row["step"]] + [row]
 

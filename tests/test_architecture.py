@@ -37,13 +37,13 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid dielectrics charges alternating roughness "
-        "forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges alternating "
+        "roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction signorini follower condensed "
-        "coulomb sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield signorini follower "
+        "condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -53,7 +53,7 @@ ROOMS = {
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "timescales spatial plan",
+        "fieldchoice timescales spatial plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
@@ -67,13 +67,15 @@ ROOMS = {
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
-        "texture generate library cleaning importing scans parametric touch estimators database commands",
+        "texture generate library cleaning importing scans parametric touch estimators database "
+        "estimate feeling commands",
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
         "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
         "fits tractions meshes movie",
     ),
+    "studio": ({"numpy"}, "state page runs server"),
 }
 #: modules outside the rooms: below all of them, after electrostatics, and above all of them
 GROUND, MIDDLE, EDGES = (

@@ -9,13 +9,26 @@ import numpy as np
 import pytest
 from tools.fakes import fake_frame, fake_result, fake_row
 from tools.meshes import KINDS, square_mesh
+from tools.solids import block
 
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError, StorageError
-from evfem.export import FieldFiles, ParaViewSeries, frame_size, instants, paraview, write_frame
+from evfem.export import (
+    TAGS,
+    FieldFiles,
+    ParaViewSeries,
+    frame_in,
+    frame_size,
+    instants,
+    paraview,
+    skin_of,
+    write_frame,
+)
 from evfem.finger.fingerpad import FingerPad
+from evfem.mesh.mesh import raised
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene
+from evfem.simulation.result import POINT_FIELDS, Frame
 
 POINT_DATA = (
     "displacement",
@@ -194,3 +207,51 @@ def test_wrong_ending_and_missing_folder_get_a_sentence(tmp_path):
     with pytest.raises(StorageError, match="cannot write"):
         paraview(fake_result(), tmp_path / "nowhere" / "slide.pvd")
     assert not list(tmp_path.iterdir())
+
+
+def solid_result(order):
+    """A block of hexahedra, pressed a little, with fields that tell nodes and cells apart."""
+    mesh = block((2, 2, 3), (2.0, 2.0, 3.0))
+    sets = {"pad": mesh.node_sets["bottom"], "bone": mesh.node_sets["top"]}
+    mesh = raised(replace(mesh, node_sets=sets)) if order == 2 else replace(mesh, node_sets=sets)
+    N, E = len(mesh.points), len(mesh.cells)
+    fields = dict.fromkeys(POINT_FIELDS, np.arange(N, dtype=float)) | {"J": np.arange(E, dtype=float)}
+    fields["contact_status"] = np.arange(N) % 3
+    stress = np.arange(6.0 * E).reshape(E, 6)
+    return mesh, Frame(
+        3, 0.0, 0.5, 0.1 * mesh.points, **fields, von_mises=np.arange(E) + 0.5, cauchy_stress=stress
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_solid_is_read_back_with_all_its_fields(order, tmp_path):
+    mesh, frame = solid_result(order)
+    write_frame(mesh, frame, tmp_path / "solid.vtu")
+    read = meshio.read(tmp_path / "solid.vtu")
+    assert [one.type for one in read.cells] == [mesh.kind]
+    np.testing.assert_array_equal(read.points, mesh.points)
+    np.testing.assert_array_equal(read.point_data["displacement"], frame.displacement)
+    np.testing.assert_array_equal(read.cell_data["cauchy_stress"][0], frame.cauchy_stress)
+    again = frame_in(tmp_path / "solid.vtu", {"step": 3, "time": 0.0, "position": 0.5}, mesh)
+    np.testing.assert_array_equal(again.displacement, frame.displacement)
+    size = (tmp_path / "solid.vtu").stat().st_size
+    assert frame_size(mesh) == pytest.approx(size, abs=TAGS)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_skin_has_its_nodes_and_the_cells_behind_its_faces(order, tmp_path):
+    mesh, frame = solid_result(order)
+    series = ParaViewSeries(tmp_path / "skin.pvd", skin=True)
+    series.add({"step": 3, "time": 0.0, "position": 0.5}, frame, mesh)
+    read = meshio.read(tmp_path / "skin_00003.vtu")
+    assert [one.type for one in read.cells] == [{1: "quad", 2: "quad9"}[order]]
+    assert len(read.cells[0].data) == 6
+    np.testing.assert_array_equal(read.points[:, 1], 0.0)
+    np.testing.assert_array_equal(read.point_data["displacement"], 0.1 * read.points)
+    nodes = read.point_data["gap"].astype(int)
+    np.testing.assert_array_equal(mesh.points[nodes], read.points)
+    middles = read.points[read.cells[0].data[:, :4]].mean(axis=1)
+    above = mesh.points[mesh.cells[read.cell_data["J"][0].astype(int)][:, :8]].mean(axis=1)
+    np.testing.assert_allclose(above - middles, np.broadcast_to([0.0, 0.5, 0.0], above.shape), atol=1e-12)
+    with pytest.raises(InputError, match="three dimensions"):
+        skin_of(square_mesh("quad"))

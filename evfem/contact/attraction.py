@@ -109,6 +109,15 @@ class Attraction:
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 
+    #: whether `work` is known from an energy
+    has_energy = False
+
+    def column_forces(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """The forces (P, 2) whose derivative is `stiffness`."""
+        return self.forces(position, voltage, touching, pressing)
+
     def forces_along(
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:

@@ -37,12 +37,17 @@ RADII = (1.0, 2.0, 4.0)
 
 def columns_sum(x: Floats, distance: Floats) -> float:
     """Integral of 1 / H over the polyline `distance` (mm)."""
+    return float(np.sum(_columns(x, distance)))
+
+
+def _columns(x: Floats, distance: Floats) -> Floats:
+    """The integral of 1 / H over each piece of a polyline."""
     dx, a, b = np.diff(x), distance[:-1], distance[1:]
     ratio = (b - a) / a
     small = np.abs(ratio) < 1e-5
     safe = np.where(small, 1.0, ratio)
     mean = np.where(small, 1.0 - ratio / 2.0 + ratio**2 / 3.0, np.log1p(safe) / safe)
-    return float(np.sum(dx / a * mean))
+    return np.asarray(dx / a * mean)
 
 
 def upper_sum(x: Floats, distance: Floats, reduced: float, eps_r: float) -> float:
@@ -51,8 +56,7 @@ def upper_sum(x: Floats, distance: Floats, reduced: float, eps_r: float) -> floa
     slope = np.divide(b - a, dx, out=np.zeros_like(dx), where=dx > 0.0)
     fourth = dx * (a * a + a * b + b * b) / (3.0 * (a * b) ** 3)
     spreading = (eps_r**2 - 1.0) * reduced**3 * float(np.sum(slope**2 * fourth)) / 3.0
-    pieces = np.array([columns_sum(x[k : k + 2], distance[k : k + 2]) for k in range(dx.size)])
-    return float(np.sum(pieces * (1.0 + slope**2 / 3.0))) + spreading
+    return float(np.sum(_columns(x, distance) * (1.0 + slope**2 / 3.0))) + spreading
 
 
 def capacitance_bounds(outline: Outline, thickness: float = 0.0, eps_r: float = 1.0) -> tuple[float, float]:
@@ -64,14 +68,24 @@ def capacitance_bounds(outline: Outline, thickness: float = 0.0, eps_r: float = 
     """
     reduced = thickness / eps_r
     lower = columns_sum(outline.x, outline.height + reduced)
+    if outline.periodic:
+        return eps_0 * lower, eps_0 * least_upper_sum(outline.x, outline.height, thickness, eps_r, True)
     uppers = []
     for slope in SLOPES:
-        below = (spread_around if outline.periodic else spread)(outline.x, outline.height, slope)
+        below = spread(outline.x, outline.height, slope)
         upper = upper_sum(outline.x, below + reduced, reduced, eps_r)
-        if not outline.periodic:
-            upper += surroundings(outline, (float(below[0]), float(below[-1])), thickness, eps_r)
-        uppers.append(upper)
+        uppers.append(upper + surroundings(outline, (float(below[0]), float(below[-1])), thickness, eps_r))
     return eps_0 * lower, eps_0 * min(uppers)
+
+
+def least_upper_sum(
+    x: Floats, height: Floats, thickness: float, eps_r: float, periodic: bool = False
+) -> float:
+    """The least of `upper_sum` over lower envelopes of a polyline whose ends are planes of symmetry, or
+    of one that is `periodic`.
+    """
+    reduced, envelope = thickness / eps_r, spread_around if periodic else spread
+    return min(upper_sum(x, envelope(x, height, slope) + reduced, reduced, eps_r) for slope in SLOPES)
 
 
 def surroundings(outline: Outline, ends: tuple[float, float], thickness: float, eps_r: float) -> float:

@@ -239,6 +239,8 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("scene", quoted(scene), "a Scene")
     if not scene.ground.is_flat:
         raise InputError("surface", type(scene.surface).__name__, "a flat surface with the fast model")
+    if scene.field != "local":
+        raise InputError("electrostatics.field", quoted(scene.field), "local with the fast model")
     if scene.solver.dynamics != "quasistatic":
         raise InputError("solver.dynamics", quoted(scene.solver.dynamics), "quasistatic with the fast model")
     if scene.solver.contact != "exact":

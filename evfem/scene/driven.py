@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
 from evfem.electrostatics.charges import Sandwich, constants
 from evfem.electrostatics.drive import Drive, mean_law
@@ -41,6 +42,25 @@ def frequency(scene: Any) -> float | None:
     if drive.resolved and isinstance(voltage, TimeSignal):
         return voltage.highest_frequency or None
     return None
+
+
+def skin_thickness(electrical: Any, mesh: Any, nodes: Ints) -> Floats:
+    """Thickness (P,) in mm of the skin's insulating layer above pad nodes: a given one, or the local
+    one of the mesh.
+    """
+    thickness = None if electrical is None else electrical.stratum_corneum_thickness
+    if thickness is None:
+        if electrical is None or "stratum_corneum" not in mesh.region_names:
+            allowed = (
+                "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+            )
+            raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
+        from evfem.mesh import faces
+        from evfem.mesh import mesh as edges
+
+        kind = faces if mesh.dim == 3 else edges
+        thickness = kind.layer_thickness(mesh, "stratum_corneum", nodes)
+    return np.broadcast_to(thickness, nodes.shape).astype(float)
 
 
 def solids(scene: Any, thickness: Values, eps_r: float) -> tuple[Layer, Layer]:

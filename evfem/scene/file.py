@@ -218,7 +218,7 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
     voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
-    same = {name: getattr(table, name) for name in ("air_layer", "direction", "coupling")}
+    same = {name: getattr(table, name) for name in ("air_layer", "direction", "field", "coupling")}
     same["roughness_gap"] = _roughness(table.roughness_gap)
     return {"law": law, "voltage": voltage, "drive": drive, **same}
 

@@ -21,7 +21,7 @@ from evfem.electrostatics.timesignals import FASTEST
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
-from evfem.scene.scene import COUPLINGS, DIRECTIONS, Output, Solver
+from evfem.scene.scene import COUPLINGS, DIRECTIONS, FIELDS, Output, Solver
 from evfem.solver.strategy import Strategy
 
 # A field's description is what an error says is allowed.
@@ -160,6 +160,7 @@ class ElectrostaticsTable(Table):
     gap_eps_r: float = optional("a relative permittivity, at least 1", 1.0)
     air_layer: bool = optional("true | false", True)
     direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
+    field: Literal[FIELDS] = optional(" | ".join(FIELDS), FIELDS[0])  # type: ignore[valid-type]
     coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
     roughness_gap: float | dict[str, Any] = optional(
         "a length in mm from 0 to 1, or a table [electrostatics.roughness_gap] with a law", 0.0

@@ -156,6 +156,7 @@ ELECTROSTATICS = {
     "gap_eps_r": Text("", "relative permittivity of what fills the gap", "", RELATIVE),
     "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
+    "field": Text("", "full: Poisson's problem, not column by column; auto: where it matters"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
     "roughness_gap": Text("mm", "what rough skin keeps between itself and the insulator in contact"),
 }

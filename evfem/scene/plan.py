@@ -146,6 +146,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         _contact(scene),
         _friction(scene),
         _electricity(scene),
+        *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
         _forms(scene, mesh),
@@ -231,6 +232,16 @@ def _electricity(scene: Scene) -> Term:
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
     return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}")
+
+
+def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
+    """What bounds say of the full field, where a scene asks for it or leaves the choice."""
+    if scene.field == "local" or scene.law is None or largest_voltage(scene) == 0.0:
+        return ()
+    from evfem.scene.fieldchoice import chosen_field
+
+    choice = chosen_field(scene, mesh)
+    return (Term("full field", choice.full, choice.reason),)
 
 
 def _roughness(scene: Scene) -> str:

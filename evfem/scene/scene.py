@@ -28,6 +28,7 @@ from evfem.common.views import called, changed, short, table
 from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
+from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
@@ -43,6 +44,8 @@ DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
 PRECISIONS = ("single", "double")
+#: the attraction column by column, by Poisson's problem, or whichever the bounds ask for
+FIELDS = ("local", "full", "auto")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
@@ -154,10 +157,12 @@ class Scene:
     alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
     surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
     or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
-    `friction_law` says what the surface's coefficient of friction means (`Coulomb`,
-    `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`, `AgeingFriction` or one's own). `depth`
-    (mm) is how deep the plane finger is meant to be; it changes no number but adds `Result.total`,
-    in N and mm2. Raises InputError for anything that does not fit together.
+    `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
+    "auto" where bounds say that it matters. `friction_law` says what the surface's coefficient of
+    friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
+    `AgeingFriction` or one's own). `depth` (mm) is how deep the plane finger is meant to be; it
+    changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything that
+    does not fit together.
     """
 
     finger: Finger
@@ -176,6 +181,7 @@ class Scene:
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
     depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
+    field: str = field(default="local", kw_only=True)  # the last one: from here on `field` is its default
 
     def __post_init__(self) -> None:
         _check_parts(self)
@@ -273,6 +279,7 @@ def _check_electrostatics(scene: Scene) -> None:
     if not isinstance(scene.air_layer, bool):
         raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
     _check_roughness(scene)
+    _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
         voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
@@ -302,6 +309,22 @@ def _check_roughness(scene: Scene) -> None:
     if rough is not None and scene.law is None:
         allowed = "only with a law of attraction: without one it changes nothing"
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
+
+
+def _check_field(scene: Scene) -> None:
+    choice("electrostatics.field", scene.field, FIELDS)
+    if scene.field == "local":
+        return
+    reasons = {
+        "no law": scene.law is None,
+        "air_layer = false": not scene.air_layer,
+        "a drive": scene.drive is not None,
+        type(scene.law).__name__: scene.field == "full" and type(scene.law) is not StrongTroxel,
+    }
+    against = [reason for reason, applies in reasons.items() if applies]
+    if against:
+        allowed = "local, or StrongTroxel (the law of rigid layers) with its air layer and without a drive"
+        raise InputError("electrostatics.field", f"{scene.field} with {against[0]}", allowed)
 
 
 def _check_friction(scene: Scene) -> None:

@@ -157,7 +157,8 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
     if (rough := scene.roughness_gap) != 0.0:
         table["roughness_gap"] = _roughness_key(rough)
-    return table | {"air_layer": scene.air_layer, "direction": scene.direction, "coupling": scene.coupling}
+    same = ("air_layer", "direction", "coupling", *(() if scene.field == "local" else ("field",)))
+    return table | {name: getattr(scene, name) for name in same}
 
 
 def _drive_keys(drive: Drive) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.driven import attracting, lossless, sandwich, solids
+from evfem.scene.driven import attracting, lossless, sandwich, skin_thickness, solids
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.terms import Boundary
@@ -123,27 +123,24 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
 def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
     electrical = scene.finger.electrical
-    thickness = None if electrical is None else electrical.stratum_corneum_thickness
-    if thickness is None:
-        if electrical is None or "stratum_corneum" not in mesh.region_names:
-            allowed = (
-                "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
-            )
-            raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
-        from evfem.mesh import faces
-        from evfem.mesh import mesh as edges
-
-        kind = faces if mesh.dim == 3 else edges
-        thickness = kind.layer_thickness(mesh, "stratum_corneum", pad.nodes)
+    thickness = skin_thickness(electrical, mesh, pad.nodes)
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
-    thickness = np.broadcast_to(thickness, pad.nodes.shape).astype(float)
     skin, insulator = solids(scene, thickness, electrical.stratum_corneum_eps_r)
     law, layers = attracting(scene, skin, insulator)
     rough, charging = roughness_of(scene.roughness_gap), None
     if scene.drive is not None and scene.drive.resolved:
         charging = Charging(sandwich(scene, skin, insulator), pad.nodes.size)
-    return Attraction(law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
+    local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
+    if scene.field == "local":
+        return Attraction(*local)
+    from evfem.contact.fullfield import FieldAttraction, facing
+    from evfem.scene.fieldchoice import chosen_field
+
+    if not chosen_field(scene, mesh).full:
+        return Attraction(*local)
+    assert isinstance(pad, Pad)
+    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin)
 
 
 def _check_quadratic(scene: Scene) -> None:

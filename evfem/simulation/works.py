@@ -67,6 +67,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -194,6 +195,10 @@ class Part:
             return self._work_of_charged(model.attraction.charging, moved)
         if model.attraction is None or (old.voltage == 0.0 and new.voltage == 0.0):
             return trapezoidal
+        if model.attraction.has_energy:
+            begin, end = (model.equilibrium.interface.resting(state) for state in (old, new))
+            own: Any = model.attraction
+            return trapezoidal + own.beyond_trapezoidal(begin, end, (old.voltage, new.voltage))
         open_ = ~(old.touching | new.touching)
         # trapezoidal only on the way with the bone, and only where that is not stopped by the surface
         along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)

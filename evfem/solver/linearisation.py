@@ -177,7 +177,9 @@ class Linearisation:
         everywhere = replace(state, status=np.full_like(state.status, STICK))
         pressing = state.contact_force[:, 0]
         now, closed = (
-            self.attraction.forces(self.interface.resting(s), state.voltage, self.touching, pressing)[:, 1]
+            self.attraction.column_forces(self.interface.resting(s), state.voltage, self.touching, pressing)[
+                :, 1
+            ]
             for s in (state, everywhere)
         )
         gain, rough = np.maximum(now - closed, 0.0), self.roughness(state)
@@ -198,7 +200,8 @@ class Linearisation:
             return None
         place, pressing = self.interface.resting(state), state.contact_force[:, 0]
         unpressed, pressed = (
-            attraction.forces(place, state.voltage, self.touching, each)[:, 1] for each in (None, pressing)
+            attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
+            for each in (None, pressing)
         )
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
         return Roughness(np.minimum(gain, STABLE), unpressed - pressed)

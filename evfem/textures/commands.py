@@ -8,17 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem.common.notices import status
+from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text
+from evfem.electrostatics.signalfile import write_signal
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
 from evfem.textures.cleaning import Cleaning
+from evfem.textures.estimate import estimate
+from evfem.textures.feeling import Device, exact_voltage, playback, render
 from evfem.textures.generate import Knobs, make
 from evfem.textures.importing import Source, from_csv, from_image, from_recording
 from evfem.textures.library import about, find, names, reference
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture, is_data, write
-from evfem.textures.touch import FrictionCurve, Touch, simulate_texture
+from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture
 
 #: what each way of importing takes beside name, licence and note
 OPTIONS = {
@@ -38,6 +42,7 @@ def run(given: argparse.Namespace) -> None:
         "make": _make,
         "import": _import,
         "simulate": _simulate,
+        "estimate": _estimate,
         "database": _database,
     }
     commands[given.what](given)
@@ -129,11 +134,69 @@ def touch_of(given: argparse.Namespace) -> Touch:
 
 
 def _simulate(given: argparse.Namespace) -> None:
-    texture, touch = find(given.name), touch_of(given)
-    _check_curve_file(given.out)
+    texture, touch, device = find(given.name), touch_of(given), device_of(given)
+    _check_outputs(given)
     with status(f"sliding over {texture.name}"):
-        curve = simulate_texture(texture, touch)
+        if given.exact:
+            found = exact_voltage(texture, touch, device)
+            curve = friction_of(found.reference.result)
+        else:
+            curve = simulate_texture(texture, touch)
     _curve(curve, given.out)
+    if given.exact:
+        print(f"exact: {found.comparison}")
+        _signal(found.voltage, touch, device, given.signal)
+    elif given.signal is not None:
+        _render(curve, touch, device, given.signal)
+
+
+def _estimate(given: argparse.Namespace) -> None:
+    touch, device = touch_of(given), device_of(given)
+    _check_outputs(given)
+    found = estimate(find(given.name), touch, given.method)
+    _curve(found.curve, given.out)
+    for note in found.notes:
+        tell(f"note: {note}")
+    if given.signal is not None:
+        _render(found.curve, touch, device, given.signal)
+
+
+def device_of(given: argparse.Namespace) -> Device:
+    """The display's part of the arguments."""
+    return Device(given.display, given.law, given.insulator, given.voltage_max, given.slew)
+
+
+def _check_outputs(given: argparse.Namespace) -> None:
+    """Before anything is computed."""
+    for key, path, endings in (
+        ("--out", given.out, (".csv",)),
+        ("--signal", given.signal, (".csv", ".wav", ".png", ".hjif")),
+    ):
+        if path is not None and path.suffix.lower() not in endings:
+            raise InputError(key, quoted(str(path)), f"a file called {', '.join(endings)}")
+        if path is not None and is_data(path):
+            raise InputError(key, f"{path}, which has the rows of a texture", "another file")
+
+
+def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path) -> None:
+    """Print how good the voltage is, and write it."""
+    found = render(curve, touch, device)
+    print(
+        f"up to {found.signal.largest:.4g} V, rms {found.signal.rms:.4g} V; {found.lost.mean():.0%} of the "
+        f"slide cannot be rendered; error in force {found.force_error:.2%}, in spectrum "
+        f"{found.spectrum_error:.2%}"
+    )
+    for low, high, error, share in found.bands:
+        if share > 1e-3:
+            print(f"  {low:g} to {high:g} Hz: error {error:.2%}, with {share:.1%} of the wish's power")
+    _signal(found.signal.profile, touch, device, path)
+
+
+def _signal(profile: VoltageProfile, touch: Touch, device: Device, path: Path | None) -> None:
+    if path is None:
+        return
+    write_signal(path, profile, playback(profile, touch, device))
+    print(path, flush=True)
 
 
 def _curve(curve: FrictionCurve, out: Path | None) -> None:
@@ -146,14 +209,6 @@ def _curve(curve: FrictionCurve, out: Path | None) -> None:
     rows = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
     write_text(out, csv_text([["x", "friction"], *rows]))
     print(out, flush=True)
-
-
-def _check_curve_file(out: Path | None) -> None:
-    """Raise InputError, before anything is computed, for a file that a curve does not go to."""
-    if out is not None and out.suffix.lower() != ".csv":
-        raise InputError("--out", quoted(str(out)), "a file called .csv")
-    if out is not None and is_data(out):
-        raise InputError("--out", f"{out}, which has the rows of a texture", "another file called .csv")
 
 
 def _database(given: argparse.Namespace) -> None:

@@ -1,15 +1,19 @@
 """The database of parametric textures: which points it has, how it is computed, and its file.
 
-Each of both fingers has the 64 corners of the box of `RANGES`, so that the convex hull of the points
-is the box, and `INNER` points of Sobol's sequence in it (Sobol 1967,
-doi:10.1016/0041-5553(67)90144-9). `compute_database` runs `parametric.scene` of every point; what is
-finished lies in its folder and is not computed again.
+Each of both fingers has `INNER` points of Sobol's sequence in the box of `RANGES` (Sobol 1967,
+doi:10.1016/0041-5553(67)90144-9) and the corners of the box, without the 16 at which the shortest
+wave is the steepest: sliding snaps from crest to crest there, and takes fifty times longer.
+`compute_database` runs `parametric.scene` of every point; what is finished lies in its folder and
+is not computed again. Beside each curve stands how wrong each estimator is there when it does not
+know the point: the root mean square of (mu - friction) / slope.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache, cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,49 +23,79 @@ from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.notices import milestone
 from evfem.common.storage import alone_in, write_text
-from evfem.common.tables import csv_text
+from evfem.common.tables import csv_text, read_table
+from evfem.errors import InputError
 from evfem.scene.file import dump
 from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.pools import open_pool
 from evfem.sweeps.run import answered, compute
+from evfem.textures.estimators import METHODS, Estimator, best_width, left_out
 from evfem.textures.parametric import RANGES, SAMPLES, Parametric, at, scene
 
 #: points of Sobol's sequence for each finger
 INNER = 192
 FILE = "textures-database.csv"
 CURVE = tuple(f"mu{i:02d}" for i in range(SAMPLES))
+ERRORS = {method: f"error_{method}" for method in METHODS}
 
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Points (N, 6) of one finger and the apparent friction (N, SAMPLES) of a period at each.
+    """Textures (N,) of one finger, and the apparent friction (N, SAMPLES) of a period at each.
 
-    Sample i is the friction F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a zero of the
-    first sine at which the profile rises.
+    Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
+    rises through zero. `errors`: of each method, (N,), NaN where the point is a corner of the hull.
     """
 
-    ridged: bool
     textures: tuple[Parametric, ...]
     friction: Floats
+    errors: Mapping[str, Floats]
 
-    @property
-    def points(self) -> Floats:
-        """Places (N, 6) from 0 to 1."""
-        return np.array([texture.point() for texture in self.textures])
-
-    @property
-    def response(self) -> Floats:
-        """What is interpolated (N, SAMPLES): (mu - friction) / slope."""
+    @cached_property
+    def estimator(self) -> Estimator:
+        """The estimator of responses at places in the box."""
+        points = np.array([texture.point() for texture in self.textures])
         own = np.array([[texture.friction, texture.slope] for texture in self.textures])
-        return (self.friction - own[:, :1]) / own[:, 1:]
+        responses = (self.friction - own[:, :1]) / own[:, 1:]
+        return Estimator(points, responses, best_width(points, responses))
+
+    @property
+    def relative_errors(self) -> dict[str, Floats]:
+        """Each method's errors (N,) as shares of the range of each curve."""
+        slope = np.array([texture.slope for texture in self.textures])
+        return {name: error * slope / np.ptp(self.friction, axis=1) for name, error in self.errors.items()}
+
+    @property
+    def best(self) -> str:
+        """The method with the smallest median of these errors."""
+        return min(self.relative_errors.items(), key=lambda one: float(np.nanmedian(one[1])))[0]
+
+
+def read(path: Path, ridged: bool) -> Database:
+    """The database of one finger in a file that `compute_database` wrote."""
+    table = read_table(path, "database")
+    if list(table) != [*RANGES, "ridged", *CURVE, *ERRORS.values()]:
+        raise InputError("database", f"{path}, with other columns", f"a file called {FILE}")
+    of = table["ridged"] == float(ridged)
+    rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
+    textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
+    friction = np.column_stack([table[name][of] for name in CURVE])
+    return Database(textures, friction, {method: table[name][of] for method, name in ERRORS.items()})
+
+
+@cache
+def shipped(ridged: bool) -> Database:
+    """The database of one finger that comes with evfem."""
+    return read(Path(evfem.__file__).parent / "data" / FILE, ridged)
 
 
 def textures() -> list[Parametric]:
     """Every texture of the database, smooth and ridged in turn."""
     from scipy.stats.qmc import Sobol
 
-    corners = np.array(list(itertools.product((0.0, 1.0), repeat=len(RANGES))))
+    corners = np.array(list(itertools.product((1.0, 0.0), repeat=len(RANGES))))
+    corners = corners[(corners[:, 0] > 0.5) | (corners[:, 1] < 0.5)]  # wavelength, slope
     inner = Sobol(len(RANGES), scramble=False).random(256)[:INNER] + 0.5 / 256
     points = np.concatenate([inner, corners])
     return [at(point, ridged) for point in points for ridged in (False, True)]
@@ -99,12 +133,26 @@ def compute_database(
             milestone("point", len(answers), len(jobs))
 
         compute(_evaluate, waiting, open_pool(workers, scheduler), keep)
-        rows = [_row(one, answers[key]) for key, one in jobs.items() if answers[key].status == "done"]
-        write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE], *rows]))
-    done = len(rows)
-    return folder / FILE, {"done": done, "not converged": len(jobs) - done}
+        done = {one: answers[key] for key, one in jobs.items() if answers[key].status == "done"}
+        rows = [row for ridged in (False, True) for row in _rows(done, ridged)]
+        write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *ERRORS.values()], *rows]))
+    return folder / FILE, {"done": len(done), "not converged": len(jobs) - len(done)}
 
 
-def _row(texture: Parametric, answer: Answer) -> list[str]:
-    values = [f"{getattr(texture, name):.6g}" for name in RANGES]
-    return [*values, str(int(texture.ridged)), *(f"{answer.outputs[name]:.6f}" for name in CURVE)]
+def _rows(done: Mapping[Parametric, Answer], ridged: bool) -> list[list[str]]:
+    """The rows of one finger, with the errors of points that are left out."""
+    textures = tuple(one for one in done if one.ridged == ridged)
+    friction = np.array([[done[one].outputs[name] for name in CURVE] for one in textures], dtype=float)
+    friction = friction.round(6)  # what stands in the file is what is estimated from
+    estimator = Database(textures, friction, {}).estimator
+    errors = [left_out(estimator, method) - estimator.responses for method in METHODS]
+    sizes = np.sqrt(np.mean(np.square(errors), axis=2)).T
+    return [
+        [
+            *(f"{getattr(one, name):.6g}" for name in RANGES),
+            str(int(ridged)),
+            *(f"{mu:.6f}" for mu in curve),
+            *(f"{size:.5g}" for size in beside),
+        ]
+        for one, curve, beside in zip(textures, friction, sizes, strict=True)
+    ]

@@ -26,7 +26,7 @@ from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCO
 from evfem.textures.texture import Texture
 
 #: steps of each mm and of a whole slide, rows of a friction table, mm of texture beside the finger
-STEPS_PER_MM, MOST_STEPS, MOST_TABLE, BESIDE = 20, 400, 9_000, 10.0
+STEPS_PER_MM, MOST_STEPS, MOST_TABLE, BESIDE = 16, 400, 9_000, 10.0
 
 
 @dataclass(frozen=True)

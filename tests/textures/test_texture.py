@@ -130,12 +130,12 @@ def test_a_measurement_of_the_same_name_is_not_replaced(tmp_path):
     assert read(tmp_path / "wave.json").length == 4.0
 
 
-@pytest.mark.parametrize("out", ["wave.csv", "curve.txt"])
-def test_a_curve_goes_to_no_texture_and_is_refused_before_the_slide(tmp_path, capsys, monkeypatch, out):
+@pytest.mark.parametrize(("key", "out"), [("--out", "wave.csv"), ("--signal", "wave.csv")])
+def test_results_go_to_no_texture_and_are_refused_before_the_slide(tmp_path, capsys, monkeypatch, key, out):
     monkeypatch.setattr("evfem.textures.commands.simulate_texture", lambda *_: pytest.fail("was run"))
     _, rows = write(WAVE, tmp_path / "wave.json")
     before = rows.read_text()
-    given = ["texture", "simulate", str(tmp_path / "wave.json"), "--out", str(tmp_path / out)]
+    given = ["texture", "simulate", str(tmp_path / "wave.json"), key, str(tmp_path / out)]
     assert main(given) == 2
-    assert "--out: given" in capsys.readouterr().err
+    assert f"{key}: given" in capsys.readouterr().err
     assert rows.read_text() == before

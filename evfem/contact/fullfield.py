@@ -1,0 +1,260 @@
+r"""The attraction of the pad from the full field instead of column by column.
+
+Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
+problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes,
+on quadratic edges between them too, and move with them (`evfem.electrostatics.columns`). The
+electrode is at the voltage, living tissue at 0; the skin's layer is as thick above each node as it
+is undeformed. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what
+rough faces keep, as a gap in series.
+Nodal forces are derivatives of the discrete energy
+
+.. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
+
+with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
+the column law, which they are close to, so contact, friction and controls know nothing of the
+field. In every accepted state C lies between its bounds (`certificate`).
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sparse
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.attraction import Attraction
+from evfem.contact.pad import Pad, surface_state
+from evfem.electrostatics.bounds import columns_sum, least_upper_sum
+from evfem.electrostatics.columns import Capacitance, Columns
+from evfem.electrostatics.laws import eps_0
+from evfem.errors import EvfemError
+
+#: gap of touching nodes, as a share of the insulator's reduced thickness
+SERIES_GAP = 1e-4
+#: outer edges steeper than this, |n_y| below it, belong to the flanks
+FLANK = 0.3
+#: rows as shares of the layers' heights: fine where insulator and skin meet the air
+INSULATOR = 1.0 - np.linspace(1.0, 0.0, 5) ** 2
+AIR = np.linspace(0.0, 1.0, 5)
+SKIN = np.linspace(0.0, 1.0, 6) ** 2
+#: share by which a discrete capacitance may miss its bounds
+MARGIN = 1e-3
+#: columns below an edge with a middle node
+PARTS = 4
+#: columns follow an outline up to this slope
+STEEP = 6.0
+#: solutions that are remembered
+KEPT = 3
+
+
+def facing(pad: Pad, points: Floats) -> Ints:
+    """Pad edges (K,), from left to right, of the chain that faces the display below the lowest node;
+    `points` (P, 2) of the pad undeformed. Its ends are where the flanks begin.
+    """
+    way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
+    after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
+    before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
+    start = int(np.argmin(points[pad.edges[:, :2], 1].min(axis=1)))
+    chain = [start]
+    while (k := after.get(int(pad.edges[chain[-1], 1]))) is not None and way[k, 0] > 0.0 and k != start:
+        chain.append(k)
+    while (k := before.get(int(pad.edges[chain[0], 0]))) is not None and way[k, 0] > 0.0 and k != chain[-1]:
+        chain.insert(0, k)
+    flat = way[chain, 0] >= FLANK * np.hypot(*way[chain].T)
+    flat[chain.index(start)] = True
+    ends = np.flatnonzero(flat)[[0, -1]]
+    return np.array(chain[ends[0] : ends[1] + 1])
+
+
+def in_line(pad: Pad, edges: Ints) -> Ints:
+    """Pad nodes (L,) of a chain of edges (K,) from left to right."""
+    ends = pad.edges[edges]
+    inner = ends[:, [0, *range(2, ends.shape[1])]].ravel()
+    return np.append(inner, ends[-1, 1])
+
+
+@dataclass(frozen=True, eq=False)
+class Bounds:
+    """Lower and upper bound of a capacitance in F per m of depth (N/V^2); the lower one is the
+    column law's.
+    """
+
+    lower: float
+    upper: float
+
+    @property
+    def spread(self) -> float:
+        """By how much of itself the column law's energy may be too small."""
+        return self.upper / self.lower - 1.0
+
+
+def certificate(x: Floats, gap: Floats, insulator: tuple[float, float], skin: Floats) -> Bounds:
+    """Bounds for an outline without solving: points at `x` (L,) with gaps `gap` (L,) in mm above an
+    insulator of that thickness (mm) and permittivity; `skin` (L,) is the skin's layer, reduced (mm).
+
+    Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
+    are linear along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
+    """
+    thickness, eps_r = insulator
+    reduced = thickness / eps_r
+    lower = columns_sum(x, gap + reduced + skin)
+    return Bounds(eps_0 * lower, eps_0 * least_upper_sum(x, gap, thickness, eps_r))
+
+
+@dataclass(frozen=True, eq=False)
+class FieldAttraction(Attraction):
+    """The attraction of the full field: `edges` (K,) of the pad that face the display, from left to
+    right, and the skin's layer under each pad node, `skin`.
+    """
+
+    edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    skin: Any = None
+    solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
+
+    @property
+    def _plane(self) -> Pad:
+        assert isinstance(self.pad, Pad)
+        return self.pad
+
+    @cached_property
+    def flanks(self) -> Attraction:
+        """The column law on the other edges."""
+        others = np.setdiff1d(np.arange(len(self._plane.edges)), self.edges)
+        pad = replace(self._plane, edges=self._plane.edges[others])
+        return Attraction(self.law, self.layers, pad, self.surface, self.direction, True, self.roughness)
+
+    @cached_property
+    def _lines(self) -> Any:
+        """Sparse (L, P): from values of the pad nodes to those of the lines, from left to right."""
+        ends = self._plane.edges[self.edges]
+        if ends.shape[1] == 2:
+            node = np.append(ends[:, 0], ends[-1, 1])
+            return sparse.csr_matrix(
+                (np.ones(node.size), (np.arange(node.size), node)), (node.size, self._size)
+            )
+        at = np.arange(PARTS) / PARTS
+        shapes = np.stack([(1 - at) * (1 - 2 * at), at * (2 * at - 1), 4 * at * (1 - at)], axis=1)
+        row = np.repeat(np.arange(PARTS * len(ends)), 3)
+        values = np.append(np.tile(shapes.ravel(), len(ends)), 1.0)
+        column = np.append(np.repeat(ends, PARTS, axis=0).ravel(), ends[-1, 1])
+        size = (PARTS * len(ends) + 1, self._size)
+        return sparse.csr_matrix((values, (np.append(row, size[0] - 1), column)), size)
+
+    @property
+    def _size(self) -> int:
+        return int(self.pad.nodes.size)
+
+    def forces_along(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """Forces (W, P, 2) at W places of a way, each from its own solution."""
+        forces = self.flanks.forces_along(positions, voltages, touching, pressing)
+        for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
+            if voltage != 0.0:
+                own = None if pressing is None else pressing[k]
+                forces[k] += voltage**2 * self._unit_forces(position, own)
+        return forces
+
+    def column_forces(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """The column law's forces (P, 2), for the tangent."""
+        pressed = None if pressing is None else pressing[None]
+        return Attraction.forces_along(self, position[None], np.array([voltage]), touching, pressed)[0]
+
+    @property
+    def has_energy(self) -> bool:  # type: ignore[override]
+        """Without rough faces, whose gap depends on the contact forces."""
+        return self.roughness is None
+
+    def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
+        """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
+        work of the forces at its ends (N mm per mm of depth), the squared voltage growing evenly.
+        """
+        self.check(end)
+        squared = [voltage**2 for voltage in voltages]
+        before, after = self.solve(begin), self.solve(end)
+        energy = 0.25 * sum(squared) * (after.value - before.value)
+        ends = zip(squared, (begin, end), strict=True)
+        forces = sum(square * self._unit_forces(at, None) for square, at in ends)
+        return energy - 0.5 * float(np.sum(forces * (end - begin)))
+
+    def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
+        """The field under the pad at `position` (P, 2); the last solutions are remembered."""
+        x, levels = self.outline(position, self.seen(position), pressing)
+        key = x.tobytes() + levels.tobytes()
+        found = self.solved.get(key)
+        if found is None:
+            found = self._columns.solve(x, levels)
+            self.solved[key] = found
+            while len(self.solved) > KEPT:
+                self.solved.popitem(last=False)
+        return found
+
+    @cached_property
+    def _columns(self) -> Columns:
+        layers = [(self.surface.insulator.eps_r, INSULATOR), (getattr(self.law, "gap_eps_r", 1.0), AIR)]
+        if np.max(self.skin.thickness) > 0.0:
+            layers.append((float(self.skin.eps_r), SKIN))
+        return Columns(tuple(eps for eps, _ in layers), tuple(share for _, share in layers))
+
+    def seen(self, position: Floats) -> Any:
+        """The lines (sparse, L x P) at which columns stand: between two that stand one above the other,
+        or nearly so, the higher one is behind an overhang, or deep in a groove.
+        """
+        x, y = (self._lines @ position).T
+        if np.all(np.diff(x) >= np.abs(np.diff(y)) / STEEP):
+            return self._lines
+        kept: list[int] = []
+        for k in range(x.size):
+            while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:
+                kept.pop()
+            if not kept or x[k] - x[kept[-1]] > max(0.0, (y[k] - y[kept[-1]]) / STEEP):
+                kept.append(k)
+        return self._lines[kept]
+
+    def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
+        """x (L,) of columns at `lines` (L, P) and the curves' heights (n + 1, L): electrode, insulator,
+        skin, living tissue.
+        """
+        place = lines @ position
+        frame = surface_state(self.surface, place)
+        insulator = self.surface.insulator
+        rough = self._separation(position[:, 0], pressing) * np.ones(self._size)
+        lowest = SERIES_GAP * insulator.thickness / insulator.eps_r
+        gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
+        ground = place[:, 1] - frame.gap
+        levels = [ground - insulator.thickness, ground, ground + gap]
+        if len(self._columns.eps_r) == 3:
+            levels.append(ground + gap + lines @ self.skin.thickness)
+        return place[:, 0], np.stack(levels)
+
+    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
+        """Forces (P, 2) of the field at 1 V."""
+        found, lines = self.solve(position, pressing), self.seen(position)
+        slope = surface_state(self.surface, lines @ position).slope
+        along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
+        up = found.by_level[2:].sum(axis=0)
+        return np.asarray(0.5 * (lines.T @ np.stack([along, up], axis=1)))
+
+    def bounds(self, x: Floats, levels: Floats) -> Bounds:
+        """The bounds of C between these curves."""
+        insulator = self.surface.insulator
+        skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
+        return certificate(x, levels[2] - levels[1], (insulator.thickness, insulator.eps_r), skin)
+
+    def check(self, position: Floats) -> None:
+        """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its
+        bounds.
+        """
+        bounds = self.bounds(*self.outline(position, self.seen(position)))
+        value = self.solve(position).value
+        if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
+            raise EvfemError(
+                f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds "
+                f"{bounds.lower:.6g} and {bounds.upper:.6g}; a finer mesh of the finger resolves it"
+            )

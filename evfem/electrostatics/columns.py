@@ -1,0 +1,183 @@
+r"""Poisson's problem below a graph over x, in columns of layers: the capacitance and its derivative.
+
+The layers (slab, air, skin) lie one above the other between curves y_l(x), l = 0 ... n, that are
+straight between L lines. Each layer has rows at fixed shares of its height; between two lines each
+row is a quadrilateral with straight sides, on which the potential is linear along the row (the
+lines are as dense as the outline's own nodes) and quadratic across it,
+
+.. math:: x = \sum_k N_k(\xi)\, x_k, \qquad
+          y = (1 - \sigma) \sum_k N_k(\xi)\, y_{l,k} + \sigma \sum_k N_k(\xi)\, y_{l+1,k},
+
+with the share :math:`\sigma` running over the row with :math:`\eta`. The potential is U on the
+lowest curve and 0 on the highest one; on the two ends its normal derivative is zero. With unknowns
+numbered along the lines the matrix of `evfem.electrostatics.poisson.poisson` is a narrow band: it
+needs neither ordering nor symbolic analysis, whatever the outline does.
+
+The derivatives of the discrete C = eps_0 times the minimal integral of eps |grad phi|^2 by all x_k
+and y_lk are exact: C is stationary in the potential, so they are virtual works
+:math:`-2 \int T : \nabla V` of the velocities V with which a curve's point takes the cells along.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.electrostatics.laws import eps_0
+
+#: places and weights of quadrature on (0, 1); linear (2, q) and quadratic (3, q) shape functions there
+_AT, _WEIGHT = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]), np.array([0.5, 0.5])
+_N, _DN = np.stack([1 - _AT, _AT]), np.outer([-1.0, 1.0], np.ones_like(_AT))
+_UP = np.stack([(1 - _AT) * (1 - 2 * _AT), 4 * _AT * (1 - _AT), _AT * (2 * _AT - 1)])
+_DUP = np.stack([4 * _AT - 3, 4 - 8 * _AT, 4 * _AT - 1])
+#: shape functions of a cell
+_SHAPES = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Capacitance:
+    """C in F per m of depth (N/V^2) and its derivatives by the lines' `x` (L,) and by the `levels`
+    (n + 1, L), in N/V^2 per mm; `phi` (L, rows) is the potential at 1 V, `y` (L, rows) where.
+    """
+
+    value: float
+    by_x: Floats
+    by_level: Floats
+    phi: Floats
+    y: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Layers of relative permittivity `eps_r` (n,), from the electrode up, each with rows at the
+    shares `shares[l]` of its height, from 0 to 1.
+    """
+
+    eps_r: tuple[float, ...]
+    shares: tuple[Floats, ...]
+
+    def solve(self, x: Floats, levels: Floats) -> Capacitance:
+        """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
+
+        >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
+        >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
+        >>> round(found.value / eps_0, 9), round(found.by_level[1].sum() / eps_0, 6)
+        (10.0, -100.0)
+        """
+        cells = _Cells(self, x, levels)
+        phi = cells.potential()
+        return cells.capacitance(phi)
+
+
+class _Cells:
+    """Quadrilaterals (rows R, columns E) with four points each, and their shape functions."""
+
+    def __init__(self, columns: Columns, x: Floats, levels: Floats) -> None:
+        self.levels = levels
+        self.layer = np.repeat(np.arange(len(columns.shares)), [s.size - 1 for s in columns.shares])
+        low = np.concatenate([share[:-1] for share in columns.shares])
+        rise = np.concatenate([np.diff(share) for share in columns.shares])
+        self.low, self.rise = low, rise
+        self.lines: Ints = np.arange(x.size - 1)[:, None] + np.arange(2)  # (E, 2)
+        at = levels[:, self.lines]  # (n + 1, E, 2)
+        value, slope = at @ _N, at @ _DN  # (n + 1, E, q)
+        self.x_xi = (x[self.lines] @ _DN)[None, :, :, None]
+        share = (low[:, None] + rise[:, None] * _AT)[:, None, None, :]  # (R, 1, 1, q)
+        bottom, top = self.layer, self.layer + 1
+        height = (value[top] - value[bottom])[..., None]
+        self.share = share
+        self.y_xi = slope[bottom][..., None] + share * (slope[top] - slope[bottom])[..., None]
+        self.y_eta = rise[:, None, None, None] * height
+        eps = np.array(columns.eps_r)[self.layer][:, None, None, None]
+        self.weight = eps * self.x_xi * self.y_eta * np.outer(_WEIGHT, _WEIGHT)  # (R, E, q, q)
+        self.by_x, self.by_y = self._gradients()
+
+    def _gradients(self) -> tuple[Floats, Floats]:
+        """Derivatives of the six shape functions by x and y: (R, E, q, q, 6)."""
+        along = np.einsum("ip,jq->pqij", _DN, _UP).reshape(_AT.size, _AT.size, _SHAPES)
+        up = np.einsum("ip,jq->pqij", _N, _DUP).reshape(_AT.size, _AT.size, _SHAPES)
+        by_y = up / self.y_eta[..., None]
+        return (along - self.y_xi[..., None] * by_y) / self.x_xi[..., None], by_y
+
+    def _matrices(self) -> Floats:
+        """Cell matrices of eps grad u . grad v, (R, E, 6, 6)."""
+        shape = (*self.by_x.shape[:2], -1, _SHAPES)
+        weight = self.weight[..., None]
+        parts = [
+            ((g * weight).reshape(shape).swapaxes(2, 3), g.reshape(shape)) for g in (self.by_x, self.by_y)
+        ]
+        return np.asarray(sum(left @ right for left, right in parts))
+
+    @property
+    def numbers(self) -> Ints:
+        """Numbers (R, E, 6) of the cells' unknowns, along the lines."""
+        rows = 2 * np.arange(self.layer.size)[:, None] + np.arange(3)  # (R, 3)
+        per_line = 2 * self.layer.size + 1
+        number = self.lines[None, :, :, None] * per_line + rows[:, None, None, :]
+        return np.asarray(number.reshape(self.layer.size, self.lines.shape[0], _SHAPES))
+
+    def potential(self) -> Floats:
+        """Potential (L, rows) that is 1 on the lowest curve and 0 on the highest one."""
+        from scipy.linalg import solveh_banded
+
+        self.matrices = self._matrices()
+        per_line, lines = 2 * self.layer.size + 1, int(self.lines[-1, -1]) + 1
+        phi = np.zeros((lines, per_line))
+        phi[:, 0] = 1.0
+        numbers = self.numbers
+        local = self.matrices @ phi.ravel()[numbers][..., None]
+        load = -np.bincount(numbers.ravel(), local.ravel(), phi.size).reshape(phi.shape)
+        width = per_line + 3
+        first = np.broadcast_to(numbers[..., :, None], self.matrices.shape)
+        second = np.broadcast_to(numbers[..., None, :], self.matrices.shape)
+        below = first >= second
+        place = ((first - second) * phi.size + second)[below]
+        band = np.bincount(place, self.matrices[below], width * phi.size).reshape(width, -1)
+        for row in (0, per_line - 1):  # what is known drops out
+            known = np.arange(lines) * per_line + row
+            load[:, row] = 0.0
+            band[:, known] = 0.0
+            for k in range(1, width):
+                before = known[known >= k] - k
+                band[k, before] = 0.0
+            band[0, known] = 1.0
+        free = solveh_banded(band, load.ravel(), lower=True, check_finite=False)
+        return np.asarray(phi + free.reshape(phi.shape))
+
+    def capacitance(self, phi: Floats) -> Capacitance:
+        """C and its derivatives for a potential (L, rows)."""
+        local = phi.ravel()[self.numbers]
+        value = float(np.sum(local * (self.matrices @ local[..., None])[..., 0]))
+        Ex, Ey = (np.einsum("repqa,rea->repq", g, local) for g in (self.by_x, self.by_y))
+        half = 0.5 * (Ex**2 + Ey**2)
+        xx, xy, yy = (self.weight * t for t in (Ex * Ex - half, Ex * Ey, Ey * Ey - half))
+        shape, slope = _N.T[None, None, :, None, :], _DN.T[None, None, :, None, :]  # (1, 1, q, 1, 2)
+        y_xi, y_eta, x_xi = (v[..., None] for v in (self.y_xi, self.y_eta, self.x_xi))
+        share, rise = self.share[..., None], self.rise[:, None, None, None, None]
+
+        def work(along: Floats, up: Floats, shear: Floats, own: Floats) -> Floats:
+            """Minus the stress times the gradient of a velocity with these derivatives by xi and eta."""
+            by_x = (along - y_xi / y_eta * up) / x_xi
+            return -2.0 * np.sum(shear[..., None] * by_x + own[..., None] * up / y_eta, axis=(2, 3))
+
+        moved_x = work(slope + 0.0 * share, 0.0 * share * shape, xx, xy)  # (R, E, 2)
+        lower = work(slope * (1.0 - share), -shape * rise, xy, yy)
+        upper = work(slope * share, shape * rise, xy, yy)
+        lines = phi.shape[0]
+        by_x = np.bincount(self.lines.ravel(), moved_x.sum(axis=0).ravel(), lines)
+        by_level = np.zeros(self.levels.shape)
+        for layer in range(len(self.levels) - 1):
+            own = self.layer == layer
+            for k, part in ((layer, lower), (layer + 1, upper)):
+                by_level[k] += np.bincount(self.lines.ravel(), part[own].sum(axis=0).ravel(), lines)
+        y = self._heights(phi.shape)
+        return Capacitance(eps_0 * value, np.asarray(eps_0 * by_x, float), eps_0 * by_level, phi, y)
+
+    def _heights(self, shape: tuple[int, ...]) -> Floats:
+        y = np.empty(shape)
+        for r, layer in enumerate(self.layer):
+            for k, share in enumerate(self.low[r] + self.rise[r] * np.array([0.0, 0.5, 1.0])):
+                y[:, 2 * r + k] = (1.0 - share) * self.levels[layer] + share * self.levels[layer + 1]
+        return y

@@ -1,0 +1,64 @@
+"""Whether a scene needs the full field, decided by bounds that cost no solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from evfem.contact.fullfield import Bounds, certificate, facing, in_line
+from evfem.contact.pad import make_pad
+from evfem.electrostatics.laws import StrongTroxel
+from evfem.errors import InputError
+from evfem.mesh.mesh import Mesh
+from evfem.scene.driven import skin_thickness
+from evfem.scene.motion import Hover
+from evfem.scene.scene import Scene
+
+#: `field = "auto"` solves for the field where the column law's energy may be too small by more than this
+AUTO = 0.02
+
+
+@dataclass(frozen=True)
+class FieldChoice:
+    """Whether the field is solved for, and the words of the plan."""
+
+    full: bool
+    reason: str
+
+
+def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
+    """The choice of a scene whose `field` is not `local`, from the bounds at first touch, or at the
+    smallest gap of a finger that only hovers.
+    """
+    if mesh.dim == 3:
+        if scene.field == "full":
+            raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")
+        return FieldChoice(False, "column by column: a solid has no other")
+    if type(scene.law) is not StrongTroxel:
+        return FieldChoice(False, f"column by column: {type(scene.law).__name__} is no law of a field")
+    bounds, gap = field_bounds(scene, mesh)
+    share = f"{100.0 * bounds.spread:.2g} %"
+    where = "at first touch" if gap == 0.0 else f"at a gap of {gap:g} mm"
+    text = f"column by column the energy {where} is at most {share} too small"
+    if scene.field == "auto":
+        choice = "more than" if bounds.spread > AUTO else "less than"
+        text += f", {choice} {100.0 * AUTO:g} %"
+    full = scene.field == "full" or bounds.spread > AUTO
+    return FieldChoice(full, f"{'solved for' if full else 'not solved for'}: {text}")
+
+
+def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
+    """Bounds of the undeformed pad's capacitance at the smallest gap (mm) that is certain, and that
+    gap.
+    """
+    pad = make_pad(mesh)
+    position = mesh.points[pad.nodes]
+    hovers = [motion.gap for motion in scene.motion if isinstance(motion, Hover)]
+    gap = min(hovers) if len(hovers) == len(scene.motion) else 0.0
+    line = in_line(pad, facing(pad, position))
+    height = position[:, 1] - scene.ground.height(position[:, 0])
+    electrical = scene.finger.electrical
+    skin = skin_thickness(electrical, mesh, pad.nodes) / electrical.stratum_corneum_eps_r
+    insulator = scene.ground.insulator
+    assert insulator is not None
+    above = (height - height.min() + gap)[line]
+    return certificate(position[line, 0], above, (insulator.thickness, insulator.eps_r), skin[line]), gap

@@ -1,0 +1,122 @@
+"""A run of the model for the page, in a process of its own that ends when nobody listens any more.
+
+The process sends a line per step, then the friction curve with a picture of the deformed pad, then
+a moving picture. Who asked reads them; when the page is closed or the run is cancelled, the next
+line cannot be sent and the process is ended.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import os
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from multiprocessing import Pipe, get_context
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from evfem.errors import EvfemError, InputError
+from evfem.protocols import Observer
+from evfem.studio.state import State, parse
+
+#: runs at the same time, seconds between two signs of life, pictures of the animation
+MOST_RUNS, EVERY, PICTURES = 2, 0.2, 10
+_PLACES = threading.BoundedSemaphore(MOST_RUNS)
+
+
+def run(text: str, send: Callable[[dict[str, Any]], None]) -> None:
+    """Run the model for a state, and `send` what it says until it ends or `send` raises OSError."""
+    parse(text)
+    with _place():
+        context = get_context("spawn")
+        reader, writer = Pipe(duplex=False)
+        process = context.Process(target=_work, args=(writer, text), daemon=True)
+        process.start()
+        writer.close()
+        try:
+            with suppress(EOFError):
+                while True:
+                    send(reader.recv() if reader.poll(EVERY) else {"alive": True})
+        finally:
+            process.kill()
+            process.join()
+            reader.close()
+
+
+@contextmanager
+def _place() -> Iterator[None]:
+    if not _PLACES.acquire(blocking=False):
+        raise InputError("run", f"more than {MOST_RUNS} at once", "to wait until one of them has ended")
+    try:
+        yield
+    finally:
+        _PLACES.release()
+
+
+class _Steps:
+    """Observer that tells how far the run is."""
+
+    def __init__(self, send: Callable[[dict[str, Any]], None]) -> None:
+        self.send = send
+
+    def started(self, mesh: object, scene: object, total_steps: int) -> None:
+        """The run begins."""
+        self.total = total_steps
+        self.send({"step": 0, "of": total_steps})
+
+    def step(self, row: Any, frame: object, checkpoint: object) -> None:
+        """A step has converged."""
+        self.send({"step": int(row["step"]), "of": self.total})
+
+
+def _work(writer: Connection, text: str) -> None:
+    """In the process: run, and send what is found."""
+    os.environ["MPLBACKEND"] = "agg"
+    try:
+        _sent(writer.send, parse(text))
+    except EvfemError as error:
+        writer.send({"error": str(error)})
+    except (BrokenPipeError, KeyboardInterrupt):
+        pass
+    finally:
+        writer.close()
+
+
+def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:
+    from evfem.simulation.run import simulate
+    from evfem.textures.touch import friction_of, touch_scene
+
+    scene = touch_scene(state.texture, state.touch)
+    steps = sum(one.steps for one in scene.motion)
+    scene = touch_scene(state.texture, state.touch, every=max(steps // PICTURES, 1))
+    observer: Observer = _Steps(send)
+    result = simulate(scene, observers=(observer,))
+    curve = friction_of(result)
+    told = {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}
+    send({"curve": told})
+    send({"picture": _picture(result)})
+    send({"animation": _animation(result)})
+
+
+def _picture(result: Any) -> str:
+    """The deformed pad near its contact as a PNG in base 64."""
+    from evfem.plotting.figures import whole_figure
+    from evfem.plotting.finger import deformed
+
+    axes = deformed(result, near="contact")
+    buffer = io.BytesIO()
+    whole_figure(axes).savefig(buffer, format="png", dpi=110)
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def _animation(result: Any) -> str:
+    """The frames of the slide as a GIF in base 64."""
+    from evfem.plotting.movie import animate
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = animate(result, Path(folder) / "slide.gif", near="contact", progress=False)
+        return base64.b64encode(path.read_bytes()).decode()

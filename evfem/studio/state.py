@@ -1,0 +1,139 @@
+"""What the page sends: a texture, a finger, a display; checked as strictly as a file.
+
+The page keeps all of it, the server nothing: two pages cannot mix, and a link holds what it shows.
+A texture that was drawn or uploaded travels as its rows.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from evfem.common.checks import choice
+from evfem.errors import InputError, quoted
+from evfem.textures.estimate import BEST, CHOICES
+from evfem.textures.feeling import Device
+from evfem.textures.generate import Knobs, make
+from evfem.textures.library import reference
+from evfem.textures.texture import Texture
+from evfem.textures.touch import FrictionCurve, Touch
+
+#: most rows of a texture, and of a friction curve, that a page sends
+MOST_ROWS = 2000
+KEYS = ("texture", "touch", "device", "method")
+ROWS = ("name", "kind", "x", "values", "licence", "quantity", "period", "provenance")
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything that decides what the page shows; `model` is the model's friction curve where the
+    page has one for this texture and touch.
+
+    >>> state = parse('{"texture": {"reference": "weave"}, "touch": {"load": 0.04}}')
+    >>> state.texture.name, state.touch.load, state.device.law, state.method
+    ('weave', 0.04, 'kaczmarek', 'best')
+    """
+
+    texture: Texture
+    touch: Touch
+    device: Device
+    method: str = BEST
+    model: FrictionCurve | None = None
+
+
+def parse(text: str | bytes) -> State:
+    """The state in a JSON text; InputError for anything else."""
+    try:
+        table = json.loads(text)
+    except (ValueError, RecursionError):
+        raise InputError("state", "no JSON", "what the page sends") from None
+    table = _table("state", table, (*KEYS, "model"))
+    return State(
+        _texture(table.get("texture", {"reference": "weave"})),
+        _build(Touch, "touch", table.get("touch", {})),
+        _build(Device, "device", table.get("device", {})),
+        choice("method", table.get("method", BEST), CHOICES),
+        _model(table.get("model")),
+    )
+
+
+def _table(key: str, given: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
+    if not isinstance(given, dict):
+        raise InputError(key, quoted(given), "an object")
+    odd = sorted(set(given) - set(keys))
+    if odd:
+        raise InputError(key, quoted(odd[0]), ", ".join(keys))
+    return given
+
+
+def _build(cls: Any, key: str, given: Any) -> Any:
+    return cls(**_table(key, given, tuple(spec.name for spec in fields(cls))))
+
+
+def _texture(given: Any) -> Texture:
+    """A reference texture, one by three knobs, or one by its rows."""
+    if isinstance(given, dict) and "reference" in given:
+        name = _table("texture", given, ("reference",))["reference"]
+        if not isinstance(name, str):
+            raise InputError("texture", quoted(name), "the name of a reference texture")
+        return reference(name)
+    if isinstance(given, dict) and "generator" in given:
+        names = tuple(spec.name for spec in fields(Knobs))
+        knobs = dict(_table("texture", given, ("generator", *names)))
+        kind = knobs.pop("generator")
+        return make(kind, Knobs(**knobs), "dialled")
+    table = _table("texture", given, ROWS)
+    missing = [key for key in ("x", "values", "licence") if key not in table]
+    if missing:
+        raise InputError("texture", f"no {missing[0]}", f"reference, generator, or {', '.join(ROWS)}")
+    size = len(table["x"]) if isinstance(table["x"], list) else 0
+    if not 2 <= size <= MOST_ROWS:
+        raise InputError("texture", f"{size} rows", f"2 to {MOST_ROWS} rows")
+    own = {"name": "drawn", "kind": "drawn", **table, "provenance": _notes(table.get("provenance", []))}
+    return Texture(**own)
+
+
+def _notes(given: Any) -> tuple[str, ...]:
+    if not isinstance(given, list):
+        raise InputError("provenance", quoted(given), "a list of sentences")
+    return tuple(given)
+
+
+def rows(texture: Texture) -> dict[str, Any]:
+    """A texture as the page keeps it: at most `MOST_ROWS` rows, others in between left out."""
+    x, values, notes = texture.x, texture.values, list(texture.provenance)
+    if x.size > MOST_ROWS:
+        few = np.linspace(x[0], x[-1], MOST_ROWS)
+        x, values = few, np.interp(few, x, values)
+        notes.append(f"{MOST_ROWS} of {texture.x.size} rows kept by the studio.")
+    return {
+        "name": texture.name,
+        "kind": texture.kind,
+        "x": np.round(x, 6).tolist(),
+        "values": np.round(values, 8).tolist(),
+        "licence": texture.licence,
+        "quantity": texture.quantity,
+        "period": texture.period,
+        "provenance": notes,
+    }
+
+
+def _model(given: Any) -> FrictionCurve | None:
+    if given is None:
+        return None
+    table = _table("model", given, ("x", "friction"))
+    both = [np.asarray(table.get(key, []), dtype=object) for key in ("x", "friction")]
+    sizes = {one.shape for one in both}
+    numbers = all(type(value) in (int, float) for one in both for value in one.ravel())
+    if len(sizes) != 1 or not numbers or not 16 <= both[0].size <= MOST_ROWS or both[0].ndim != 1:
+        raise InputError("model", "another shape", f"x and friction, 16 to {MOST_ROWS} numbers each")
+    x, friction = (one.astype(float) for one in both)
+    if not (np.isfinite(x).all() and np.isfinite(friction).all() and (np.diff(x) > 0.0).all()):
+        raise InputError("model", "numbers that are not finite or do not rise", "a curve of the model")
+    if np.abs(friction).max() > 100.0 or np.abs(x).max() > 1e4:
+        raise InputError("model", "numbers out of range", "a curve of the model")
+    return FrictionCurve(x, friction, "model")

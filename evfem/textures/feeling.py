@@ -1,0 +1,192 @@
+r"""From a friction curve to a display's voltage, and how good that rendering is.
+
+The voltage is that of the closed forms (`rendering.voltage_for`), of whatever curve: estimated,
+measured or the model's; `exact_voltage` asks the coupled model instead. What the display then gives
+is ``mu = mu_d (1 + F_e / F_n)``, with the amplifier's limits in it. Compared are::
+
+    force      ||F - F_wish|| / ||F_wish||
+    changes    the same without both means: what texture is felt by
+    spectrum   ||a - a_wish|| / ||a_wish|| of the one-sided amplitudes, the mean left out
+    bands      the same within each band of frequencies, spatial frequency times speed
+
+A place cannot be rendered where the wish is below the display's own friction, because attraction
+only adds to it, and where the amplifier cannot follow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, check_fields, number, one_of
+from evfem.contact.surfaces import Display
+from evfem.electrostatics.encoding import AreaLaw, Encoding
+from evfem.electrostatics.laws import FILM, TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.signalfile import Playback
+from evfem.electrostatics.signals import Amplifier, VoltageProfile
+from evfem.protocols import ForceLaw
+from evfem.simulation.rendering import (
+    NOISE,
+    ApparentFriction,
+    Comparison,
+    Recording,
+    Signal,
+    compare,
+    exact,
+    record,
+    voltage_for,
+)
+from evfem.textures.texture import Texture
+from evfem.textures.touch import FrictionCurve, Touch, touch_scene
+
+#: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
+BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
+LAWS: Mapping[str, Callable[[], ForceLaw]] = {"kaczmarek": Kaczmarek, "strong_troxel": StrongTroxel}
+INSULATORS = {"film": FILM, "touchscreen": TOUCHSCREEN}
+#: of the plane finger: area per load (mm2/N), and the stratum corneum of Table 2
+AREA, SKIN = 112.0, Layer(0.38, 1650.0)
+
+
+@dataclass(frozen=True)
+class Device:
+    """A display with its amplifier: own `friction`, force `law`, `insulator` (film or touchscreen),
+    largest effective voltage (V) and `slew` (V/s), None: without limit.
+
+    >>> Device(law="coulomb")
+    Traceback (most recent call last):
+    evfem.errors.InputError: law: given "coulomb"; allowed: kaczmarek | strong_troxel
+    """
+
+    friction: float = field(default=0.25, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
+    law: str = field(default="kaczmarek", metadata=one_of(*LAWS))
+    insulator: str = field(default="film", metadata=one_of(*INSULATORS))
+    voltage_max: float | None = field(default=None, metadata=number("V from 1 to 1e5", Within(1.0, 1e5)))
+    slew: float | None = field(default=None, metadata=number("V/s from 1 to 1e9", Within(1.0, 1e9)))
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def encoding(self) -> Encoding:
+        """Its closed forms."""
+        layers = Layers.of(SKIN, INSULATORS[self.insulator])
+        return Encoding(LAWS[self.law](), layers, AreaLaw(AREA), self.friction)
+
+    @property
+    def amplifier(self) -> Amplifier | None:
+        """Its amplifier, None without limits."""
+        if self.voltage_max is None and self.slew is None:
+            return None
+        return Amplifier(1e5 if self.voltage_max is None else self.voltage_max, self.slew)
+
+
+@dataclass(frozen=True, eq=False)
+class Rendering:
+    """The voltage for a friction curve, what the display makes of it, and how good that is.
+
+    `felt` (n,) is the friction on the display at the curve's positions, `lost` (n,) where it is not
+    the wish; errors are shares as at the head of this file, `bands` rows (low Hz, high Hz, error,
+    share of the wish's power). An error is NaN where there is nothing to be compared with.
+    """
+
+    curve: FrictionCurve
+    signal: Signal
+    felt: Floats
+    lost: Floats
+    force_error: float
+    change_error: float
+    spectrum_error: float
+    bands: tuple[tuple[float, float, float, float], ...]
+
+
+def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
+    """The voltage by the closed forms for a friction curve.
+
+    >>> x = np.linspace(0.0, 8.0, 401)
+    >>> curve = FrictionCurve(x, 0.35 + 0.02 * np.sin(np.pi * x), "made up")
+    >>> found = render(curve, Touch(), Device(friction=0.25))
+    >>> bool(found.lost.any()), found.change_error < 1e-9, round(found.signal.largest)
+    (False, True, 3511)
+    >>> worse = render(curve, Touch(), Device(friction=0.34))
+    >>> float(worse.lost.mean().round(2)), round(worse.change_error, 2)
+    (0.33, 0.25)
+    """
+    load = np.full(curve.x.shape, touch.load)
+    wish = ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
+    signal = voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
+    felt = np.asarray(device.encoding.tangential_force(load, signal.profile(curve.x))) / load
+    frequency, wanted = _amplitudes(curve.x, curve.friction, touch.speed)
+    _, given = _amplitudes(curve.x, felt, touch.speed)
+    change = curve.friction - curve.friction.mean()
+    return Rendering(
+        curve=curve,
+        signal=signal,
+        felt=felt,
+        lost=np.abs(felt - curve.friction) > 10.0 * NOISE * np.abs(curve.friction).max(),
+        force_error=_relative(felt, curve.friction),
+        change_error=_relative(felt - felt.mean(), change),
+        spectrum_error=_relative(given, wanted),
+        bands=tuple(_band(low, high, frequency, wanted, given) for low, high in pairwise(BANDS)),
+    )
+
+
+def _relative(found: Floats, wanted: Floats) -> float:
+    size = float(np.linalg.norm(wanted))
+    return float(np.linalg.norm(found - wanted)) / size if size > 1e-12 else float("nan")
+
+
+def _amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
+    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window."""
+    even = np.linspace(x[0], x[-1], x.size)
+    values = np.interp(even, x, friction)
+    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size)
+    amplitude = 2.0 / x.size * np.abs(np.fft.rfft((values - values.mean()) * window))
+    return np.arange(1.0, amplitude.size) * speed / float(x[-1] - x[0]), amplitude[1:]
+
+
+def _band(
+    low: float, high: float, frequency: Floats, wanted: Floats, given: Floats
+) -> tuple[float, float, float, float]:
+    inside = (frequency > low) & (frequency <= high)
+    share = float(np.sum(wanted[inside] ** 2) / max(np.sum(wanted**2), 1e-300))
+    return low, high, _relative(given[inside], wanted[inside]), share
+
+
+def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:
+    """What a file of the voltage needs: as full scale the next power of ten times 1, 2 or 5."""
+    largest = max(float(np.max(np.abs(profile.voltage))), 1.0)
+    ten = 10.0 ** np.floor(np.log10(largest))
+    full = next(float(ten * m) for m in (1.0, 2.0, 5.0, 10.0) if ten * m >= largest * (1.0 - 1e-12))
+    felt = float(device.encoding.tangential_force(touch.load, full)) / touch.load
+    return Playback(max(full, largest), touch.speed, (device.friction, felt))
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """The coupled model's own voltage for a texture: both recordings, and how they compare."""
+
+    reference: Recording
+    display: Recording
+    comparison: Comparison
+
+    @property
+    def voltage(self) -> VoltageProfile:
+        """The voltage over the position of the second slide, x = 0 where the texture begins."""
+        result = self.display.result
+        last = result.motion_index == 2
+        return VoltageProfile(result.position[last] - result.position[~last][-1], result.voltage[last])
+
+
+def exact_voltage(texture: Texture, touch: Touch, device: Device) -> Exact:
+    """Slide over the texture by the model, then find the display's voltage that gives the same
+    friction force, step by step (`rendering.exact`). Takes two runs of the model.
+    """
+    reference = record(touch_scene(texture, touch))
+    display = Display(INSULATORS[device.insulator], friction=device.friction)
+    largest = 10_000.0 if device.voltage_max is None else device.voltage_max
+    rendered = exact(reference, display, LAWS[device.law](), largest)
+    return Exact(reference, rendered, compare(reference.result, rendered.result))

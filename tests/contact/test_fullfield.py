@@ -1,0 +1,176 @@
+"""The pad's attraction by the full field: forces, limits, bounds, runs."""
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.contact import fullfield
+from evfem.contact.attraction import Attraction
+from evfem.contact.fullfield import FieldAttraction, facing, in_line
+from evfem.contact.pad import Pad
+from evfem.simulation.model import make_model
+
+
+def arc(number, radius, width, quadratic=True):
+    """A pad like the bottom of a cylinder, its nodes from left to right."""
+    x = np.linspace(-0.5 * width, 0.5 * width, 2 * number + 1)
+    points = np.stack([x, radius - np.sqrt(radius**2 - x**2)], axis=1)
+    start = 2 * np.arange(number)
+    edges = np.stack([start, start + 2, start + 1], axis=1)
+    if not quadratic:
+        start = np.arange(2 * number)
+        edges = np.stack([start, start + 1], axis=1)
+    return Pad(np.arange(x.size), edges, np.ones(x.size, bool)), points
+
+
+def attractions(pad, points, surface, skin_thickness=0.38):
+    """By columns and by the full field."""
+    skin = ev.Layer(np.full(len(points), skin_thickness), 1650.0)
+    layers = ev.Layers.of(skin, surface.insulator)
+    local = (ev.StrongTroxel(), layers, pad, surface, "normal")
+    return Attraction(*local), FieldAttraction(*local, edges=facing(pad, points), skin=skin)
+
+
+def test_the_full_field_of_a_flat_outline_is_the_law():
+    """And it approaches the law with the square of the slopes."""
+    surface = ev.Display(y=0.0)
+    differences = []
+    for radius in (4.0, 8.0, 16.0):
+        pad, points = arc(60, radius, 2.0)
+        points[:, 1] *= 0.5
+        points[:, 1] += 0.1
+        local, full = (a.forces(points, 500.0, None) for a in attractions(pad, points, surface, 0.0))
+        differences.append(full[:, 1].sum() / local[:, 1].sum() - 1.0)
+    assert 0.0 < differences[2] < 1e-3
+    rates = np.log2(np.divide(differences[:-1], differences[1:]))
+    assert np.all((rates > 1.5) & (rates < 2.5)), rates
+
+
+@pytest.mark.parametrize("quadratic", [True, False])
+def test_nodal_forces_are_the_derivative_of_the_energy(quadratic):
+    """In both directions, over a textured insulator, some nodes nearly touching."""
+    pad, points = arc(12, 3.0, 2.0, quadratic)
+    rng = np.random.default_rng(3)
+    surface = ev.Sinusoid(terms=[[0.02, 6.0, 0.3]], insulator=ev.FILM, y=0.0)
+    points[:, 1] += 0.05 + rng.uniform(0.0, 0.01, len(points))
+    _, full = attractions(pad, points, surface)
+    way = rng.normal(size=points.shape)
+    step = 2e-5
+
+    def energy(s):
+        return 0.5 * full.solve(points + s * way).value
+
+    quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
+    slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
+    assert np.sum(full.forces(points, 1.0, None) * way) == pytest.approx(slope, rel=1e-7)
+
+
+def test_touching_nodes_are_pulled_as_by_the_law():
+    """Where all of the outline touches, the field is that of insulator and skin in series."""
+    pad, points = arc(10, 3.0, 2.0)
+    points[:, 1] = 0.0
+    local, full = (a.forces(points, 300.0, None) for a in attractions(pad, points, ev.Display(y=0.0)))
+    assert full[:, 1].sum() == pytest.approx(local[:, 1].sum(), rel=1e-3)
+    assert full[3:-3, 1] == pytest.approx(local[3:-3, 1], rel=0.13)  # four chords share out an edge
+
+
+def test_flanks_keep_the_law_and_ridges_do_not_cut_the_chain():
+    finger = ev.FingerPad(resolution="coarse")
+    model = make_model(scene("local", finger, [ev.Hover(gap=0.1)]))
+    points = model.mesh.points[model.pad.nodes]
+    line = in_line(model.pad, facing(model.pad, points))
+    assert np.all(np.diff(points[line, 0]) > 0.0)
+    x = points[line, 0]
+    # an ellipse of half axes a, b: |n_y| = .3 at x = a s, s / sqrt(1 - s^2) b / a = tan
+    a, b = 8.34, 6.395
+    steep = np.sqrt(1.0 - 0.3**2) / 0.3 * a / b
+    assert x[-1] == pytest.approx(a * steep / np.hypot(1.0, steep), abs=0.3)
+
+
+def test_what_is_behind_an_overhang_has_no_column():
+    pad, points = arc(4, 3.0, 2.0, quadratic=False)
+    _, full = attractions(pad, points, ev.Display(y=-0.1))
+    points[5] = points[4] + [-0.1, 0.3]
+    assert full.seen(points).shape == (8, 9)
+    assert 5 not in full.seen(points).indices
+    assert full.forces(points, 1.0, None)[5] == pytest.approx([0.0, 0.0])
+
+
+def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch):
+    pad, points = arc(4, 3.0, 2.0)
+    points[:, 1] += 0.1
+    _, full = attractions(pad, points, ev.Display(y=0.0))
+    monkeypatch.setattr(fullfield, "columns_sum", lambda *_: 1e3)
+    with pytest.raises(ev.EvfemError, match="not between its bounds"):
+        full.check(points)
+
+
+def scene(field, finger, motion, **options):
+    options = {"voltage": 1000.0, "direction": "normal"} | options
+    return ev.Scene(finger, ev.Display(), ev.StrongTroxel(), motion=motion, field=field, **options)
+
+
+SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
+
+
+def test_a_hovering_pad_feels_the_field_of_its_outline():
+    """The same polyline in `rigid_field`, where its ends are planes of symmetry."""
+    pad, points = arc(40, 3.0, 1.0, quadratic=False)
+    points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
+    local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
+    x = np.append(points[:, 0], 1.0 + points[1:, 0])
+    height = np.append(points[:, 1], points[-2::-1, 1])
+    rigid = ev.electrostatics.rigid_field(x, height, slab=ev.FILM, voltage=100.0)
+    assert -2.0 * full[:, 1].sum() == pytest.approx(rigid.force, rel=2e-3)
+    assert -2.0 * local[:, 1].sum() < 0.95 * rigid.force
+
+
+def test_the_energy_of_a_moving_run_is_balanced():
+    """What the steps lose falls with their square, as it does with the law."""
+    lost = []
+    for steps in (2, 4):
+        motion = [ev.Press(indentation=0.1), ev.Press(indentation=0.3, steps=steps)]
+        result = ev.simulate(scene("full", SMOOTH, motion))
+        energy = result.external_work + result.electrostatic_work - result.stored_energy
+        energy = energy - result.friction_dissipation - result.snap_dissipation
+        assert energy == pytest.approx(result.integrator_dissipation, abs=1e-9)
+        lost.append(np.ptp(result.integrator_dissipation[[0, -1]]))
+    assert lost[1] < 0.35 * lost[0]
+
+
+def test_the_plan_chooses_by_the_bounds():
+    ridged = ev.FingerPad(resolution="coarse")
+    motion = [ev.Hover(gap=2.0)]
+    far = ev.plan(scene("auto", SMOOTH, motion))
+    near = ev.plan(scene("auto", ridged, [ev.Press(force=0.05)]))
+    asked = ev.plan(scene("full", SMOOTH, motion))
+    assert (near.has("full field"), asked.has("full field")) == (True, True)
+    assert "at first touch is at most" in " ".join(str(near).split())
+    assert "at a gap of 2 mm" in " ".join(str(far).split())
+    model = make_model(scene("auto", ridged, [ev.Press(force=0.05)]))
+    assert isinstance(model.attraction, FieldAttraction)
+    law = ev.Scene(ridged, ev.Display(), ev.Kaczmarek(), 100.0, [ev.Press(force=0.05)], field="auto")
+    assert not ev.plan(law).has("full field")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"field": "whole"}, "local | full | auto"),
+        ({"field": "full", "law": ev.Kaczmarek()}, "Kaczmarek"),
+        ({"field": "full", "air_layer": False}, "air_layer"),
+    ],
+)
+def test_what_has_no_full_field_is_refused(options, said):
+    options = {"law": ev.StrongTroxel(), "voltage": 10.0, "motion": [ev.Press(force=0.05)]} | options
+    with pytest.raises(ev.InputError, match=r"electrostatics\.field") as refused:
+        ev.Scene(SMOOTH, ev.Display(), **options)
+    assert said in str(refused.value)
+
+
+def test_a_scene_file_knows_the_key(tmp_path):
+    path = tmp_path / "scene.toml"
+    one = scene("auto", SMOOTH, [ev.Press(force=0.05)])
+    path.write_text(ev.scenefile.dump(one), encoding="utf-8")
+    assert 'field = "auto"' in path.read_text(encoding="utf-8")
+    assert ev.scenefile.load(path) == one

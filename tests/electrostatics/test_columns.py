@@ -1,0 +1,88 @@
+"""Poisson's problem in columns of layers: closed forms, its derivatives, the outlines of `rigid_field`."""
+
+import numpy as np
+import pytest
+
+from evfem import FILM
+from evfem.electrostatics import eps_0, rigid_field
+from evfem.electrostatics.bounds import columns_sum, least_upper_sum
+from evfem.electrostatics.columns import Columns
+
+ROWS = np.linspace(0.0, 1.0, 5)
+FINE = 1.0 - (1.0 - ROWS) ** 2
+
+
+def wave(number, gap):
+    """Half a period of a sinusoid above the film: its crest and groove are planes of symmetry."""
+    x = np.linspace(0.0, 0.25, number)
+    height = gap + 0.075 * (1.0 - np.cos(4.0 * np.pi * x))
+    return x, np.stack([0.0 * x - 0.09, 0.0 * x, height])
+
+
+FILM_AND_AIR = Columns((3.35, 1.0), (FINE, ROWS))
+
+
+def test_half_a_wave_converges_to_its_closed_form():
+    """Twice the lines, a quarter of the error in energy and force."""
+    exact = np.array([7.53901511, 81.97857879])
+    errors = []
+    for number in (49, 97):
+        found = FILM_AND_AIR.solve(*wave(number, 0.005))
+        numbers = 2.0 * np.array([found.value, -0.5 * found.by_level[2].sum()]) / eps_0
+        errors.append(numbers / exact - 1.0)
+    assert np.abs(errors[1]).max() < 5e-4
+    assert np.log2(np.abs(errors[0] / errors[1])) == pytest.approx([2.0, 2.0], abs=0.1)
+
+
+def test_plates_in_series_are_exact():
+    levels = np.array([[-0.09] * 3, [0.0] * 3, [0.05] * 3, [0.43] * 3])
+    found = Columns((3.35, 1.0, 1650.0), (FINE, ROWS, ROWS)).solve(np.array([0.0, 0.3, 1.0]), levels)
+    distance = 0.09 / 3.35 + 0.05 + 0.38 / 1650.0
+    assert found.value / eps_0 == pytest.approx(1.0 / distance, rel=1e-12)
+    up = found.by_level[2].sum() + found.by_level[3].sum()
+    assert up / eps_0 == pytest.approx(-1.0 / distance**2, rel=1e-10)
+    assert found.phi[0, [0, -1]].tolist() == [1.0, 0.0]
+
+
+def test_derivatives_are_those_of_the_discrete_energy():
+    """By every x and every level at once, along a random way, on an uneven outline."""
+    rng = np.random.default_rng(7)
+    x, levels = wave(17, 0.05)
+    x = x + rng.uniform(-3e-3, 3e-3, x.size)
+    dx, rise = rng.normal(size=x.shape), rng.normal(size=levels.shape)
+
+    def energy(s):
+        return FILM_AND_AIR.solve(x + s * dx, levels + s * rise).value
+
+    found = FILM_AND_AIR.solve(x, levels)
+    step = 3e-5
+    quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
+    slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
+    assert found.by_x @ dx + np.sum(found.by_level * rise) == pytest.approx(slope, rel=1e-7)
+
+
+def test_moving_everything_changes_nothing():
+    """Newton's third law: all forces on all curves cancel."""
+    x, levels = wave(17, 0.05)
+    found = FILM_AND_AIR.solve(x, levels)
+    size = np.abs(found.by_level).sum()
+    assert abs(found.by_level.sum()) < 1e-13 * size
+    assert abs(found.by_x.sum()) < 1e-13 * size
+
+
+def test_columns_agree_with_the_field_of_the_same_polyline():
+    """Other elements on another mesh: `rigid_field` of one period."""
+    half, levels = wave(65, 0.02)
+    x = np.append(half, 0.5 - half[-2::-1])
+    height = np.append(levels[2], levels[2][-2::-1])
+    full = rigid_field(x, height, slab=FILM)
+    found = FILM_AND_AIR.solve(half, levels)
+    assert 2e-3 * found.value == pytest.approx(full.capacitance, rel=5e-4)
+    assert -found.by_level[2].sum() == pytest.approx(full.force, rel=1e-3)
+
+
+def test_a_capacitance_is_above_the_columns_and_below_the_vertical_field():
+    x, levels = wave(33, 0.001)
+    value = FILM_AND_AIR.solve(x, levels).value / eps_0
+    low = columns_sum(x, levels[2] + 0.09 / 3.35)
+    assert low < value < least_upper_sum(x, levels[2], 0.09, 3.35)

@@ -1,0 +1,81 @@
+"""`evfem texture`: files in and out, one sentence for a mistake, and nothing written then."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from evfem import cli
+from evfem.electrostatics.signalfile import read_signal
+from evfem.textures.library import names
+from evfem.textures.texture import read
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def run(*words):
+    return cli.main(["texture", *words])
+
+
+def test_the_list_has_a_line_for_every_reference_texture(capsys):
+    assert run("list") == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == names()
+
+
+def test_what_is_made_is_shown(capsys):
+    assert run("make", "self_affine", "--hurst", "0.8", "--seed", "3", "--out", "rough.json") == 0
+    assert run("show", "rough.json") == 0
+    out = capsys.readouterr().out
+    assert "hurst 0.8, seed 3" in out
+    assert "licence: CC0-1.0" in out
+    assert read("rough.json").name == "rough"
+
+
+def test_an_image_is_imported_with_what_it_cannot_know(tmp_path, capsys):
+    Image.fromarray(np.tile(np.arange(0, 250, 5, dtype=np.uint8), (3, 1))).save("cloth.png")
+    words = ("import", "cloth.png", "--licence", "CC0-1.0", "--out", "cloth")
+    assert run(*words) == 2
+    assert "--pixel" in capsys.readouterr().err
+    assert run(*words, "--pixel", "0.1", "--depth", "0.2", "--unit", "um") == 2
+    assert "--unit" in capsys.readouterr().err
+    assert not (tmp_path / "cloth").exists()
+    assert run(*words, "--pixel", "0.1", "--depth", "0.2", "--level", "mean") == 0
+    assert json.loads((tmp_path / "cloth/texture.json").read_text())["licence"] == "CC0-1.0"
+
+
+def test_a_licence_is_needed(capsys):
+    assert run("import", "a.csv", "--out", "a.json") == 2
+    assert "--licence" in capsys.readouterr().err
+
+
+def test_an_estimate_becomes_files(capsys):
+    assert run("estimate", "wave-2mm", "--out", "mu.csv", "--signal", "wave.wav") == 0
+    told = capsys.readouterr().out
+    assert "cannot be rendered" in told
+    assert 0.2 < np.loadtxt("mu.csv", delimiter=",", skiprows=1)[:, 1].mean() < 0.4
+    assert read_signal("wave.wav").voltage.max() > 100.0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("show", "nothing"),
+        ("show", "no.json"),
+        ("estimate", "weave", "--signal", "a.mp3"),
+        ("estimate", "weave", "--out", "a.txt"),
+        ("estimate", "weave", "--load", "-1"),
+        ("simulate", "weave", "--law", "coulomb"),
+        ("make", "grating", "--frequency", "0", "--out", "a.json"),
+        ("make", "grating", "--out", "a.txt"),
+        (),
+    ],
+)
+def test_mistakes_are_one_sentence_and_nothing_is_written(tmp_path, capsys, words):
+    assert run(*words) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) <= 3
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,178 @@
+"""Estimates of textures: how they are reduced, what is said of them, and the shipped database."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.simulation.run import simulate
+from evfem.textures.database import FILE, compute_database, read, shipped, textures
+from evfem.textures.estimate import estimate, reduced
+from evfem.textures.estimators import METHODS, Estimator
+from evfem.textures.generate import Knobs, make
+from evfem.textures.library import reference
+from evfem.textures.parametric import RANGES, SAMPLES, Parametric, at, scene
+from evfem.textures.texture import Texture
+from evfem.textures.touch import Touch
+
+WAVE = make("sinusoids", Knobs(0.5, 0.02, second=0.3, phase=0.4))
+
+
+def moved(texture, by):
+    """The same texture, further along x."""
+    x = texture.x + by
+    return Texture("moved", texture.kind, x, texture.values, texture.licence, period=texture.period)
+
+
+@pytest.mark.parametrize("by", [0.0, 0.3, 1.7])
+def test_two_harmonics_are_found_wherever_they_begin(by):
+    found = reduced(moved(WAVE, by))
+    assert found.wavelength == pytest.approx(2.0)
+    assert found.explain == pytest.approx(1.0, abs=1e-4)
+    assert (found.x0 - by) % 2.0 == pytest.approx(0.0, abs=1e-3) or (found.x0 - by) % 2.0 == pytest.approx(
+        2.0
+    )
+    assert found.in_phase == pytest.approx(0.3 * np.cos(0.4), abs=1e-3)
+    assert found.in_quadrature == pytest.approx(0.3 * np.sin(0.4), abs=1e-3)
+
+
+def test_a_texture_that_ends_is_reduced_to_its_main_wave():
+    x = np.linspace(0.0, 9.3, 700)
+    height = 0.02 * np.sin(2.0 * np.pi * x / 1.7 + 0.8) + 0.002 * np.sin(11.0 * x)
+    found = reduced(Texture("t", "k", x, height, "CC0-1.0"))
+    assert found.wavelength == pytest.approx(1.7, rel=0.02)
+    assert found.amplitude == pytest.approx(0.02, rel=0.05)
+    assert 0.9 < found.explain < 0.995
+
+
+def test_the_scene_of_the_database_has_the_profile_of_the_formula():
+    texture = Parametric(wavelength=2.0, slope=0.1, in_phase=0.2, in_quadrature=-0.3)
+    surface = scene(texture).surface
+    x = np.linspace(-1.0, 3.0, 50)
+    turn = np.pi * x
+    formula = 0.1 / np.pi * (np.sin(turn) + 0.2 * np.sin(2 * turn) - 0.3 * np.cos(2 * turn))
+    np.testing.assert_allclose(surface.height(x), formula, atol=1e-15)
+    assert float(np.max(surface.slope(x))) > 0.1
+
+
+def test_places_and_textures_are_each_others_inverse():
+    place = np.array([0.1, 0.9, 0.2, 0.8, 0.35, 0.6])
+    np.testing.assert_allclose(at(place, True).point(), place, atol=1e-5)
+    assert Parametric(wavelength=8.0).beyond() == {"wavelength": (1.0, 4.0)}
+
+
+def test_every_finger_has_the_corners_that_are_not_short_and_steep_and_no_texture_twice():
+    every = textures()
+    assert len(set(every)) == len(every)
+    for ridged in (False, True):
+        places = np.array([one.point() for one in every if one.ridged == ridged])
+        corners = places[((places < 1e-4) | (places > 1.0 - 1e-4)).all(axis=1)].round()
+        assert len({tuple(corner) for corner in corners}) == 3 * 2 ** (len(RANGES) - 2)
+        assert not ((corners[:, 0] == 0.0) & (corners[:, 1] == 1.0)).any()
+
+
+@pytest.mark.parametrize("ridged", [False, True])
+def test_the_shipped_errors_are_those_of_points_left_out(ridged):
+    database = shipped(ridged)
+    estimator = database.estimator
+    for i in (3, 40, 77, 90, 111):
+        for method in METHODS:
+            if not np.isfinite(database.errors[method][i]):  # a corner of the hull
+                assert method == "linear"
+                continue
+            guess = estimator.without(i)(estimator.points[i], method)
+            error = np.sqrt(np.mean((guess - estimator.responses[i]) ** 2))
+            assert database.errors[method][i] == pytest.approx(error, rel=1e-3), method
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ridged", [False, True])
+def test_a_shipped_curve_is_what_the_model_says(ridged):
+    database = shipped(ridged)
+    i = int(np.argmin([one.friction * one.load / one.wavelength for one in database.textures]))
+    result = simulate(scene(database.textures[i]))
+    last = result.motion_index == 2
+    mu = result.applied_tangential_force[last] / result.applied_force[last]
+    np.testing.assert_allclose(mu, database.friction[i], atol=2e-5)
+
+
+def test_an_estimate_at_a_point_of_the_database_is_its_curve():
+    database = shipped(True)
+    i = int(np.argmin(np.abs(database.estimator.points[:, :4] - 0.5).max(axis=1)))
+    one = database.textures[i]
+    x = np.arange(512) / 512 * one.wavelength
+    texture = Texture("t", "k", x, one.surface().height(x), "CC0-1.0", period=one.wavelength)
+    touch = Touch(True, one.friction, one.load, length=one.wavelength)
+    found = estimate(texture, touch, "rbf")
+    at_samples = np.interp(
+        np.arange(1, SAMPLES) / SAMPLES * one.wavelength, found.curve.x, found.curve.friction
+    )
+    np.testing.assert_allclose(
+        at_samples, database.friction[i, :-1], atol=0.02 * np.ptp(database.friction[i])
+    )
+    assert found.trusted
+    assert found.curve.error > 0.0
+
+
+@pytest.mark.parametrize(
+    ("texture", "touch", "note"),
+    [
+        (WAVE, Touch(load=0.5), "load 0.5 is outside the database, 0.02 to 0.1"),
+        (make("sinusoids", Knobs(0.1, 0.02)), Touch(), "wavelength 10 is outside"),
+        (reference("plaster"), Touch(), "of the heights' variance"),
+        (WAVE, Touch(speed=40.0), "made at 20 mm/s"),
+    ],
+)
+def test_what_speaks_against_an_estimate_is_said_and_the_model_offered(texture, touch, note):
+    found = estimate(texture, touch)
+    assert any(note in one and "the model" in one for one in found.notes)
+    assert not found.trusted
+    assert np.isfinite(found.curve.friction).all()
+
+
+def test_without_a_word_the_method_with_the_smallest_errors_is_taken():
+    for ridged in (False, True):
+        errors = {name: np.nanmedian(error) for name, error in shipped(ridged).relative_errors.items()}
+        assert estimate(WAVE, Touch(ridged)).method == min(errors, key=errors.get)
+
+
+def test_measured_friction_is_taken_as_it_is():
+    found = estimate(reference("friction-ramps"), Touch(length=4.0))
+    np.testing.assert_allclose(
+        np.interp([0.0, 1.0, 3.0], found.curve.x, found.curve.friction), [0.3, 0.45, 0.45]
+    )
+
+
+def test_a_level_texture_and_a_spectrum_have_no_estimate():
+    level = Texture("t", "k", [0.0, 1.0], [0.1, 0.1], "CC0-1.0")
+    spectrum = Texture("t", "k", [1.0, 2.0], [0.6, 0.8], "CC0-1.0", "friction_spectrum")
+    for texture in (level, spectrum):
+        with pytest.raises(InputError, match="texture: given t"):
+            estimate(texture, Touch())
+
+
+def test_the_database_is_resumed_and_written_whole(tmp_path, monkeypatch):
+    few = [replace(one, load=0.02) for one in textures()[:4]]
+    calls = []
+
+    def fake(text):
+        from evfem.sweeps.folder import Answer
+        from evfem.textures.database import CURVE
+
+        calls.append(text)
+        return Answer("done", 0.1, "", {name: 0.3 + 0.01 * i * len(calls) for i, name in enumerate(CURVE)})
+
+    monkeypatch.setattr("evfem.textures.database.textures", lambda: few)
+    monkeypatch.setattr("evfem.textures.database._evaluate", fake)
+    monkeypatch.setattr(Estimator, "__call__", lambda self, place, method: self.responses.mean(axis=0))
+    path, counted = compute_database(tmp_path, workers=1)
+    assert counted == {"done": 4, "not converged": 0}
+    before = path.read_text()
+    assert compute_database(tmp_path, workers=1)[1] == counted
+    assert len(calls) == 4
+    assert path.read_text() == before
+    assert len(read(path, True).textures) == 2
+    (tmp_path / "other.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match=FILE):
+        read(tmp_path / "other.csv", True)

@@ -1,0 +1,73 @@
+"""Estimators: exact where they must be, and errors that are what the definition says."""
+
+import numpy as np
+import pytest
+
+from evfem.errors import InputError
+from evfem.textures.estimators import METHODS, Estimator, best_width, hull_weights, kernel, left_out
+
+DRAW = np.random.default_rng(3)
+POINTS = np.concatenate([DRAW.random((40, 3)), np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, -1).T])
+LINEAR = POINTS @ np.array([[1.0, -2.0], [0.5, 3.0], [2.0, 0.0]]) + 0.7
+
+
+@pytest.mark.parametrize("method", ["linear", "rbf"])
+def test_what_is_linear_is_found_exactly(method):
+    estimator = Estimator(POINTS, LINEAR, 0.2)
+    place = np.array([0.3, 0.8, 0.6])
+    wanted = place @ np.array([[1.0, -2.0], [0.5, 3.0], [2.0, 0.0]]) + 0.7
+    np.testing.assert_allclose(estimator(place, method), wanted, atol=1e-7)
+
+
+@pytest.mark.parametrize("method", ["linear", "rbf"])
+def test_points_are_met(method):
+    values = DRAW.random((len(POINTS), 2))
+    np.testing.assert_allclose(Estimator(POINTS, values, 0.2)(POINTS[7], method), values[7], atol=1e-6)
+
+
+def test_linear_weights_are_those_of_the_delaunay_simplex():
+    from scipy.spatial import Delaunay
+
+    triangulation = Delaunay(POINTS)
+    place = np.array([0.41, 0.37, 0.62])
+    corners = triangulation.simplices[triangulation.find_simplex(place)]
+    assert sorted(np.flatnonzero(hull_weights(POINTS, place) > 1e-9)) == sorted(corners)
+
+
+def test_the_average_is_that_of_gaussian_weights_by_hand():
+    points = np.array([[0.0], [1.0]])
+    weight = np.exp(-0.5 * np.array([0.25**2, 0.75**2]) / 0.5**2)
+    weight /= weight.sum()
+    np.testing.assert_allclose(kernel(points, np.array([0.25]), 0.5), weight)
+    found = Estimator(points, np.array([[1.0], [3.0]]), 0.5)(np.array([0.25]), "average")
+    assert found[0] == pytest.approx(weight @ [1.0, 3.0])
+
+
+def test_the_width_has_the_smallest_error_of_points_left_out():
+    values = np.sin(5.0 * POINTS[:, :1])
+    best = best_width(POINTS, values)
+    errors = {
+        width: np.sum((left_out(Estimator(POINTS, values, width), "average") - values) ** 2)
+        for width in (best, best * 1.15, best / 1.15)
+    }
+    assert min(errors, key=errors.get) == best
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_point_that_is_left_out_does_not_know_itself(method):
+    values = DRAW.random((len(POINTS), 1))
+    changed = values.copy()
+    changed[3] += 100.0
+    one, other = (left_out(Estimator(POINTS, v, 0.3), method)[3] for v in (values, changed))
+    assert one == pytest.approx(other)
+
+
+def test_corners_that_are_left_out_are_outside_the_hull_of_the_others():
+    found = left_out(Estimator(POINTS, LINEAR, 0.2), "linear")
+    assert np.isnan(found[40:]).all()
+    assert np.isfinite(found[:40]).any()
+
+
+def test_linear_interpolation_refuses_a_place_outside():
+    with pytest.raises(InputError, match="outside the hull"):
+        Estimator(POINTS, LINEAR, 0.2)(np.array([1.1, 0.5, 0.5]), "linear")

@@ -1,0 +1,72 @@
+"""From friction to feeling: voltages, limits, and the errors of a rendering."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from evfem.textures.feeling import BANDS, Device, playback, render
+from evfem.textures.touch import FrictionCurve, Touch
+
+X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
+TOUCH = Touch(load=0.05)
+
+
+def curve(*waves, mean=0.4):
+    """Friction with sines of (amplitude, Hz) at 20 mm/s."""
+    mu = mean + 0.0 * X + sum(a * np.sin(2.0 * np.pi * f * X / 20.0) for a, f in waves)
+    return FrictionCurve(X, mu, "made up")
+
+
+def test_what_can_be_rendered_is_felt_without_an_error():
+    found = render(curve((0.02, 10.0)), TOUCH, Device(friction=0.3))
+    assert not found.lost.any()
+    assert max(found.force_error, found.change_error, found.spectrum_error) < 1e-9
+    np.testing.assert_allclose(found.felt, found.curve.friction)
+
+
+def test_the_voltage_is_that_of_equation_20a():
+    device = Device(friction=0.3)
+    found = render(curve(), TOUCH, device)
+    pressure = device.encoding.law.traction(0.0, 1.0, device.encoding.layers)
+    wanted = np.sqrt((0.4 / 0.3 - 1.0) / (112.0 * pressure))
+    assert found.signal.profile(3.0) == pytest.approx(wanted)
+    assert np.isnan(found.change_error)
+
+
+def test_friction_below_the_displays_own_is_lost_and_marked():
+    found = render(curve((0.1, 10.0)), TOUCH, Device(friction=0.4))
+    np.testing.assert_array_equal(found.lost, found.curve.friction < 0.4 - 1e-5)
+    below = np.minimum(found.curve.friction - 0.4, 0.0)
+    wanted = np.linalg.norm(below) / np.linalg.norm(found.curve.friction)
+    assert found.force_error == pytest.approx(wanted, rel=1e-6)
+
+
+def test_an_amplifier_that_is_too_weak_loses_what_is_above_it():
+    free = render(curve((0.05, 10.0)), TOUCH, Device(friction=0.3))
+    cut = render(curve((0.05, 10.0)), TOUCH, Device(friction=0.3, voltage_max=free.signal.largest * 0.9))
+    assert cut.signal.largest == pytest.approx(free.signal.largest * 0.9)
+    assert 0.1 < cut.lost.mean() < 0.6
+    np.testing.assert_array_equal(cut.lost, free.signal.profile(X) > free.signal.largest * 0.9 * (1 + 1e-5))
+
+
+def test_bands_hold_the_power_of_their_frequencies_and_the_error_of_a_slow_amplifier():
+    found = render(curve((0.02, 10.0), (0.01, 100.0)), TOUCH, Device(friction=0.3, slew=3e4))
+    share = {(low, high): power for low, high, _, power in found.bands}
+    assert share[5.0, 15.0] == pytest.approx(0.8, abs=0.01)
+    assert share[50.0, 150.0] == pytest.approx(0.2, abs=0.01)
+    assert list(pairwise(BANDS)) == [band[:2] for band in found.bands]
+    error = {(low, high): error for low, high, error, _ in found.bands}
+    assert error[50.0, 150.0] > 3.0 * error[5.0, 15.0]
+
+
+def test_a_file_has_a_round_full_scale_and_both_frictions():
+    found = render(curve((0.02, 10.0)), TOUCH, Device(friction=0.3))
+    told = playback(found.signal.profile, TOUCH, Device(friction=0.3))
+    assert told.full_scale >= found.signal.largest
+    assert f"{told.full_scale:e}"[0] in "125"
+    assert told.full_scale < 2.51 * found.signal.largest
+    natural, largest = told.friction
+    assert natural == 0.3
+    share = (found.signal.largest / told.full_scale) ** 2
+    assert natural + share * (largest - natural) == pytest.approx(found.curve.friction.max())
