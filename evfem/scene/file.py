@@ -19,7 +19,7 @@ from typing import Any
 from evfem.common.checks import MOST_STEPS
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import INSULATORS, Layer
-from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
@@ -44,6 +44,7 @@ from evfem.scene.keys import (
     kind_of,
     parse,
     shown,
+    unknown_key,
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
@@ -256,7 +257,7 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     known = {spec.name: spec for spec in fields(finger) if spec.init}
     mistakes = Mistakes()
     mistakes.found += [
-        unknown(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
+        unknown_key(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
         for name in parts
         if name not in (*known, "kind", "participant")
     ]
