@@ -84,6 +84,8 @@ def make_model(scene: Scene) -> Model:
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
     deepest = max((one.indentation or 0.0 for one in scene.motion if isinstance(one, Press)), default=0.0)
+    if mesh.dim == 3:  # a dense compliance of three unknowns a node: candidates as they are needed
+        deepest = 0.0
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
     if not isinstance(scene.friction_law, Coulomb):

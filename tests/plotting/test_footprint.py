@@ -10,7 +10,7 @@ from tools.fakes import fake_result
 import evfem as ev
 from evfem.contact.skin import make_skin
 from evfem.errors import InputError
-from evfem.plotting import animate, contact_area, contact_pressure, deformed, footprint, forces, regions
+from evfem.plotting import animate, contact_area, contact_pressure, deformed, footprint, forces
 from evfem.plotting.fields import values_of
 from evfem.simulation.run import simulate
 
@@ -86,8 +86,6 @@ def test_other_fields_fingers_and_pictures_are_refused(result, tmp_path):
     for draw in (deformed, contact_pressure):
         with pytest.raises(InputError, match="three dimensions"):
             draw(result)
-    with pytest.raises(InputError, match="three dimensions"):
-        regions(result.mesh)
     with pytest.raises(InputError, match="field"):
         animate(result, tmp_path / "stress.gif", "von_mises")
 
