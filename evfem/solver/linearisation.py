@@ -26,18 +26,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    ALIKE,
-    FAINT,
-    FAR,
-    LONGER,
-    SHORTER,
-    SLOW,
-    SPARE,
-    STABLE,
-    STALLED,
-    STEEP,
-)
+from evfem.common.constants import ALIKE, FAINT, FAR, LONGER, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
