@@ -47,7 +47,8 @@ ROOMS = {
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface spatial linearisation pressure anderson findings "
+        "strategy state hand control condensation interface spatial linearisation pressure anderson "
+        "findings "
         "equilibrium factorised relaxation stepping",
     ),
     "scene": (

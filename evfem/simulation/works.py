@@ -15,6 +15,8 @@ The history has
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
+  with a hand that of its spring (and ``kinetic_energy``, ``viscous_dissipation`` and the work of the
+  drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
@@ -164,6 +166,8 @@ class Part:
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
         springs = float(0.5 * np.sum(self._compliance * new.contact_force**2))
+        if (hand := self.model.scene.hand) is not None:
+            springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
@@ -179,6 +183,9 @@ class Part:
         if np.isfinite(lost):  # the fast model has no tissue to ask
             lost -= self._contact() + friction
             lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        if (hand := self.model.scene.hand) is not None:
+            more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
+            given, viscous, lost = given + more, viscous + damped, lost + more - damped
         drag = body.drag_dissipation(new.u)
         lost -= drag
         snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
@@ -284,6 +291,11 @@ class Part:
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
         return float(PART @ np.sum(limit * length, axis=1))
 
+    @property
+    def _seconds(self) -> float:
+        """Of this part."""
+        return float(self.model.equilibrium.interface.duration)
+
     @cached_property
     def _x(self) -> tuple[Floats, Floats]:
         """x of the pad nodes (P,) before and after."""
@@ -332,7 +344,10 @@ class Part:
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
         dynamics, new, old = self.model.body.dynamics, self.new, self.old
+        hand = self.model.scene.hand
         if dynamics is not None and dynamics.step > 0.0:
+            return False
+        if hand is not None and hand.timed and self._seconds > 0.0:
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)
