@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.constants import KILOVOLT
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
 
@@ -84,6 +85,20 @@ class Charging:
         if self.seconds == 0.0:
             return self.stack.effective(voltage, self.carried(length))
         return self.stack.effective(voltage, self.after(gap, voltage, length))
+
+    def electrode_charge(self, at: Charged) -> float:
+        """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it."""
+        return float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
+
+    def voltage_for(self, charge: float, gap: Floats, length: Floats) -> float:
+        """The voltage (V) at the end of the step with which the electrode has this charge over eps_0
+        (V): the charge is linear in it.
+        """
+        none, one = (
+            self.electrode_charge(Charged(self.after(gap, volts, length), volts, gap, length))
+            for volts in (0.0, KILOVOLT)
+        )
+        return KILOVOLT * (charge - none) / (one - none)
 
     def energy_density(self, at: Charged) -> Floats:
         """Energy of the field in skin, gap and insulator of every node (P,), N mm per mm^2.

@@ -42,7 +42,7 @@ from evfem.common.checks import Values
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import InputError, quoted
 
-#: |z| below which phi_2 is summed as a series of so many terms
+#: magnitude of z below which phi_2 is summed as a series, and its terms
 SMALL, TERMS = 0.2, 12
 
 

@@ -116,6 +116,32 @@ class Square:
 
 
 @dataclass(frozen=True)
+class OpenCircuit:
+    """A direct `voltage` (V) until the time `after` (s); then the electrode is disconnected and keeps
+    its charge, whatever that does to its voltage. For a resolved `Drive`.
+
+    >>> OpenCircuit(100.0, after=0.1).largest
+    100.0
+    """
+
+    voltage: float = field(metadata=_BIAS)
+    after: float = field(default=0.0, metadata=_START)
+    highest_frequency = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def largest(self) -> float:
+        """Magnitude (V) while the electrode is connected."""
+        return abs(self.voltage)
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) of the source at `time` (s, any shape)."""
+        return plain(np.full(np.shape(time), self.voltage))
+
+
+@dataclass(frozen=True)
 class Carrier:
     """`envelope` times sin(2 pi `frequency` t), in V: a carrier, modulated where the envelope is a
     signal.

@@ -16,7 +16,7 @@ from evfem.electrostatics.charges import Sandwich, constants
 from evfem.electrostatics.drive import Drive, mean_law
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import Carrier
+from evfem.electrostatics.timesignals import Carrier, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import VoltageRamp
@@ -100,6 +100,8 @@ def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich:
 def check_drive(scene: Any) -> None:
     """Raise InputError where drive, law, voltage and motions do not fit together."""
     drive = scene.drive
+    if isinstance(scene.voltage, OpenCircuit) and (drive is None or not drive.resolved):
+        raise InputError("electrostatics.voltage", "OpenCircuit", "with a resolved drive")
     if drive is None:
         return
     if scene.law is None:
@@ -133,6 +135,9 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, TimeSignal) and drive.frequency is not None:
         given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
         raise InputError("electrostatics.frequency", given, "nothing here")
+    if isinstance(voltage, OpenCircuit) and np.any(constants(scene.ground.insulator, frequency(scene))[1]):
+        allowed = "an insulator that does not conduct, with an open circuit"
+        raise InputError("surface.insulator", "a conductor", allowed)
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"
         raise InputError("electrostatics.signal", "the mean of a carrier", allowed)

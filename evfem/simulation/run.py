@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from evfem.common import notices
 from evfem.common.notices import LOG
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import OpenCircuit
 from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
@@ -41,6 +42,7 @@ from evfem.solver.control import (
     GivenVoltage,
     HeightControl,
     Indentation,
+    KeptCharge,
     Target,
     VoltageControl,
 )
@@ -175,6 +177,10 @@ class Run:
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
+                if isinstance(self.voltage, OpenCircuit) and now >= self.voltage.after:
+                    begin, end = (
+                        replace(one, drive=KeptCharge(self.voltage.voltage)) for one in (begin, end)
+                    )
                 path = self._path(begin, end, now, seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
@@ -263,6 +269,8 @@ class Run:
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage
+            if isinstance(end.drive, KeptCharge):
+                return end.drive
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
             if self._follows(seconds):

@@ -11,6 +11,7 @@ control             known                        unknown                       e
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
 `GivenVoltage`      voltage                                                    none
+`KeptCharge`        charge of the electrode                                    found by the stepper
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
@@ -183,6 +184,13 @@ class GivenVoltage:
 
     def fallback(self, old: State, found: State | None) -> None:
         return None
+
+
+@dataclass(frozen=True)
+class KeptCharge(GivenVoltage):
+    """The electrode keeps the charge that it had; `voltage` (V) is that of its source, long ago. The
+    stepper finds the voltage (`evfem.solver.stepping`).
+    """
 
 
 @dataclass

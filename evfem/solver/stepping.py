@@ -26,11 +26,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from evfem.common.constants import COARSER, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.solver.control import Target
+from evfem.contact.attraction import Attraction
+from evfem.contact.charging import Charging
+from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import Folded, State, StepFailed
 from evfem.tissue.body import Body
+
+#: a change of the voltage that is rounding (relative), and a voltage that is none (V)
+ROUNDING, TINY = 1e-14, 1e-300
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
@@ -112,9 +117,31 @@ class Stepper:
         pressing = state.contact_force[:, 0]
         old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
         attraction.charging.begin(old, target.duration)
+        if isinstance(target.drive, KeptCharge):
+            return self._disconnected(state, target, attraction, attraction.charging)
         new = self._coupled(state, target)
         end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
         return replace(new, charges=end.charges)
+
+    def _disconnected(
+        self, state: State, target: Target, attraction: Attraction, charging: Charging
+    ) -> State:
+        """Equilibria under voltages that bring the electrode's charge to what it was, until the
+        voltage no longer changes.
+        """
+        equilibrium, voltage, change = self.equilibrium, state.voltage, np.inf
+        charge = charging.electrode_charge(charging.old)
+        for _ in range(STAGGERED_LIMIT):
+            new = self._coupled(state, replace(target, drive=GivenVoltage(voltage)))
+            place, pressing = equilibrium.interface.resting(new), new.contact_force[:, 0]
+            end = attraction.charged(place, voltage, pressing)
+            found = charging.voltage_for(charge, end.gap, end.length)
+            before, change = change, abs(found - voltage) / max(abs(found), TINY)
+            # as far as the equilibria are exact: to rounding where nothing deforms
+            if change <= ROUNDING or (change <= equilibrium.tolerance and change > 0.1 * before):
+                return replace(new, charges=end.charges)
+            voltage = found
+        raise StepFailed("the voltage of the open circuit does not settle", equilibrium.record.residuals)
 
     def _coupled(self, state: State, target: Target) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics import alternating_pressure, step_pressure
@@ -163,3 +164,32 @@ def test_a_sine_puts_twice_its_frequency_into_the_friction_and_a_square_wave_onl
     assert leaking > 5e-3
     even, _ = line(100.0, ev.Drive(FREQUENCY, "square", resolved=True))
     assert even < 1e-6
+
+
+def test_an_open_circuit_keeps_the_force_on_a_flat_pad_whatever_the_gap():
+    """The electrode is charged to 100 V over 0.2 mm and then disconnected: D stays, and so does the
+    force, while the voltage grows with the gap.
+    """
+    flat = ev.MeshedFinger(block(8, 3), {"tissue": ev.NeoHookean(10.0, 0.3)}, ELECTRICAL)
+    motion = [ev.Hover(0.2, steps=1), ev.Wait(1e-3, steps=1), ev.Hover(0.4, steps=1)]
+    motion += [ev.Hover(1.7, steps=1), ev.Wait(0.1, steps=2)]
+    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
+    free = ev.Scene(flat, SCREEN, ev.StrongTroxel(), ev.OpenCircuit(100.0, 1e-3), motion, drive=drive)
+    found = ev.simulate(free)
+    np.testing.assert_allclose(found.electrostatic_force, found.electrostatic_force[0], rtol=1e-12)
+    solids = 0.30 / 1136.0 + 0.001 / 3.9
+    expected = 100.0 * (np.array([0.2, 0.2, 0.4, 1.7, 1.7, 1.7]) + solids) / (0.2 + solids)
+    np.testing.assert_allclose(found.voltage, expected, rtol=1e-12)
+    with pytest.raises(ev.InputError, match="with a resolved drive"):
+        replace(free, drive=None)
+
+
+def test_a_soft_pad_over_an_open_circuit_finds_its_voltage():
+    """Charge of the electrode, summed over the nodes of the frame, is what it was."""
+    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
+    motion = [ev.Hover(0.02, steps=1), ev.Wait(1e-3, steps=1), ev.Hover(0.06, steps=2)]
+    found = ev.simulate(scene(drive, motion, ev.OpenCircuit(100.0, 1e-3)))
+    assert (np.diff(found.voltage[1:]) > 0.0).all()
+    # without leak the field's energy is Q U / 2
+    charge = 2.0 * found.field_energy / found.voltage
+    np.testing.assert_allclose(charge, charge[1], rtol=1e-7)
