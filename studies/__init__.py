@@ -27,6 +27,8 @@ NAMES = (
     "fig13",
     "participants",
     "uncertainty",
+    "frequency",
+    "hypotheses",
     "stability",
     "work_precision",
     "peers",
