@@ -14,10 +14,15 @@ columns' pull where the faces are smooth, a few per cent where they are rough.
 Fingers. The hovering finger of Table 1 and the pressed one of Fig. 11, with and without ridges.
 Expected: the ridged finger gains more than the smooth one, so the share of its ridges rises, and
 Strong and Troxel's law moves further away from the measured forces, which lie below it.
+
+Electrodes. A smooth rigid finger hovers over the edge of an electrode, and over stripes of either
+sign with gaps of a tenth of their pitch. Expected: half of the pull at the edge, and a force back
+to the electrode; over stripes as much for a grounded as for a floating finger, less for finer ones.
 """
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +33,7 @@ import evfem as ev
 from evfem.electrostatics.columns import Columns
 from evfem.electrostatics.grading import graded
 from evfem.electrostatics.rigid import rigid_field
+from evfem.simulation.model import make_model
 
 from .common import CASES, Series, Study, new_figure, panel_letter
 
@@ -119,6 +125,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
                 series.append(Series(name, gaps, [one[key] for one in found], "% over mm"))
     numbers |= {f"spreading.{name}": spreading(rough) for name, rough in ROUGH.items()}
     numbers |= finger_numbers(quick)
+    on_electrodes, over_edge = electrode_numbers(quick)
+    numbers |= on_electrodes
+    series += over_edge
     parameters = {"pitch_mm": PITCH, "height_mm": HEIGHT, "load_N_per_mm": LOAD}
     study = Study("fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters)
     return study.finish(out, quick)
@@ -137,9 +146,38 @@ def finger_numbers(quick: bool) -> dict[str, float]:
     return numbers
 
 
+def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
+    """A hovering outline over an electrode's edge and over stripes, relative to one without end."""
+    finger = ev.FingerPad(ridges=False, resolution="coarse" if quick else "medium")
+    model = make_model(_scene(finger, 1000.0, ev.Hover(gap=0.1)))
+    points = model.mesh.points[model.pad.nodes] + model.bone(0.0, -0.1)
+
+    def force(rows: Any, floating: bool = False) -> Any:
+        surface = replace(model.surface, electrodes=rows)
+        own = {"surface": surface, "floating": floating, "solved": OrderedDict()}
+        return replace(model.attraction, **own).forces(points, 1000.0, None).sum(axis=0)
+
+    whole = -force(None)[1]
+    places = np.linspace(-6.0, 6.0, 7 if quick else 25)
+    over = np.array([force([[-30.0, place, 1.0]]) for place in places]) / whole
+    numbers = {"edge.normal_in_the_middle_over_whole": float(np.interp(0.0, places, -over[:, 1]))}
+    numbers["edge.largest_x_over_whole"] = float(np.abs(over[:, 0]).max())
+    for pitch in (4.0, 1.0):
+        ends = np.arange(-12.0, 12.0, pitch)
+        rows = [[a + 0.05 * pitch, a + 0.95 * pitch, (-1.0) ** k] for k, a in enumerate(ends)]
+        for floating in (False, True):
+            name = f"stripes.{pitch:g}mm.{'floating' if floating else 'grounded'}_over_whole"
+            numbers[name] = float(-force(rows, floating)[1] / whole)
+    series = [
+        Series("edge normal", places, -over[:, 1], "1 over mm"),
+        Series("edge x", places, over[:, 0], "1 over mm"),
+    ]
+    return numbers, series
+
+
 def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
-    figure = new_figure(3.6)
-    axes = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 1.3))
+    figure = new_figure(3.6, 9.5)
+    axes = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 1.2, 1.0))
     for axis, insulator, letter in zip(axes, INSULATORS, "ab", strict=False):
         for shape, colour in (("t7", "C0"), ("sinus", "C1")):
             own = {s.name.split()[-1]: s for s in series if s.name.startswith(f"{shape} {insulator} ")}
@@ -163,4 +201,9 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     axes[2].tick_params(axis="y", labelsize=7)
     axes[2].set_xlabel("full field, more pull (%)")
     panel_letter(axes[2], "c")
+    for one, label in zip(series[-2:], ("towards the display", "along x"), strict=True):
+        axes[3].plot(one.x, one.y, label=label)
+    axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
+    axes[3].legend(fontsize=7)
+    panel_letter(axes[3], "d")
     return figure

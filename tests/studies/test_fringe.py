@@ -36,6 +36,17 @@ def test_ridged_fingers_gain_more_than_smooth_ones(numbers):
         assert ridged > smooth > 1.0, case
 
 
+def test_electrodes_that_end(numbers):
+    assert numbers["edge.normal_in_the_middle_over_whole"] == pytest.approx(0.5, abs=0.02)
+    assert 0.0 < numbers["edge.largest_x_over_whole"] < 0.2
+    for pitch in ("4", "1"):
+        grounded, floating = (
+            numbers[f"stripes.{pitch}mm.{way}_over_whole"] for way in ("grounded", "floating")
+        )
+        assert floating == pytest.approx(grounded, rel=0.1)
+        assert grounded < 1.0
+
+
 def test_both_ridges_have_the_height_of_the_fingers():
     for shape in ("t7", "sinus"):
         x, height = fringe.ridge(shape, 101)
