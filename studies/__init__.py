@@ -26,6 +26,8 @@ NAMES = (
     "fig13",
     "participants",
     "uncertainty",
+    "frequency",
+    "hypotheses",
     "stability",
     "work_precision",
     "peers",

@@ -30,6 +30,7 @@ from evfem.scene.keys import (
     SURFACES,
     ElectricalTable,
     ElectrostaticsTable,
+    HandTable,
     MeshTable,
     OutputTable,
     ProfileTable,
@@ -48,6 +49,7 @@ from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.voltage import drive_of, voltage_of
 from evfem.scene.written import FORCE_LAWS, TEXTURES, VERSION, dump
+from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import from_table
 
@@ -126,6 +128,9 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
             parts["friction_law"] = _friction_law(law)
     with mistakes.of_a_part():
         parts["motion"] = _motions(top.motion)
+    with mistakes.of_a_part():
+        if top.hand is not None:
+            parts["hand"] = _build(Hand, parse(HandTable, top.hand, "hand"), "hand")
     with mistakes.of_a_part():
         parts["solver"] = _solver(parse(SolverTable, top.solver, "solver"))
     with mistakes.of_a_part():

@@ -21,6 +21,7 @@ from evfem.electrostatics.timesignals import FASTEST
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, FIELDS, Output, Solver
+from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
 
 # A field's description is what an error says is allowed.
@@ -65,6 +66,7 @@ class SceneTable(Table):
         "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"
     )
     electrostatics: dict[str, Any] | None = optional("a table [electrostatics]")
+    hand: dict[str, Any] | None = optional("a table [hand]")
     solver: dict[str, Any] = optional("a table [solver]", {})
     output: dict[str, Any] = optional("a table [output]", {})
     motion: list[dict[str, Any]] = Key(min_length=1, description="one or more tables [[motion]]")
@@ -168,6 +170,7 @@ class ElectrostaticsTable(Table):
 
 SolverTable = derived(Solver, strategy=(dict[str, Any], optional("a table [solver.strategy]", {})))
 StrategyTable = derived(Strategy)
+HandTable = derived(Hand)
 OutputTable = derived(Output)
 
 FRICTIONS: Mapping[str, tuple[type[Table], type]] = {kind: (derived(cls), cls) for kind, cls in KINDS.items()}

@@ -36,6 +36,7 @@ from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw
 from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
+from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
 from evfem.tissue.forms import Form
@@ -160,9 +161,9 @@ class Scene:
     `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
     "auto" where bounds say that it matters. `friction_law` says what the surface's coefficient of
     friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
-    `AgeingFriction` or one's own). `depth` (mm) is how deep the plane finger is meant to be; it
-    changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything that
-    does not fit together.
+    `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
+    drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
+    adds `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -176,6 +177,7 @@ class Scene:
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
+    hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
@@ -187,7 +189,14 @@ class Scene:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        checks = (_check_electrostatics, check_drive, _check_friction, _check_motion, _check_time)
+        checks = (
+            _check_electrostatics,
+            check_drive,
+            _check_friction,
+            _check_hand,
+            _check_motion,
+            _check_time,
+        )
         for check in (*checks, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
@@ -297,6 +306,20 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _check_hand(scene: Scene) -> None:
+    hand = scene.hand
+    if hand is None:
+        return
+    if not isinstance(hand, Hand):
+        raise InputError("hand", quoted(hand), "a Hand, or None")
+    if isinstance(scene.voltage, FollowForce):
+        raise InputError("hand", "a hand beside a wished friction force", "one of the two")
+    for i, motion in enumerate(scene.motion if hand.timed else ()):
+        if isinstance(motion, Slide) and motion.speed is None:
+            allowed = "a speed in mm/s, needed with a hand that has a damping or a mass"
+            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
 
 
 def _check_roughness(scene: Scene) -> None:

@@ -51,6 +51,8 @@ def dump(scene: Scene) -> str:
     }
     if scene.law is not None:
         tables["electrostatics"] = _electrostatics_table(scene)
+    if scene.hand is not None:
+        tables["hand"] = _changed(scene.hand)
     solver = _changed(scene.solver)
     if "strategy" in solver:
         solver["strategy"] = _changed(scene.solver.strategy)

@@ -43,6 +43,8 @@ penalty_normal = 1.0
 penalty_tangential = 1.0
 [solver.strategy]
 [output]
+[hand]
+stiffness = 1.0
 [[motion]]
 kind = "press"
 indentation = 0.1
@@ -79,6 +81,7 @@ def test_every_key_of_the_models_has_its_row():
     found = {(one.name, one.kind): {key.name for key in one.keys} for one in scenes.sections()}
     models = {
         ("", ""): keys.SceneTable,
+        ("hand", ""): keys.HandTable,
         ("finger.electrical", ""): keys.ElectricalTable,
         ("electrostatics", ""): keys.ElectrostaticsTable,
         ("solver", ""): keys.SolverTable,
@@ -121,6 +124,7 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
     written += [
         meanings.FRICTION,
+        meanings.HAND,
         meanings.ROUGHNESS,
         *meanings.MOTION.values(),
         meanings.SIGNAL,
@@ -218,7 +222,7 @@ def test_sweeps_have_their_schema():
     schema = sweeps.schema()
     jsonschema.Draft7Validator.check_schema(schema)
     inner = SLIDE.replace("version = 1", "").replace("[[motion]]", "[[scene.motion]]")
-    for table in ("finger", "surface", "electrostatics", "solver", "output"):
+    for table in ("finger", "surface", "electrostatics", "hand", "solver", "output"):
         inner = inner.replace(f"\n[{table}", f"\n[scene.{table}")
     grid = "[grid]\nsurface.friction = [0.1, 0.2]\n"
     samples = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\nsurface.y = { normal = [-9.0, 0.1] }\n"
