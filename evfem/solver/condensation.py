@@ -111,24 +111,34 @@ class Pardiso:
         self._mark[:] = 0
         self._mark[self.kept] = 1
         self._analysed = False
+        self._phase, self._error = ctypes.c_int32(0), ctypes.c_int32(0)
+        self._fixed = self._arguments()
 
     def _call(self, phase: int, b: Any, x: Any) -> int:
+        self._phase.value = phase
+        handle, before, after = self._fixed
+        self._call_pardiso(
+            handle, *before, self._values.ctypes, *after, b.ctypes, x.ctypes, ctypes.byref(self._error)
+        )
+        return self._error.value
+
+    def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+        """What every call has in common: the handle, what stands before the matrix's values, and
+        what stands behind them. Made once, for on small pads it takes as long as a solve.
+        """
+
         def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
 
         def integers(array: Any) -> Any:
             return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
 
-        def values(array: Any) -> Any:
-            return array.ctypes.data_as(ctypes.c_void_p)
-
-        error = ctypes.c_int32(0)
-        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
-        kind = (number(1), number(1), number(self.mtype), number(phase), number(self.pattern.size))
-        matrix = (values(self._values), integers(self.pattern.indptr), integers(self.pattern.indices))
+        pattern, phase = self.pattern, ctypes.byref(self._phase)
+        matrix = (integers(pattern.indptr), integers(pattern.indices))
         control = (integers(self._mark), number(1), integers(self._iparm), number(0))
-        self._call_pardiso(handle, *kind, *matrix, *control, values(b), values(x), ctypes.byref(error))
-        return error.value
+        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        kind = (number(1), number(1), number(self.mtype), phase, number(pattern.size))
+        return handle, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
         """Factorise new values of the pattern; raises `Singular` if even the indefinite
