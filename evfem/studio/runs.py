@@ -25,6 +25,8 @@ from evfem.studio.state import State, parse
 
 #: runs at the same time, seconds between two signs of life, pictures of the animation
 MOST_RUNS, EVERY, PICTURES = 2, 0.2, 10
+#: what the last line of a run has
+LAST = frozenset({"animation", "error"})
 _PLACES = threading.BoundedSemaphore(MOST_RUNS)
 
 
@@ -38,9 +40,13 @@ def run(text: str, send: Callable[[dict[str, Any]], None]) -> None:
         process.start()
         writer.close()
         try:
+            line: dict[str, Any] = {}
             with suppress(EOFError):
                 while True:
-                    send(reader.recv() if reader.poll(EVERY) else {"alive": True})
+                    line = reader.recv() if reader.poll(EVERY) else {"alive": True}
+                    send(line)
+            if LAST.isdisjoint(line):
+                send({"error": "the run ended without a result; perhaps the memory was not enough"})
         finally:
             process.kill()
             process.join()

@@ -161,7 +161,7 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     curve = FrictionCurve(x, mu + (touch.friction - near.friction), f"estimate ({method})", error)
     notes = _notes(wanted, found, touch)
     if error > MUCH * np.ptp(mu):
-        notes = (*notes, f"its error is as large as the changes that it shows: {MODEL}")
+        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
     if not inside:
         notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
     return Estimate(curve, method, notes, found)

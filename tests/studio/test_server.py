@@ -3,6 +3,7 @@
 import http.client
 import json
 import multiprocessing
+import os
 import re
 import signal
 import subprocess
@@ -130,6 +131,13 @@ def test_a_run_ends_when_nobody_listens(monkeypatch):
     with pytest.raises(BrokenPipeError):
         runs.run("{}", send)
     assert not multiprocessing.active_children()
+
+
+def test_a_run_whose_process_dies_says_so(monkeypatch):
+    lines = []
+    monkeypatch.setattr(runs, "_work", os.abort)  # takes no arguments: the process ends at once
+    runs.run("{}", lines.append)
+    assert "without a result" in lines[-1]["error"]
 
 
 def test_no_more_than_two_runs_at_once(monkeypatch):
