@@ -59,6 +59,7 @@ _NAMES = {
     "simulation.result": ("Checkpoint", "Frame", "Result"),
     "simulation.run": ("simulate",),
     "simulation.spectrum": ("spectrum",),
+    "solver.hand": ("Hand",),
     "solver.strategy": ("Strategy",),
     "sweeps.file": ("Sweep",),
     "sweeps.run": ("SweepResult", "sweep"),

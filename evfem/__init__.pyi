@@ -85,6 +85,7 @@ from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate
 from evfem.simulation.spectrum import spectrum as spectrum
+from evfem.solver.hand import Hand as Hand
 from evfem.solver.strategy import Strategy as Strategy
 from evfem.sweeps.file import Sweep as Sweep
 from evfem.sweeps.run import SweepResult as SweepResult

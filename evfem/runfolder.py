@@ -272,7 +272,7 @@ WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 
 def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
     """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
-    a whole `depth` (mm) forces are in N.
+    a whole `depth` (mm), and of a finger in three dimensions, forces are in N.
 
     >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
     >>> print(table([row]))
@@ -280,7 +280,7 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
                        mm      mm       V      N/mm      N/mm       N/mm       N/mm
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
-    units = UNITS if depth is None else WHOLE_UNITS
+    units = UNITS if depth is None and not any("contact_area" in row for row in rows) else WHOLE_UNITS
     lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
         row = row if depth is None else over_depth(row, depth)

@@ -47,7 +47,8 @@ ROOMS = {
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state control condensation interface spatial linearisation pressure anderson findings "
+        "strategy state hand control condensation interface spatial linearisation pressure anderson "
+        "findings "
         "equilibrium factorised relaxation stepping",
     ),
     "scene": (
@@ -72,7 +73,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
+        "colours labels figures fields ground outline finger footprint curves beside pressing spectra sweeps "
         "fits tractions meshes movie",
     ),
     "studio": ({"numpy"}, "state page runs server"),

@@ -149,7 +149,9 @@ def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
 
 
 def make_pad(mesh: Mesh) -> Pad:
-    """The pad of a mesh; raises InputError where no outer edge belongs to it."""
+    """The pad of a plane mesh; raises InputError where no outer edge belongs to it."""
+    if mesh.dim == 3:
+        raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
     edges = mesh.edges_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(edges):
         raise InputError(

@@ -247,6 +247,8 @@ def _check_scene(scene: Scene) -> None:
         raise InputError("solver.contact", quoted(scene.solver.contact), "exact with the fast model")
     if scene.forms:
         raise InputError("forms", f"{len(scene.forms)} of your own", "none with the fast model")
+    if scene.hand is not None:
+        raise InputError("hand", repr(scene.hand), "no hand with the fast model")
     if not isinstance(scene.friction_law, Coulomb):
         given = type(scene.friction_law).__name__
         raise InputError("surface.friction_law", given, "Coulomb with the fast model")

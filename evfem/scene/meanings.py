@@ -37,6 +37,7 @@ SCENE = {
     "finger": Text("", "the finger; without it that of the paper's Table 2"),
     "surface": Text("", "what the finger touches"),
     "electrostatics": Text("", "insulator, voltage and force law; without it no attraction"),
+    "hand": Text("", "between drive and bone; without it the drive moves the bone itself"),
     "solver": Text("", "how the scene is solved; the defaults are the recommended ones"),
     "output": Text("", "which fields are kept"),
     "motion": Text("", "what happens, one table [[motion]] after the other"),
@@ -157,8 +158,15 @@ ELECTROSTATICS = {
     "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
     "field": Text("", "full: Poisson's problem, not column by column; auto: where it matters"),
+    "electrodes": Text("mm, 1", "where electrodes end, and their share of the voltage; with field full"),
+    "grounded": Text("", "false: the finger has no charge; with field full"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
     "roughness_gap": Text("mm", "what rough skin keeps between itself and the insulator in contact"),
+}
+HAND = {
+    "stiffness": Text("N/mm", "of the spring, per mm of depth"),
+    "damping": Text("N s/mm", "of the damper beside it, per mm of depth"),
+    "mass": Text("t", "that moves with the bone, per mm of depth"),
 }
 FRICTION = {
     "pressure": Text("MPa", "contact pressure at which the coefficient is that of the surface"),

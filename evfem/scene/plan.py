@@ -149,6 +149,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
+        *_hand(scene),
         _forms(scene, mesh),
     )
     return Plan(
@@ -270,6 +271,20 @@ def _time(scene: Scene) -> Term:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
     return Term("time", True, f"{dynamics}, backward Euler{lost}")
+
+
+def _hand(scene: Scene) -> tuple[Term, ...]:
+    """The hand between drive and bone, if there is one: its own frequency is to be resolved."""
+    hand = scene.hand
+    if hand is None:
+        return ()
+    reason = f"x of the bone an unknown, behind a spring of {hand.stiffness:g} N/mm"
+    if hand.damping > 0.0:
+        reason += f", a damper of {hand.damping:g} N s/mm"
+    if hand.mass > 0.0:
+        own = np.sqrt(hand.stiffness / hand.mass) / (2.0 * np.pi)
+        reason += f", a mass of {hand.mass:g} t: {own:.3g} Hz by themselves"
+    return (Term("hand", True, f"{reason} (per mm of depth)"),)
 
 
 def _forms(scene: Scene, mesh: Mesh) -> Term:

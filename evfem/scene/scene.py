@@ -36,6 +36,7 @@ from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw
 from evfem.scene.driven import applied, check_drive
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
+from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
 from evfem.tissue.forms import Form
@@ -158,11 +159,12 @@ class Scene:
     surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
     or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
     `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
-    "auto" where bounds say that it matters. `friction_law` says what the surface's coefficient of
+    "auto" where bounds say that it matters; only there may the finger be not `grounded`: without a
+    charge, above electrodes of different voltages. `friction_law` says what the surface's coefficient of
     friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
-    `AgeingFriction` or one's own). `depth` (mm) is how deep the plane finger is meant to be; it
-    changes no number but adds `Result.total`, in N and mm2. Raises InputError for anything that
-    does not fit together.
+    `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
+    drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
+    adds `Result.total`, in N and mm2. Raises InputError for anything that does not fit together.
     """
 
     finger: Finger
@@ -176,18 +178,27 @@ class Scene:
     drive: Drive | None = field(default=None, kw_only=True)
     roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
+    hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
     depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
+    grounded: bool = field(default=True, kw_only=True)
     field: str = field(default="local", kw_only=True)  # the last one: from here on `field` is its default
 
     def __post_init__(self) -> None:
         _check_parts(self)
         set_frozen(self, forms=tuple(self.forms))
         mistakes = Mistakes()
-        checks = (_check_electrostatics, check_drive, _check_friction, _check_motion, _check_time)
+        checks = (
+            _check_electrostatics,
+            check_drive,
+            _check_friction,
+            _check_hand,
+            _check_motion,
+            _check_time,
+        )
         for check in (*checks, _check_dynamics):
             with mistakes.of_a_part():
                 check(self)
@@ -299,6 +310,20 @@ def _check_electrostatics(scene: Scene) -> None:
         raise InputError("surface.insulator", "a law and no insulator", allowed)
 
 
+def _check_hand(scene: Scene) -> None:
+    hand = scene.hand
+    if hand is None:
+        return
+    if not isinstance(hand, Hand):
+        raise InputError("hand", quoted(hand), "a Hand, or None")
+    if isinstance(scene.voltage, FollowForce):
+        raise InputError("hand", "a hand beside a wished friction force", "one of the two")
+    for i, motion in enumerate(scene.motion if hand.timed else ()):
+        if isinstance(motion, Slide) and motion.speed is None:
+            allowed = "a speed in mm/s, needed with a hand that has a damping or a mass"
+            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
+
+
 def _check_roughness(scene: Scene) -> None:
     if isinstance(scene.roughness_gap, (int, float)) and not isinstance(scene.roughness_gap, bool):
         set_frozen(scene, roughness_gap=float(scene.roughness_gap))
@@ -313,6 +338,12 @@ def _check_roughness(scene: Scene) -> None:
 
 def _check_field(scene: Scene) -> None:
     choice("electrostatics.field", scene.field, FIELDS)
+    if not isinstance(scene.grounded, bool):
+        raise InputError("electrostatics.grounded", quoted(scene.grounded), "true or false")
+    ended = getattr(scene.surface, "electrodes", None) is not None
+    if scene.field != "full" and (ended or not scene.grounded):
+        given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"
+        raise InputError("electrostatics.field", given, "full: the column law knows neither")
     if scene.field == "local":
         return
     reasons = {

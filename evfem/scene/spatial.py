@@ -44,6 +44,8 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if not isinstance(scene.friction_law, Coulomb):
         given = f"{type(scene.friction_law).__name__} {SOLID}"
         found.append(("surface.friction_law", given, "Coulomb's law"))
+    if scene.hand is not None:
+        found.append(("hand", f"a hand {SOLID}", "no hand"))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.direction != "vertical":

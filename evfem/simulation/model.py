@@ -142,7 +142,7 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)
     assert isinstance(pad, Pad)
-    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin)
+    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin, not scene.grounded)
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -109,7 +109,7 @@ class Result(History):
     the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
-    (`SPATIAL`): `result["position_z"]`, `result["tangential_force_z"]` and the contact areas.
+    (`SPATIAL`): `position_z`, `tangential_force_z` and the contact areas.
     """
 
     frames: list[Frame]
@@ -141,6 +141,16 @@ class Result(History):
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""
         return self.in_space[name] if name in self.in_space else super().__getitem__(name)
+
+    @property
+    def position_z(self) -> Floats:
+        """z of the bone (mm); that of a finger in the plane stays 0."""
+        return self.in_space.get("position_z", np.zeros_like(self.position))
+
+    @property
+    def tangential_force_z(self) -> Floats:
+        """Sum of the contact forces against +z; none on a finger in the plane."""
+        return self.in_space.get("tangential_force_z", np.zeros_like(self.position))
 
     @property
     def units(self) -> Mapping[str, str]:

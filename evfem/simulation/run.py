@@ -44,6 +44,7 @@ from evfem.solver.control import (
     Target,
     VoltageControl,
 )
+from evfem.solver.hand import AT_REST, Grip
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
@@ -132,6 +133,8 @@ class Run:
         self.frames: list[Frame] = []
         self.time = 0.0
         self.state: State = self.model.equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
+        if scene.hand is not None:
+            self.state = replace(self.state, hand=AT_REST)
         if resume is not None:
             self._restore(resume)
 
@@ -187,7 +190,17 @@ class Run:
             }
         row = {"position_z": 0.0} | self.rows[rows_before - 1]
         names = ("position", "position_z", "indentation", "applied_force", "voltage")
-        return {name: row[name] for name in names}
+        start = {name: row[name] for name in names}
+        return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
+
+    def _driven(self, rows_before: int) -> float:
+        """x of the drive (mm) at the end of the motions of so many rows; the bone's is another one."""
+        x, done = 0.0, 0
+        for motion in self.scene.motion:
+            done += motion.steps
+            if done <= rows_before and isinstance(motion, Slide):
+                x = x + motion.distance
+        return x
 
     def _target(self, motion: Motion, start: dict[str, float], fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
@@ -221,7 +234,12 @@ class Run:
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
-        return Target(position, height, drive, z=position_z if bone.size == 3 else None)
+        along = position_z if bone.size == 3 else None
+        return Target(position, height, drive, z=along, hand=self._grip)
+
+    @property
+    def _grip(self) -> Grip | None:
+        return None if self.scene.hand is None else Grip(self.scene.hand)
 
     @staticmethod
     def _following(wish: FollowForce, position: float) -> FollowFriction:
@@ -241,7 +259,7 @@ class Run:
             if start.z is not None and end.z is not None:
                 z = start.z + fraction * (end.z - start.z)
             height = start.height.towards(end.height, fraction)
-            return Target(x, height, drive(x, fraction), duration, z)
+            return Target(x, height, drive(x, fraction), duration, z, end.hand)
 
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage

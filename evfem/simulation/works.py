@@ -15,6 +15,8 @@ The history has
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
+  with a hand that of its spring (and ``kinetic_energy``, ``viscous_dissipation`` and the work of the
+  drive have its mass and damper);
 - ``kinetic_energy`` :math:`T = v\cdot M v/2`;
 - ``friction_dissipation`` :math:`D_f = \int \mu\lambda_n\,|ds|` (or the bound of another law of
   friction) over the slip s along the profile, with
@@ -55,10 +57,10 @@ and the voltage that it had, which is the way of :math:`W_e`, and then charge fl
 
 .. math:: W_s = \Delta W_f + D_l + W_e + W_a
 
-with the ``field_energy`` of skin, gap and insulator and the work W_a of the field on the tributary
-lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction does not do and
-which is part of ``integrator_dissipation``. This holds for Strong and Troxel's law, which is the
-pressure of that field, and lacks the work on a roughness gap that changes with the load.
+with the ``field_energy`` of skin, gap and insulator, and with the ``stretch_work`` W_a of the field on
+the tributary lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction
+leaves out. This holds for Strong and Troxel's law, which is the pressure of that field, and lacks the
+work on a roughness gap that changes with the load.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
@@ -88,6 +90,7 @@ SUMS = (
     "snap_dissipation",
     "source_work",
     "leakage_dissipation",
+    "stretch_work",
 )
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
@@ -163,6 +166,8 @@ class Part:
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
         springs = float(0.5 * np.sum(self._compliance * new.contact_force**2))
+        if (hand := self.model.scene.hand) is not None:
+            springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
 
     def works(self, begin: Books, end: Books) -> dict[str, float]:
@@ -178,12 +183,16 @@ class Part:
         if np.isfinite(lost):  # the fast model has no tissue to ask
             lost -= self._contact() + friction
             lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        if (hand := self.model.scene.hand) is not None:
+            more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
+            given, viscous, lost = given + more, viscous + damped, lost + more - damped
         drag = body.drag_dissipation(new.u)
         lost -= drag
         snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
-        flow, beside = self._flow(), self._lengthening()
-        snapped = (beside, drag + lost) if snap else (lost + beside, 0.0)
-        added = (given, pulled, friction, viscous, *snapped, flow.source_work, flow.leakage)
+        snapped = (0.0, drag + lost) if snap else (lost, 0.0)
+        flow = self._flow()
+        source = (flow.source_work, flow.leakage, self._stretching())
+        added = (given, pulled, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
     def electrostatic(self) -> float:
@@ -237,7 +246,7 @@ class Part:
             return flow
         return Flow(flow.source_work + charging.field_energy(charging.old), flow.leakage)
 
-    def _lengthening(self) -> float:
+    def _stretching(self) -> float:
         """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
         attraction = self.model.attraction
         if attraction is None or attraction.charging is None:
@@ -262,7 +271,7 @@ class Part:
         assert attraction is not None
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
         volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
-        if voltages[0] == voltages[1]:
+        if attraction.charging is not None:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
@@ -281,6 +290,11 @@ class Part:
         resists = self.model.equilibrium.interface.resistance
         limit = np.array([resists(part, *each, length) for each in zip(places, normal, strict=True)])
         return float(PART @ np.sum(limit * length, axis=1))
+
+    @property
+    def _seconds(self) -> float:
+        """Of this part."""
+        return float(self.model.equilibrium.interface.duration)
 
     @cached_property
     def _x(self) -> tuple[Floats, Floats]:
@@ -330,7 +344,10 @@ class Part:
     def _snaps(self, before: Floats, after: Floats, lost: float) -> bool:
         """Whether stability was lost on the way, from the internal forces (N, dim) and L."""
         dynamics, new, old = self.model.body.dynamics, self.new, self.old
+        hand = self.model.scene.hand
         if dynamics is not None and dynamics.step > 0.0:
+            return False
+        if hand is not None and hand.timed and self._seconds > 0.0:
             return False
         moved = new.u - old.u
         along = moved - (new.bone - old.bone)

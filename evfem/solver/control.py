@@ -31,6 +31,7 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
+from evfem.solver.hand import Grip
 from evfem.solver.state import State
 
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
@@ -249,7 +250,8 @@ def sticks(state: State) -> bool:
 @dataclass(frozen=True)
 class Target:
     """Where a step goes: x of the bone (mm), what settles its height and the voltage, its seconds,
-    and in three dimensions z of the bone (mm).
+    in three dimensions z of the bone (mm), and the `hand` between drive and bone: x is then that of
+    the drive, and the bone's an unknown.
     """
 
     x: float
@@ -257,6 +259,7 @@ class Target:
     drive: VoltageControl
     duration: float = 0.0
     z: float | None = None
+    hand: Grip | None = None
 
     @classmethod
     def held(cls, bone: Floats, voltage: float) -> Target:
@@ -269,11 +272,23 @@ class Target:
         return cls(float(bone[0]), Indentation(float(bone[1])), GivenVoltage(voltage), z=z)
 
     def bone(self, present: Floats) -> Floats:
-        """Translation of the bone (dim,) as far as it is known; the `present` height where it is
-        not.
-        """
+        """Translation of the bone (dim,) as far as it is known; the `present` one where it is not."""
+        x = self.x if self.hand is None else float(present[0])
         along = [] if self.z is None else [self.z]
-        return np.array([self.x, self.height.known(float(present[1])), *along])
+        return np.array([x, self.height.known(float(present[1])), *along])
+
+    def way(self, present: Floats) -> Floats:
+        """How far the bone is likely to go from its `present` translation (dim,)."""
+        way = self.bone(present) - present
+        if self.hand is not None:
+            way[0] = self.hand.way
+        return way
+
+    def begun(self, old: State) -> Target:
+        """The target of a step that starts from `old`."""
+        if self.hand is None:
+            return self
+        return replace(self, hand=self.hand.begun(old, self.x, self.duration))
 
     def reached(self, bone: Floats) -> bool:
         """Whether the bone's translation is, to the last digit, what is known of it."""

@@ -246,6 +246,7 @@ class Equilibrium(Statics):
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
+        target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.drive.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
@@ -261,13 +262,18 @@ class Equilibrium(Statics):
                 raise StepFailed("the residual is not finite", history)
             if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):
                 self._refuse_fold(state)
-                return self.interface.aged(old, self.body.accepted(old, state))
+                return self._settled(old, self.body.accepted(old, state), target)
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(history)} iterations", history)
+
+    def _settled(self, old: State, state: State, target: Target) -> State:
+        """The accepted state with what friction and hand remember of it."""
+        state = self.interface.aged(old, state)
+        return state if target.hand is None else target.hand.settled(state)
 
     def _nearly(self, history: list[float]) -> bool:
         """Whether up to `MORE` times the iterations will do, as fast as the residuals (i,) fell in
@@ -321,7 +327,7 @@ class RigidOutline(Statics):
         gap = surface_state(self.interface.surface, self.positions(state.u)).gap
         if gap.min() <= 0.0 or target.height.free:
             raise StepFailed("a rigid outline cannot touch", [1.0])
-        return replace(state, velocity=old.velocity)
+        return replace(state, velocity=old.velocity, hand=old.hand)
 
     def verge(self, state: State, target: Target) -> None:
         """It does not deform."""

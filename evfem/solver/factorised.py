@@ -42,7 +42,7 @@ from evfem.common.constants import (
     TURNED,
 )
 from evfem.contact.attraction import Attraction
-from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
 from evfem.contact.stability import Verge, verge
@@ -118,7 +118,7 @@ class FactorisedBody:
         last.
         """
         node = self.body.space.mesh.node_sets["bone"][0]
-        last, way = state.last_increment[node], target.bone(state.bone) - state.bone
+        last, way = state.last_increment[node], target.way(state.bone)
         axis = int(np.argmax(np.abs(way)))
         # where the bone turns off, its last increment along the new way is rounding of either sign
         if way[axis] * last[axis] <= TURNED * way[axis] ** 2:
@@ -157,7 +157,9 @@ class FactorisedBody:
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
         dim = state.bone.size
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
-        missing = (target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction))
+        missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
+        if target.hand is not None:
+            missing.append(target.hand.missing(float(state.bone[0]), reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return float(free / largest)
 
@@ -192,6 +194,8 @@ class FactorisedBody:
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
+        if target.hand is not None:
+            bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _linear_step(
@@ -235,10 +239,18 @@ class FactorisedBody:
             candidates=known,
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
-            unknowns=target.height.unknowns(linearisation.tangent, float(state.bone[1])),
+            unknowns=self._unknowns(state, target),
             snap=self._scaled_down >= LOST,
             timed=self.body.dynamics is not None and self.body.dynamics.step > 0.0,
         )
+
+    def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
+        """Travels of the bone that are not given: first along y, then along x."""
+        tangent = self.linearisation.tangent
+        height = target.height.unknowns(tangent, float(state.bone[1]))
+        if target.hand is None:
+            return height
+        return (*height, target.hand.unknown(tangent, float(state.bone[0]), state.bone.size))
 
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
@@ -272,7 +284,10 @@ class FactorisedBody:
         if not step.unknowns:
             return found, step.bone
         bone = step.bone.copy()
-        bone[1] = found.extra[0]
+        for unknown, travel in zip(step.unknowns, found.extra.tolist(), strict=False):
+            bone[unknown.axis] += travel
+        if not target.height.free:
+            return found, bone
         missing = target.height.missing(float(state.bone[1]), state.reaction)
         flies = not found.status.any() and bone[1] * missing < 0.0
         if abs(bone[1]) > self.largest_bone_increment or flies:
@@ -329,7 +344,7 @@ class FactorisedBody:
         c, fraction = self.linearisation.candidates, update.fraction
         force, status = np.zeros_like(state.contact_force), np.zeros_like(state.status)
         force[c], status[c] = update.contact.force, update.contact.status
-        whole = fraction == 1.0 and not target.height.free
+        whole = fraction == 1.0 and not target.height.free and target.hand is None
         voltage = state.voltage
         if update.squared:
             squared = (voltage / KILOVOLT) ** 2 + fraction * update.squared

@@ -26,19 +26,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    ALIKE,
-    FAINT,
-    FAR,
-    LONGER,
-    NEIGHBOURS,
-    SHORTER,
-    SLOW,
-    SPARE,
-    STABLE,
-    STALLED,
-    STEEP,
-)
+from evfem.common.constants import ALIKE, FAINT, FAR, LONGER, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
@@ -112,7 +100,7 @@ class Linearisation:
         if needed[self.candidates].sum() == needed.sum():
             return
         enough = np.sort(gap)[min(int(SPARE * near.sum()), int(self.pad.free.sum()) - 1)]
-        wider = (gap <= max(enough, NEIGHBOURS * self.interface.length)) | (SPARE * weakening > steep)
+        wider = (gap <= max(enough, self.interface.neighbourhood)) | (SPARE * weakening > steep)
         wider = self.pad.free & (wider | self._deep) | needed
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None

@@ -55,7 +55,8 @@ class Relaxation:
 
     def applies(self, target: Target) -> bool:
         """Whether a way to `target` takes no time, so that nothing but an equilibrium is asked for."""
-        return self.body.dynamics is None or target.duration == 0.0
+        held = target.hand is not None and target.hand.hand.timed
+        return target.duration == 0.0 or (self.body.dynamics is None and not held)
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
         """The equilibrium at `target` where the body comes to rest when released at `state`;

@@ -13,6 +13,8 @@ from evfem.solver.strategy import Strategy
 
 #: the pressure where it is no unknown of the iterations
 NO_PRESSURE: Floats = np.zeros((0, 0))
+#: drive, velocity and force of a hand where there is none
+NO_HAND: Floats = np.zeros(0)
 #: the time since a node touched where nothing depends on it
 NO_AGE: Floats = np.zeros(0)
 #: the charges where the voltage is not resolved in time
@@ -47,8 +49,9 @@ class State:
     mm/s, and the increment of the displacements in the step that led here (N, 2). While an
     equilibrium of nearly incompressible tissue is sought, the pressure (E, Q) in MPa is an unknown
     too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
-    nodes have touched, `age` (P,) in s. Under a voltage resolved in time each pad node has two charges
-    over eps_0 (2, P) in V/mm (`evfem.contact.charging`).
+    nodes have touched, `age` (P,) in s. With a hand: x of the drive, velocity of the bone and force
+    of the drive, `hand` (3,) in mm, mm/s and N/mm. Under a voltage resolved in time each pad node
+    has two charges over eps_0 (2, P) in V/mm (`evfem.contact.charging`).
     """
 
     u: Floats
@@ -62,6 +65,7 @@ class State:
     last_increment: Floats
     pressure: Floats = field(default_factory=lambda: NO_PRESSURE)
     age: Floats = field(default_factory=lambda: NO_AGE)
+    hand: Floats = field(default_factory=lambda: NO_HAND)
     charges: Floats = field(default_factory=lambda: NO_CHARGES)
 
     @property

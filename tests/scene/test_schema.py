@@ -3,6 +3,7 @@ of the files, but not stricter.
 """
 
 import json
+import re
 import tomllib
 from dataclasses import fields
 
@@ -43,6 +44,8 @@ penalty_normal = 1.0
 penalty_tangential = 1.0
 [solver.strategy]
 [output]
+[hand]
+stiffness = 1.0
 [[motion]]
 kind = "press"
 indentation = 0.1
@@ -79,6 +82,7 @@ def test_every_key_of_the_models_has_its_row():
     found = {(one.name, one.kind): {key.name for key in one.keys} for one in scenes.sections()}
     models = {
         ("", ""): keys.SceneTable,
+        ("hand", ""): keys.HandTable,
         ("finger.electrical", ""): keys.ElectricalTable,
         ("electrostatics", ""): keys.ElectrostaticsTable,
         ("solver", ""): keys.SolverTable,
@@ -121,6 +125,7 @@ def test_every_key_says_what_it_is_and_no_text_is_left_over():
     written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
     written += [
         meanings.FRICTION,
+        meanings.HAND,
         meanings.ROUGHNESS,
         *meanings.MOTION.values(),
         meanings.SIGNAL,
@@ -218,7 +223,7 @@ def test_sweeps_have_their_schema():
     schema = sweeps.schema()
     jsonschema.Draft7Validator.check_schema(schema)
     inner = SLIDE.replace("version = 1", "").replace("[[motion]]", "[[scene.motion]]")
-    for table in ("finger", "surface", "electrostatics", "solver", "output"):
+    for table in ("finger", "surface", "electrostatics", "hand", "solver", "output"):
         inner = inner.replace(f"\n[{table}", f"\n[scene.{table}")
     grid = "[grid]\nsurface.friction = [0.1, 0.2]\n"
     samples = "[samples]\ncount = 3\nseed = 1\n[samples.parameters]\nsurface.y = { normal = [-9.0, 0.1] }\n"
@@ -257,6 +262,16 @@ def test_what_a_template_comments_out_is_a_default(name, tmp_path):
             assert not defaults or value in defaults, line
             checked += 1
     assert checked >= 2
+
+
+@pytest.mark.parametrize("name", templates.TEMPLATES)
+def test_a_template_names_every_kind(name):
+    """A comment `one | two | ...` beside a kind or a law has all there are."""
+    text = templates.text(name)
+    for kinds in (keys.SURFACES, keys.MOTIONS, LAWS):
+        for line in text.splitlines():
+            told = set(re.findall(r"\w+", line.rpartition("#")[2])) & set(kinds)
+            assert len(told) < 3 or told == set(kinds), line
 
 
 def test_a_template_makes_a_scene_and_overwrites_nothing(tmp_path):

@@ -1,0 +1,139 @@
+r"""The hand behind the finger: a spring, a damper and a mass between drive and bone.
+
+Without one the bone is moved by the drive itself. With one its x is an unknown of every step, with
+the force that the bone needs, its reaction R, as the equation: over a step of :math:`\Delta t` from
+the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
+
+.. math:: R = k (X - x) + c\,\frac{(X - X_0) - (x - x_0)}{\Delta t}
+          - \frac{m}{\Delta t}\Bigl(\frac{x - x_0}{\Delta t} - v_0\Bigr),
+
+by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
+and the bone comes to rest. Across the slide, the bone's height stays what the motion says.
+
+Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162 (stiffness and moving mass grow
+with the speed of the slide). In the plane all three are per mm of depth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, check_fields, number
+from evfem.contact.condensed import CondensedTangent, ExtraUnknown
+from evfem.solver.state import State
+
+
+@dataclass(frozen=True)
+class Hand:
+    """Spring (N/mm), damper (N s/mm) and mass (t) between drive and bone, per mm of depth.
+
+    >>> Hand(stiffness=0.1)
+    Hand(stiffness=0.1, damping=0.0, mass=0.0)
+    """
+
+    stiffness: float = field(
+        metadata=number("a stiffness in N/mm, larger than 0", Within(0.0, 1e9, above=True))
+    )
+    damping: float = field(
+        default=0.0, metadata=number("a damping in N s/mm, not negative", Within(0.0, 1e9))
+    )
+    mass: float = field(default=0.0, metadata=number("a mass in t, not negative", Within(0.0, 1e3)))
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def timed(self) -> bool:
+        """Whether it knows of time."""
+        return self.damping > 0.0 or self.mass > 0.0
+
+    def stored(self, state: State) -> float:
+        """Energy of the spring in N mm."""
+        return 0.5 * self.stiffness * (state.hand[0] - float(state.bone[0])) ** 2
+
+    def kinetic(self, state: State) -> float:
+        """Energy of the mass in N mm."""
+        return 0.5 * self.mass * float(state.hand[1]) ** 2
+
+    def given(self, old: State, new: State) -> float:
+        """What the drive does beyond the work on the bone, between two states, in N mm."""
+        drive = 0.5 * (old.hand[2] + new.hand[2]) * (new.hand[0] - old.hand[0])
+        return float(drive - 0.5 * (old.reaction[0] + new.reaction[0]) * (new.bone[0] - old.bone[0]))
+
+    def dissipation(self, old: State, new: State, duration: float) -> float:
+        """What the damper dissipates in so many seconds, in N mm."""
+        if duration == 0.0:
+            return 0.0
+        stretched = (new.hand[0] - old.hand[0]) - (new.bone[0] - old.bone[0])
+        return float(self.damping * stretched**2 / duration)
+
+
+#: drive's x (mm), the bone's velocity (mm/s) and the drive's force (N/mm) at the beginning of a run
+AT_REST: Floats = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A hand in one step: the drive's x at its end, its seconds, and before it x of drive and bone
+    (mm) and the bone's velocity (mm/s).
+    """
+
+    hand: Hand
+    drive: float = 0.0
+    duration: float = 0.0
+    before: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def begun(self, old: State, drive: float, duration: float) -> Grip:
+        """In the step from `old` that takes the drive to x = `drive`."""
+        before = (float(old.hand[0]), float(old.bone[0]), float(old.hand[1]))
+        return Grip(self.hand, drive, duration, before)
+
+    @property
+    def stiffness(self) -> float:
+        """How fast the force on the bone falls with its travel, N/mm per mm."""
+        if self.duration == 0.0:
+            return self.hand.stiffness
+        rate = 1.0 / self.duration
+        return self.hand.stiffness + rate * (self.hand.damping + rate * self.hand.mass)
+
+    @property
+    def way(self) -> float:
+        """How far the bone goes if nothing changes (mm)."""
+        return self.before[2] * self.duration
+
+    def velocity(self, x: float) -> float:
+        """Of the bone at the end of the step, in mm/s."""
+        return (x - self.before[1]) / self.duration if self.duration > 0.0 else 0.0
+
+    def driving(self, x: float) -> float:
+        """Force of the drive (N/mm), that of spring and damper, at the bone's x."""
+        force = self.hand.stiffness * (self.drive - x)
+        if self.duration > 0.0:
+            stretched = (self.drive - self.before[0]) - (x - self.before[1])
+            force += self.hand.damping * stretched / self.duration
+        return force
+
+    def force(self, x: float) -> float:
+        """What of it comes to the bone (N/mm), the mass taken off."""
+        force = self.driving(x)
+        if self.duration > 0.0:
+            force -= self.hand.mass * (self.velocity(x) - self.before[2]) / self.duration
+        return force
+
+    def missing(self, x: float, reaction: Floats) -> float:
+        """Force along x (N/mm) that the bone lacks at its x and reactions (dim,)."""
+        return float(self.force(x) - reaction[0])
+
+    def unknown(self, tangent: CondensedTangent, x: float, dim: int) -> ExtraUnknown:
+        """The bone's travel from x, in mm."""
+        push = -tangent.schur[:, -dim]
+        push[-dim] -= self.stiffness
+        return ExtraUnknown(push, 0, self.force(x))
+
+    def settled(self, state: State) -> State:
+        """The accepted state with drive, velocity and force."""
+        x = float(state.bone[0])
+        return replace(state, hand=np.array([self.drive, self.velocity(x), self.driving(x)]))

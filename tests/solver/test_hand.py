@@ -1,0 +1,195 @@
+"""A spring, a damper and a mass between drive and bone, against what they do by themselves."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from tools.builders import benchmark_finger, coarse_pad, finger
+from tools.meshes import block
+
+import evfem as ev
+from evfem.errors import InputError
+from evfem.scene.file import dump, loads
+from evfem.scene.plan import plan
+from evfem.simulation.result import Saved
+
+pytestmark = pytest.mark.solver
+#: hardly deforms: 4 mm on 0.02 mm of 50 MPa
+SLAB = finger(block(2, 1, width=4.0, height=0.02), E=50.0, nu=0.0)
+N, K, M = 0.04, 0.02, 1e-6
+OMEGA = np.sqrt(K / M)
+OUTPUT = ev.Output(every=100_000)
+
+
+def slab(hand, *slides, mu=0.4, **more):
+    motion = [ev.Press(force=N, steps=1), *slides]
+    return ev.Scene(SLAB, ev.Flat(friction=mu), motion=motion, hand=hand, output=OUTPUT, **more)
+
+
+def slid(distance, steps, speed=1.0, hold="force"):
+    return ev.Slide(distance, steps=steps, hold=hold, speed=speed)
+
+
+def remainder(result):
+    lost = result.friction_dissipation + result.integrator_dissipation + result.snap_dissipation
+    kept = result.stored_energy + result.kinetic_energy + result.viscous_dissipation
+    given = result.external_work + result.electrostatic_work
+    return np.abs(given - lost - kept).max() / np.abs(given).max()
+
+
+@pytest.mark.parametrize("hold", ["force", "indentation"])
+def test_behind_a_spring_the_bone_sticks_until_it_is_stretched_and_then_lags_behind(hold):
+    """The stretch of full slip is mu N / k = 0.8 mm, forwards and, 1.6 mm later, backwards."""
+    hand = ev.Hand(K)
+    result = ev.simulate(slab(hand, slid(1.2, 6, None, hold), slid(-2.0, 5, None, hold)))
+    drive = np.append(0.0, np.concatenate([np.linspace(0.2, 1.2, 6), np.linspace(0.8, -0.8, 5)]))
+    lag = np.array([0.0, 0.2, 0.4, 0.6, 0.8, 0.8, 0.8, 0.4, 0.0, -0.4, -0.8, -0.8])
+    np.testing.assert_allclose(result.position, drive - lag, atol=2e-4)
+    np.testing.assert_allclose(result.applied_tangential_force, K * (drive - result.position), atol=1e-10)
+    assert remainder(result) < 1e-9
+    # the drive has stretched the spring, and friction has taken the way of the bone
+    friction = 0.4 * N * np.abs(np.diff(result.position)).sum()
+    assert result.friction_dissipation[-1] == pytest.approx(friction, rel=2e-3)
+    assert result.external_work[4] == pytest.approx(0.5 * K * 0.8**2, rel=2e-3)
+
+
+@pytest.mark.parametrize("damping", [0.0, 4e-5])
+def test_without_friction_the_bone_swings_about_the_drive(damping):
+    """e'' + (c/m) e' + (k/m) e = 0 with the drive's speed at the start; the error of backward Euler
+    falls with the step.
+    """
+    decay = 0.5 * damping / M
+    omega = np.sqrt(OMEGA**2 - decay**2)
+    errors = []
+    for steps in (100, 200):
+        result = ev.simulate(slab(ev.Hand(K, damping, M), slid(0.02, steps), mu=0.0))
+        t = result.time
+        stretch = np.exp(-decay * t) * np.sin(omega * t) / omega
+        errors.append(np.abs(result.position - (t - stretch)).max() * omega)
+        assert remainder(result) < 1e-9
+    assert errors[1] < 0.1
+    assert 1.7 < errors[0] / errors[1] < 2.3
+    assert (result.viscous_dissipation[-1] > 0.0) == (damping > 0.0)
+
+
+def test_the_books_know_the_energies_of_the_hand():
+    """By themselves: the spring's from the stretch, the mass's from the steps of the bone."""
+    hand = ev.Hand(K, 4e-5, M)
+    result = ev.simulate(slab(hand, slid(0.01, 50), mu=0.0))
+    steps = np.diff(result.position)
+    speed = steps / np.diff(result.time)
+    drive = np.append(0.0, np.linspace(0.0002, 0.01, 50))
+    stretch = drive - result.position
+    assert result.kinetic_energy[-1] == pytest.approx(0.5 * M * speed[-1] ** 2, rel=1e-9)
+    pressed = result.stored_energy[0]
+    np.testing.assert_allclose(result.stored_energy - pressed, 0.5 * K * stretch**2, atol=1e-8 * K)
+    damped = np.cumsum(4e-5 * np.diff(stretch) ** 2 / np.diff(result.time))
+    np.testing.assert_allclose(result.viscous_dissipation[1:], damped, rtol=1e-9)
+
+
+STRIBECK = ev.RateFriction(speed=0.5, ratio=0.5)
+
+
+def reference(hand, speed):
+    """Times of stick and of slip of a mass on a spring under Stribeck's friction, by an integrator
+    with events.
+    """
+
+    def acceleration(stretch, v):
+        mu = 0.4 * (0.5 + 0.5 * np.exp(-max(v, 0.0) / 0.5))
+        return (hand.stiffness * stretch + hand.damping * (speed - v) - N * mu) / hand.mass
+
+    def stops(t, y):
+        return y[1]
+
+    stops.terminal, stops.direction = True, -1
+    begin = (0.4 * N - hand.damping * speed) / hand.stiffness
+    way = solve_ivp(
+        lambda t, y: [speed - y[1], acceleration(*y)], (0.0, 1.0), [begin, 1e-9],
+        events=stops, rtol=1e-10, atol=1e-13,
+    )  # fmt: skip
+    return (begin - way.y_events[0][0][0]) / speed, way.t_events[0][0]
+
+
+def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
+    """The slip is followed in 600 steps, the sticking spring before and after it in few: it is as
+    straight as they are. Backward Euler takes a part of the swing that falls with the step.
+    """
+    hand = ev.Hand(K, mass=M)
+    stick, slip = reference(hand, 1.0)
+    before, fine = 0.799, 1.3 * slip + 0.001
+    rest = 0.98 * (stick + slip) - fine + 0.001
+    result = ev.simulate(
+        slab(hand, slid(before, 3), slid(fine, 600), slid(rest, 3), slid(0.03, 60), friction_law=STRIBECK)
+    )
+    speed = np.diff(result.position) / np.diff(result.time)
+    assert remainder(result) < 1e-8
+    # sticks again at the end of the slip, and the spring is stretched by the drive alone
+    held = slice(580, 606)
+    assert np.abs(speed[held]).max() == pytest.approx(K * 0.02 / (25.0 * 4.0), rel=1e-3)  # of the slab itself
+    first = 0.4 * N / K
+    lacking = 0.4 * N - result.applied_tangential_force[604]
+    second = result.time[604] - result.time[0] + lacking / K
+    assert second - first == pytest.approx(stick + slip, rel=0.01)
+    # and there it slips
+    again = result.time[1:][np.flatnonzero((speed > 1.0) & (result.time[1:] > 0.83))[0]] - result.time[0]
+    assert again == pytest.approx(second, abs=0.02)
+
+
+def test_a_stiff_hand_is_none():
+    motion = [ev.Press(force=0.03, steps=2), ev.Slide(0.4, steps=4, speed=10.0, hold="force")]
+    scene = ev.Scene(benchmark_finger(), ev.Flat(friction=0.4), motion=motion, output=OUTPUT)
+    held = ev.Scene(
+        benchmark_finger(), ev.Flat(friction=0.4), motion=motion, hand=ev.Hand(1e5), output=OUTPUT
+    )
+    one, other = ev.simulate(scene), ev.simulate(held)
+    for name in ("tangential_force", "normal_force", "position", "friction_dissipation"):
+        np.testing.assert_allclose(other[name], one[name], rtol=1e-5, atol=1e-7)
+    assert remainder(other) < 1e-6
+
+
+@pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
+def test_a_finger_with_time_of_its_own_goes_with_a_hand(dynamics):
+    pad = ev.FingerPad(ridges=False, resolution="coarse", viscosity=1e-3)
+    motion = [ev.Press(force=0.05, steps=2), ev.Slide(0.3, steps=6, speed=20.0, hold="force")]
+    scene = ev.Scene(
+        pad, ev.Flat(friction=0.4), motion=motion, hand=ev.Hand(0.2, 1e-4, 1e-7),
+        solver=ev.Solver(dynamics=dynamics), output=OUTPUT, friction_law=ev.RateFriction(20.0, ratio=1.2),
+    )  # fmt: skip
+    result = ev.simulate(scene)
+    assert remainder(result) < 1e-6
+    assert 0.0 < result.position[-1] < 0.3
+    assert result.substeps.max() == 1
+
+
+def test_a_resumed_run_goes_on_with_its_hand():
+    kept = []
+
+    class Keep:
+        def step(self, row, frame, checkpoint):
+            kept.append(checkpoint())
+
+    scene = slab(ev.Hand(K, 1e-6, M), slid(0.01, 4), slid(0.01, 4), mu=0.1)
+    whole = ev.simulate(scene, observers=[Keep()])
+    for rows in (3, 5, 7):
+        resumed = ev.simulate(scene, resume=Saved(kept[rows - 1], whole.rows[:rows]))
+        np.testing.assert_array_equal(resumed.position, whole.position)
+
+
+def test_a_scene_file_says_it_and_what_cannot_be_is_refused():
+    scene = ev.Scene(
+        coarse_pad(), ev.Flat(), motion=[ev.Press(force=0.05), slid(1.0, 5)], hand=ev.Hand(0.1, mass=1e-7)
+    )
+    again = loads(dump(scene))
+    assert again == scene
+    assert "159 Hz" in next(term.reason for term in plan(scene).terms if term.name == "hand")
+    with pytest.raises(InputError, match=r"hand\.stiffness"):
+        loads(dump(scene).replace("stiffness = 0.1", "stiffness = 0.0"))
+    with pytest.raises(InputError, match=r"motion\[1\].speed"):
+        slab(ev.Hand(K, mass=M), slid(1.0, 5, None))
+    with pytest.raises(InputError, match="wished friction force"):
+        ev.Scene(
+            SLAB, ev.Display(), ev.Kaczmarek(), ev.FollowForce([0.0, 1.0], [0.0, 0.01], 100.0),
+            [ev.Press(force=N), slid(1.0, 5)], hand=ev.Hand(K),
+        )  # fmt: skip
+    with pytest.raises(InputError, match="hand"):
+        slab(0.1, slid(1.0, 5))
