@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,10 @@ class RunFolder:
         self._pending = (row, frame, checkpoint)
         self._commit()
 
+    @cached_property
+    def _checkpoint(self) -> Checkpoint:
+        return Checkpoint(self.path / STATE)
+
     @property
     def begun(self) -> bool:
         """Whether a step has converged, so that there is something to keep."""
@@ -99,7 +104,7 @@ class RunFolder:
         if frame is not None and self._series is not None and self.mesh is not None and self._wants(row):
             self._series.add(row, frame, self.mesh)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            Checkpoint(self.path / STATE).write(self._digest, checkpoint(), [*self.rows, row])
+            self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
         if self._series is not None:
