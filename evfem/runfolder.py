@@ -14,6 +14,7 @@ import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,10 @@ class RunFolder:
         self._pending = (row, frame, checkpoint)
         self._commit()
 
+    @cached_property
+    def _checkpoint(self) -> Checkpoint:
+        return Checkpoint(self.path / STATE)
+
     @property
     def begun(self) -> bool:
         """Whether a step has converged, so that there is something to keep."""
@@ -99,7 +104,7 @@ class RunFolder:
         if frame is not None and self._series is not None and self.mesh is not None and self._wants(row):
             self._series.add(row, frame, self.mesh)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            Checkpoint(self.path / STATE).write(self._digest, checkpoint(), [*self.rows, row])
+            self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
         if self._series is not None:
@@ -267,7 +272,7 @@ WIDTHS = (9, 8, 8, 10, 10, 11, 11)
 
 def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> str:
     """At most about `most` rows of a history, always the last of each motion, in 80 columns; over
-    a whole `depth` (mm) forces are in N.
+    a whole `depth` (mm), and of a finger in three dimensions, forces are in N.
 
     >>> row = dict.fromkeys(HEADS, 0.0) | {"step": 1, "motion": "press", "motion_index": 0}
     >>> print(table([row]))
@@ -275,7 +280,7 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
                        mm      mm       V      N/mm      N/mm       N/mm       N/mm
        1 press      0.000   0.000       0   0.00000   0.00000    0.00000    0.00000
     """
-    units = UNITS if depth is None else WHOLE_UNITS
+    units = UNITS if depth is None and not any("contact_area" in row for row in rows) else WHOLE_UNITS
     lines = [_line("step", "motion", list(HEADS.values())), _line("", "", [units[name] for name in HEADS])]
     for row in (rows[i] for i in chosen(rows, most)):
         row = row if depth is None else over_depth(row, depth)

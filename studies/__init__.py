@@ -15,6 +15,7 @@ from evfem.errors import InputError, quoted
 NAMES = (
     "section321",
     "laws",
+    "fringe",
     "fig05",
     "fig06",
     "fig07",
@@ -26,6 +27,8 @@ NAMES = (
     "fig13",
     "participants",
     "uncertainty",
+    "frequency",
+    "hypotheses",
     "friction_spectrum",
     "stick_slip",
     "stability",

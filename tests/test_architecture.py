@@ -73,7 +73,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "colours labels figures fields ground outline finger curves beside pressing spectra sweeps "
+        "colours labels figures fields ground outline finger footprint curves beside pressing spectra sweeps "
         "fits tractions meshes movie",
     ),
     "studio": ({"numpy"}, "state page runs server"),

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,8 @@ from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_table
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.keys import shown
+from evfem.scene.scene import DEPTH
+from evfem.simulation.history import over_depth
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
@@ -122,9 +124,13 @@ class MeasuredCurve:
         motion: int | None = None,
         sd: float | None = None,
         where: Mapping[str, Any] | None = None,
+        depth: float | None = None,
     ) -> MeasuredCurve:
         """The curve in a file with the header `OVER,COLUMN` or `OVER,COLUMN,sd`, two columns of
         the history: `indentation,normal_force`.
+
+        With a `depth` (mm) the file is in N, mm2 and mJ over this depth, as an experiment is and
+        `Result.total`, and what depends on it is divided by it, `sd` too.
         """
         table = read_table(Path(path), "data")
         spread = sd if "sd" not in table else table.pop("sd")
@@ -132,7 +138,15 @@ class MeasuredCurve:
             given = f"{path} with the header {','.join(table)}"
             raise InputError("data", given, "two columns of the history, as indentation,normal_force; and sd")
         (over, at), (column, values) = table.items()
-        return cls(column, over, at, values, motion, spread, where or {})
+        curve = cls(column, over, at, values, motion, spread, where or {})
+        return curve if depth is None else curve._per_depth(DEPTH["check"]("data.depth", depth))
+
+    def _per_depth(self, depth: float) -> MeasuredCurve:
+        """Numbers over a depth (mm), per mm of it."""
+        given = {"at": self.over, "values": self.column, "sd": self.column}
+        parts = {key: getattr(self, key) for key in given if getattr(self, key) is not None}
+        divided = {key: over_depth({given[key]: part}, 1.0 / depth) for key, part in parts.items()}
+        return replace(self, **{key: part[given[key]] for key, part in divided.items()})
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -63,7 +63,7 @@ def plain(value: Values) -> Values:
     >>> plain(np.array(2.5))
     2.5
     """
-    return value.item() if np.ndim(value) == 0 and isinstance(value, (np.ndarray, np.generic)) else value
+    return value.item() if isinstance(value, (np.ndarray, np.generic)) and value.ndim == 0 else value
 
 
 def above(key: str, given: Values, lowest: float, allowed: str) -> Values:

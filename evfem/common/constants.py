@@ -29,9 +29,12 @@ SEARCH_END              and ends at this fraction of the force that was lacking 
 SEARCH_LIMIT            or after so many contact problems                                         attraction
 GROWTH_LIMIT            a residual so many times the smallest of the step ends it,                contact
 GROWTH_GRACE            but not before so many iterations
-SPARE                   candidates are chosen so many times more than needed, as every new        A
-                        choice costs an analysis of the matrix
+SPARE                   candidates are chosen so many times more than needed, and with            A
+                        attractions so many times less steep, as every new choice costs an
+                        analysis of the matrix
 REACH                   a gap below so many times the step's travel makes a candidate             A
+FAR                     so many times as high as the scene's deepest indentation, nodes of the    A
+                        undeformed outline become candidates with the first ones
 NEIGHBOURS              and so does one below so many node distances once any is chosen           B
 STEEP                   an attraction whose negative stiffness exceeds this fraction of the       thin
                         softest shear modulus per height of the body makes its node a candidate   insulators
@@ -105,8 +108,9 @@ GROWTH_LIMIT = 1e3
 GROWTH_GRACE = 8
 SPARE = 1.5
 REACH = 1.2
+FAR = 1.3
 NEIGHBOURS = 4.0
-STEEP = 0.02
+STEEP = 0.05
 FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5

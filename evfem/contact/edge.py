@@ -36,6 +36,8 @@ def outline_nodes(mesh: Mesh) -> Ints:
     >>> len(nodes) == len(mesh.node_sets["pad"]), bool(mesh.points[nodes[0], 0] < 0)
     (True, True)
     """
+    if mesh.dim == 3:
+        raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
     edges = mesh.edges_of("pad")
     follow = {int(edge[0]): [int(node) for node in (*edge[2:], edge[1])] for edge in edges}
     starts = set(follow) - {nodes[-1] for nodes in follow.values()}

@@ -108,11 +108,12 @@ def certificate(x: Floats, gap: Floats, insulator: tuple[float, float], skin: Fl
 @dataclass(frozen=True, eq=False)
 class FieldAttraction(Attraction):
     """The attraction of the full field: `edges` (K,) of the pad that face the display, from left to
-    right, and the skin's layer under each pad node, `skin`.
+    right, and the skin's layer under each pad node, `skin`; a `floating` finger has no charge.
     """
 
     edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     skin: Any = None
+    floating: bool = False
     solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
 
     @property
@@ -152,7 +153,8 @@ class FieldAttraction(Attraction):
         self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
     ) -> Floats:
         """Forces (W, P, 2) at W places of a way, each from its own solution."""
-        forces = self.flanks.forces_along(positions, voltages, touching, pressing)
+        share = self.share(positions[..., 0])[..., None]
+        forces = share**2 * self.flanks.forces_along(positions, voltages, touching, pressing)
         for k, (position, voltage) in enumerate(zip(positions, voltages.tolist(), strict=True)):
             if voltage != 0.0:
                 own = None if pressing is None else pressing[k]
@@ -170,6 +172,13 @@ class FieldAttraction(Attraction):
     def has_energy(self) -> bool:  # type: ignore[override]
         """Without rough faces, whose gap depends on the contact forces."""
         return self.roughness is None
+
+    def negative_stiffness(
+        self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """The column law's, where an electrode is below."""
+        weakening = super().negative_stiffness(position, voltage, touching, pressing)
+        return np.asarray(self.share(position[:, 0]) ** 2 * weakening)
 
     def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
         """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
@@ -189,11 +198,24 @@ class FieldAttraction(Attraction):
         key = x.tobytes() + levels.tobytes()
         found = self.solved.get(key)
         if found is None:
-            found = self._columns.solve(x, levels)
+            found = self._columns.solve(x, levels, self._electrodes, self.floating)
             self.solved[key] = found
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
         return found
+
+    @property
+    def _electrodes(self) -> Floats | None:
+        """Electrodes that end, (K, 3), or None for one without end."""
+        electrodes = getattr(self.surface, "electrodes", None)
+        return None if electrodes is None else np.asarray(electrodes, dtype=float)
+
+    def share(self, x: Floats) -> Floats:
+        """Share of the voltage of the electrode below x (...); 0 where there is none."""
+        if self._electrodes is None:
+            return np.ones_like(x)
+        over = [np.where((x >= a) & (x <= b), share, 0.0) for a, b, share in self._electrodes]
+        return np.asarray(sum(over))
 
     @cached_property
     def _columns(self) -> Columns:
@@ -251,6 +273,8 @@ class FieldAttraction(Attraction):
         """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its
         bounds.
         """
+        if self._electrodes is not None or self.floating:
+            return  # the bounds are those of a grounded pad over one electrode
         bounds = self.bounds(*self.outline(position, self.seen(position)))
         value = self.solve(position).value
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):

@@ -122,24 +122,36 @@ def fold(position: Floats, segments: Ints, touching: Any, down: Any) -> float | 
     if pressed.size:
         return float(begin[pressed[0], 0])
     # begin and end of b are on both sides of the line through a, and the other way round
-    before, after = (_sides(begin, end, point) for point in (begin, end))
-    apart = before * after < 0.0
-    crossed = np.argwhere(apart & apart.T)
+    a, b = _near(begin, end)
+    before, after = (_side(begin[a], end[a], point[b]) for point in (begin, end))
+    back, forth = (_side(begin[b], end[b], point[a]) for point in (begin, end))
+    crossed = np.flatnonzero((before * after < 0.0) & (back * forth < 0.0))
     if not crossed.size:
         return None
-    a, b = crossed[0]
-    way = before[a, b] / (before[a, b] - after[a, b])
-    return float(begin[b, 0] + way * (end[b, 0] - begin[b, 0]))
+    first = crossed[0]
+    way = before[first] / (before[first] - after[first])
+    return float(begin[b[first], 0] + way * (end[b[first], 0] - begin[b[first], 0]))
 
 
-def _sides(begin: Floats, end: Floats, point: Floats) -> Floats:
-    """On which side of each segment (S, 2), from begin to end, the points (S, 2) are: (S, S)."""
-    way, to = end - begin, point[None] - begin[:, None]
-    return way[:, None, 0] * to[..., 1] - way[:, None, 1] * to[..., 0]
+def _near(begin: Floats, end: Floats) -> tuple[Ints, Ints]:
+    """Pairs a < b of segments (S, 2), from begin to end, whose boxes overlap: (K,) and (K,)."""
+    low, high = np.minimum(begin, end), np.maximum(begin, end)
+    apart = low[:, None, 0] > high[:, 0]
+    apart |= low[:, None, 1] > high[:, 1]
+    a, b = np.nonzero(~(apart | apart.T))
+    return a[a < b], b[a < b]
+
+
+def _side(begin: Floats, end: Floats, point: Floats) -> Floats:
+    """On which side of segments (K, 2), from begin to end, the points (K, 2) are: (K,)."""
+    way, to = end - begin, point - begin
+    return way[:, 0] * to[:, 1] - way[:, 1] * to[:, 0]
 
 
 def make_pad(mesh: Mesh) -> Pad:
-    """The pad of a mesh; raises InputError where no outer edge belongs to it."""
+    """The pad of a plane mesh; raises InputError where no outer edge belongs to it."""
+    if mesh.dim == 3:
+        raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
     edges = mesh.edges_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(edges):
         raise InputError(

@@ -33,6 +33,7 @@ FRICTION = (
     "a number from 0 to 100, or a table [[x, mu], ...] with mu from 0 to 100 and x not decreasing, "
     "within 1e6 mm, in at most 10000 rows"
 )
+ELECTRODES = "rows [from, to, share] in mm from left to right, gaps in between, shares from -1 to 1"
 TERMS = (
     "a list of at most 1000 rows [amplitude, wavenumber, phase], amplitudes within 1e3 mm, wavenumbers and "
     "phases within 1e6"
@@ -172,6 +173,9 @@ class Display(_Level):
     """A level display: an insulator over an electrode, by default the film of Table 2 (0.09 mm,
     eps_r 3.35).
 
+    `electrodes` are rows [from, to, share] of electrodes that end, in mm, from left to right with gaps
+    between them, each at its share (-1 to 1) of the scene's voltage; None is one without end.
+
     >>> from evfem.electrostatics.laws import TOUCHSCREEN
     >>> Display().insulator, Display(TOUCHSCREEN).insulator
     (Layer(thickness=0.09, eps_r=3.35), Layer(thickness=0.001, eps_r=3.9))
@@ -180,9 +184,18 @@ class Display(_Level):
     insulator: Layer | None = FILM
     friction: float | Rows = 0.3
     y: float | None = None
+    electrodes: Rows | None = None
 
     def __post_init__(self) -> None:
         self._check_common()
+        if self.electrodes is None:
+            return
+        rows = _rows("surface.electrodes", self.electrodes, 3, ELECTRODES, MOST_TERMS)
+        table = np.array(rows)
+        ends = table[:, :2].ravel()
+        if np.any(np.diff(ends) <= 0.0) or np.any(np.abs(table[:, 2]) > 1.0):
+            raise InputError("surface.electrodes", quoted(self.electrodes), ELECTRODES)
+        set_frozen(self, electrodes=rows)
 
 
 @dataclass(frozen=True)

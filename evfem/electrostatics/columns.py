@@ -32,6 +32,8 @@ _AT, _WEIGHT = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]),
 _N, _DN = np.stack([1 - _AT, _AT]), np.outer([-1.0, 1.0], np.ones_like(_AT))
 _UP = np.stack([(1 - _AT) * (1 - 2 * _AT), 4 * _AT * (1 - _AT), _AT * (2 * _AT - 1)])
 _DUP = np.stack([4 * _AT - 3, 4 - 8 * _AT, 4 * _AT - 1])
+#: share of the lowest layer that is taken as columns on electrodes that end
+THIN = 0.2
 #: shape functions of a cell
 _SHAPES = 6
 
@@ -58,17 +60,72 @@ class Columns:
     eps_r: tuple[float, ...]
     shares: tuple[Floats, ...]
 
-    def solve(self, x: Floats, levels: Floats) -> Capacitance:
+    def solve(
+        self, x: Floats, levels: Floats, electrodes: Floats | None = None, floating: bool = False
+    ) -> Capacitance:
         """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
+
+        `electrodes` (K, 3) are pieces of the lowest curve, from and to in mm and their voltage over U;
+        between them nothing crosses it. Without, all of it is one electrode. The highest curve is at
+        0, or, `floating`, at the potential at which it has no charge.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
         >>> round(found.value / eps_0, 9), round(found.by_level[1].sum() / eps_0, 6)
         (10.0, -100.0)
         """
-        cells = _Cells(self, x, levels)
-        phi = cells.potential()
-        return cells.capacitance(phi)
+        if electrodes is None:
+            cells = _Cells(self, x, levels)
+            return cells.capacitance(cells.potential(None, floating), None)
+        raised = levels.copy()
+        raised[0] += THIN * (levels[1] - levels[0])
+        cells = _Cells(self, x, raised)
+        strips = _Strips(x, electrodes, self.eps_r[0] / (THIN * float(np.mean(levels[1] - levels[0]))))
+        found = cells.capacitance(cells.potential(strips, floating), strips)
+        found.by_level[1] += THIN * found.by_level[0]
+        found.by_level[0] *= 1.0 - THIN
+        return found
+
+
+class _Strips:
+    """Electrodes that end somewhere. The share `THIN` of the lowest layer's thickness is taken as columns
+    that stand on them: kappa times the integral of (phi - V)^2 joins the energy, exactly as far as they
+    reach into a cell. So plates stay exact, the field at an edge is smoothed over that thickness, and
+    the energy changes smoothly when lines that are as close as that move over an edge.
+    """
+
+    def __init__(self, x: Floats, electrodes: Floats, kappa: float) -> None:
+        begin, end, voltage = np.asarray(electrodes, dtype=float).T[:, :, None]
+        width = np.diff(x)
+        low, high = (np.clip((place - x[:-1]) / width, 0.0, 1.0) for place in (begin, end))  # (K, E)
+        self.at = low[..., None] + (high - low)[..., None] * _AT  # (K, E, q)
+        self.weight = kappa * (high - low)[..., None] * _WEIGHT
+        self.width, self.voltage = width, voltage[..., None]
+        self.shapes = np.stack([1.0 - self.at, self.at])  # (2, K, E, q)
+
+    def matrix(self) -> tuple[Floats, Floats]:
+        """Diagonal (L,) and off-diagonal (L - 1,) of what joins the matrix of the lowest row."""
+        weight = self.weight * self.width[:, None]
+        own = [np.sum(weight * shape**2, axis=(0, 2)) for shape in self.shapes]
+        return np.append(own[0], 0.0) + np.append(0.0, own[1]), np.sum(
+            weight * np.prod(self.shapes, 0), axis=(0, 2)
+        )
+
+    def load(self) -> Floats:
+        """What joins the right-hand side of the lowest row (L,)."""
+        weight = self.weight * self.width[:, None] * self.voltage
+        own = [np.sum(weight * shape, axis=(0, 2)) for shape in self.shapes]
+        return np.asarray(np.append(own[0], 0.0) + np.append(0.0, own[1]))
+
+    def energy(self, phi: Floats) -> tuple[float, Floats]:
+        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,): the
+        electrodes stay where they are when the lines move.
+        """
+        beyond = phi[:-1, None] * self.shapes[0] + phi[1:, None] * self.shapes[1] - self.voltage
+        value = float(np.sum(self.weight * self.width[:, None] * beyond**2))
+        rise = np.diff(phi)
+        rate = [-2.0 * rise * np.sum(self.weight * beyond * shape, axis=(0, 2)) for shape in self.shapes]
+        return value, np.append(rate[0], 0.0) + np.append(0.0, rate[1])
 
 
 class _Cells:
@@ -118,35 +175,64 @@ class _Cells:
         number = self.lines[None, :, :, None] * per_line + rows[:, None, None, :]
         return np.asarray(number.reshape(self.layer.size, self.lines.shape[0], _SHAPES))
 
-    def potential(self) -> Floats:
-        """Potential (L, rows) that is 1 on the lowest curve and 0 on the highest one."""
-        from scipy.linalg import solveh_banded
+    def potential(self, strips: _Strips | None, floating: bool) -> Floats:
+        """Potential (L, rows): 1 on the lowest curve, or as the strips hold it, and 0 on the highest one,
+        or constant there.
+        """
+        from scipy.linalg import cho_solve_banded, cholesky_banded
 
         self.matrices = self._matrices()
         per_line, lines = 2 * self.layer.size + 1, int(self.lines[-1, -1]) + 1
-        phi = np.zeros((lines, per_line))
-        phi[:, 0] = 1.0
+        given = np.zeros((2, lines, per_line))  # for the electrodes, and for 1 on the highest curve
+        given[1, :, -1] = 1.0
+        given[0, :, 0] = float(strips is None)
+        load = np.stack([self._load(one) for one in given])
+        held = [0, per_line - 1] if strips is None else [per_line - 1]
+        band = self._band(strips, held)
+        if strips is not None:
+            load[0, :, 0] += strips.load()
+        load[:, :, held] = 0.0
+        factor = cholesky_banded(band, lower=True, check_finite=False)
+        wanted = load[: 2 if floating else 1].reshape(-1, lines * per_line).T
+        free = cho_solve_banded((factor, True), wanted, check_finite=False).T
+        phi = free.reshape(-1, lines, per_line) + given[: len(free)]
+        if not floating:
+            return np.asarray(phi[0])
+        charges = [float(np.sum(self._load(one)[:, -1])) for one in phi]
+        return np.asarray(phi[0] - charges[0] / charges[1] * phi[1])
+
+    def _load(self, phi: Floats) -> Floats:
+        """Minus the matrix times a potential (L, rows)."""
         numbers = self.numbers
         local = self.matrices @ phi.ravel()[numbers][..., None]
-        load = -np.bincount(numbers.ravel(), local.ravel(), phi.size).reshape(phi.shape)
-        width = per_line + 3
+        return np.asarray(
+            -np.bincount(numbers.ravel(), local.ravel(), phi.size).reshape(phi.shape), dtype=float
+        )
+
+    def _band(self, strips: _Strips | None, held: list[int]) -> Floats:
+        """The matrix as a lower band, (width, unknowns); the rows `held` of every line drop out."""
+        numbers, per_line = self.numbers, 2 * self.layer.size + 1
+        lines = int(self.lines[-1, -1]) + 1
+        width, size = per_line + 3, per_line * lines
         first = np.broadcast_to(numbers[..., :, None], self.matrices.shape)
         second = np.broadcast_to(numbers[..., None, :], self.matrices.shape)
         below = first >= second
-        place = ((first - second) * phi.size + second)[below]
-        band = np.bincount(place, self.matrices[below], width * phi.size).reshape(width, -1)
-        for row in (0, per_line - 1):  # what is known drops out
+        place = ((first - second) * size + second)[below]
+        band = np.asarray(np.bincount(place, self.matrices[below], width * size), dtype=float)
+        band = band.reshape(width, -1)
+        if strips is not None:
+            diagonal, beside = strips.matrix()
+            band[0, ::per_line] += diagonal
+            band[per_line, :-per_line:per_line] += beside
+        for row in held:  # what is known drops out
             known = np.arange(lines) * per_line + row
-            load[:, row] = 0.0
             band[:, known] = 0.0
             for k in range(1, width):
-                before = known[known >= k] - k
-                band[k, before] = 0.0
+                band[k, known[known >= k] - k] = 0.0
             band[0, known] = 1.0
-        free = solveh_banded(band, load.ravel(), lower=True, check_finite=False)
-        return np.asarray(phi + free.reshape(phi.shape))
+        return np.asarray(band)
 
-    def capacitance(self, phi: Floats) -> Capacitance:
+    def capacitance(self, phi: Floats, strips: _Strips | None) -> Capacitance:
         """C and its derivatives for a potential (L, rows)."""
         local = phi.ravel()[self.numbers]
         value = float(np.sum(local * (self.matrices @ local[..., None])[..., 0]))
@@ -166,14 +252,17 @@ class _Cells:
         lower = work(slope * (1.0 - share), -shape * rise, xy, yy)
         upper = work(slope * share, shape * rise, xy, yy)
         lines = phi.shape[0]
-        by_x = np.bincount(self.lines.ravel(), moved_x.sum(axis=0).ravel(), lines)
+        by_x = np.bincount(self.lines.ravel(), moved_x.sum(axis=0).ravel(), lines).astype(float)
         by_level = np.zeros(self.levels.shape)
         for layer in range(len(self.levels) - 1):
             own = self.layer == layer
             for k, part in ((layer, lower), (layer + 1, upper)):
                 by_level[k] += np.bincount(self.lines.ravel(), part[own].sum(axis=0).ravel(), lines)
+        if strips is not None:
+            held, moved = strips.energy(phi[:, 0])
+            value, by_x = value + held, by_x + moved
         y = self._heights(phi.shape)
-        return Capacitance(eps_0 * value, np.asarray(eps_0 * by_x, float), eps_0 * by_level, phi, y)
+        return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, y)
 
     def _heights(self, shape: tuple[int, ...]) -> Floats:
         y = np.empty(shape)

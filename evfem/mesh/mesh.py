@@ -6,7 +6,7 @@ plane (hexahedra: `evfem.mesh.hexahedron`). Lengths in mm.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -90,6 +90,38 @@ class Mesh:
     def cells_of(self, name: str) -> Ints:
         """Numbers of the cells in the region `name`."""
         return np.flatnonzero(self.region == self.region_names[name])
+
+    @property
+    def centres(self) -> Floats:
+        """The point in the middle of each cell (E, dim) in mm, of its own coordinates where it is
+        bent.
+        """
+        if self.kind in ("quad9", "hexahedron27"):
+            return self.points[self.cells[:, -1]]
+        corners, middles = np.split(self.points[self.cells], [self.corners], axis=1)
+        if self.order == 1:
+            return corners.mean(axis=1)
+        return (4.0 * middles.sum(axis=1) - corners.sum(axis=1)) / 9.0  # of a triangle
+
+    def cells_at(self, points: Floats | Sequence[Sequence[float]]) -> Ints:
+        """Numbers of the cells (k,) in which points (k, 2) of the plane lie, -1 outside of the mesh.
+
+        A cell is the polygon through the nodes around it; of two cells that share an edge exactly one
+        has its points. A ray to the right crosses the polygon of the cell that it starts in an odd
+        number of times. Raises InputError for a mesh in space.
+
+        >>> corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+        >>> one = Mesh(corners, np.array([[0, 1, 2, 3]]), "quad", np.zeros(1, int), {"tissue": 0})
+        >>> one.cells_at([[0.5, 0.5], [1.5, 0.5]]).tolist()
+        [0, -1]
+        """
+        given = np.asarray(points, dtype=float)
+        if self.dim != 2 or given.ndim != 2 or given.shape[1] != 2:
+            raise InputError("points", f"shape {given.shape} in {self.dim} dimensions", "(k, 2) in the plane")
+        around = self.points[self.cell_edges[..., [0, 2, 1] if self.order == 2 else [0, 1]]]
+        low, high = around.min(axis=(1, 2)), around.max(axis=(1, 2))
+        edges = np.stack([around[:, :, :-1], around[:, :, 1:]], axis=3).reshape(len(around), -1, 2, 2)
+        return np.array([_cell_around(point, edges, low, high) for point in given], dtype=int)
 
     @cached_property
     def outer_edges(self) -> Ints:
@@ -268,3 +300,20 @@ def _distance(points: Floats, curves: Floats) -> Floats:
         s = np.clip(s - (place * slope).sum(-1) / np.where(bend > 0.1 * speed, bend, speed), -1.0, 1.0)
     t = s[..., None]
     return np.linalg.norm(c0 + t * c1 + t * t * c2, axis=-1).min(axis=1)
+
+
+def _cell_around(point: Floats, edges: Floats, low: Floats, high: Floats) -> int:
+    """The cell whose edges (E, n, 2 ends, 2) go round a point, -1 for none; `low` and `high` (E, 2)
+    are the corners of a box around each.
+    """
+    near = np.flatnonzero(((low <= point) & (point <= high)).all(axis=1))
+    ends = edges[near]
+    rising = (ends[:, :, 0, 1] <= ends[:, :, 1, 1])[..., None]
+    (x0, y0), (x1, y1) = (
+        np.moveaxis(np.where(rising, ends[:, :, i], ends[:, :, 1 - i]), -1, 0) for i in (0, 1)
+    )
+    passed = (y0 <= point[1]) & (point[1] < y1)
+    share = np.divide(point[1] - y0, y1 - y0, out=np.zeros_like(y0), where=passed)
+    crossings = np.sum(passed & (point[0] < x0 + share * (x1 - x0)), axis=1)
+    inside = near[crossings % 2 == 1]
+    return int(inside[0]) if inside.size else -1

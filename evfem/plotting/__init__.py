@@ -8,6 +8,7 @@ from evfem.plotting.curves import compare, energies, forces, history
 from evfem.plotting.fields import FIELDS
 from evfem.plotting.finger import deformed
 from evfem.plotting.fits import residuals
+from evfem.plotting.footprint import footprint
 from evfem.plotting.meshes import regions
 from evfem.plotting.movie import animate
 from evfem.plotting.pressing import contact_area, force_indentation, friction, signal
@@ -23,6 +24,7 @@ __all__ = [
     "contact_pressure",
     "deformed",
     "energies",
+    "footprint",
     "force_indentation",
     "forces",
     "friction",

@@ -41,6 +41,8 @@ ENERGIES = {
     "snap_dissipation": ("lost in snaps", PURPLE, "-."),
 }
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
+#: width of a letter of a motion's name in inches, and height of its line in points
+LETTER, HIGH = 0.085, 12.0
 OVER = ("step", "position", "time", "indentation", "voltage", "applied_force")
 
 
@@ -134,8 +136,12 @@ def _marker(x: Any) -> str | None:
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
-    """A thin line where a motion ends, and its name above."""
+    """A thin line where a motion ends, and its name above; names that would run into each other
+    stand in rows.
+    """
     ends = [*np.flatnonzero(np.diff(result.motion_index)).tolist(), len(result.step) - 1]
+    letter = LETTER * ax.figure.dpi * float(np.ptp(ax.get_xlim())) / ax.get_window_extent().width
+    rows: list[float] = []  # where the last name of each row ends
     start = 0
     for end in ends:
         if end < 0:
@@ -143,7 +149,17 @@ def _mark_motions(ax: Axes, result: Result) -> None:
         if end < len(result.step) - 1:
             ax.axvline(result.step[end] + 0.5, color="0.6", linewidth=0.8)
         middle = 0.5 * (result.step[start] + result.step[end])
-        ax.annotate(result.motion[end], (middle, 1.01), xycoords=ax.get_xaxis_transform(), ha="center")
+        half = 0.5 * letter * (len(result.motion[end]) + 1)
+        row = next((row for row, last in enumerate(rows) if last <= middle - half), len(rows))
+        rows[row:] = [middle + half, *rows[row + 1 :]]
+        ax.annotate(
+            result.motion[end],
+            (middle, 1.0),
+            (0.0, 2.0 + HIGH * row),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            ha="center",
+        )
         start = end + 1
 
 

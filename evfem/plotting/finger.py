@@ -65,9 +65,10 @@ def deformed(
     frame.
     """
     check_field(field)
+    check_plane(result.mesh)
     view = View(result, frame_of(result, frame), field)
     window = view.window(near)
-    scale = scale_of(field, shown_values(result.mesh, view.frame, field, window), vmin, vmax)
+    scale = scale_of(field, view.shown(window), vmin, vmax)
     ax = axes_or_new(ax, figure_height(window))
     mapped = view.draw(ax, window, scale, smooth)
     ax.set_title(told(result, view.frame), fontsize="medium")
@@ -101,6 +102,15 @@ class View:
             return _close(self.points, self.frame, height_of(self.result, self.frame), flat)
         return checked_window(near)
 
+    @property
+    def scaled_as(self) -> str:
+        """The field whose scale it has."""
+        return self.field
+
+    def shown(self, window: Window) -> Floats:
+        """The values inside a window."""
+        return shown_values(self.result.mesh, self.frame, self.field, window)
+
     def draw(self, ax: Axes, window: Window, scale: Scale, smooth: bool = True) -> Any:
         """Draw the view into axes, and return what a colour bar needs."""
         mesh, points = self.result.mesh, self.points
@@ -116,6 +126,13 @@ class View:
             draw_arrows(ax, mesh, self.frame, self.field, height, window)
         ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="y (mm)")
         return mapped
+
+
+def check_plane(mesh: Mesh) -> None:
+    """Raises InputError for a mesh in three dimensions."""
+    if mesh.dim == 3:
+        allowed = "a plane finger; footprint(result) and evfem.export.paraview show one in three dimensions"
+        raise InputError("mesh", "a finger in three dimensions", allowed)
 
 
 def checked_window(window: Any) -> Window:

@@ -18,6 +18,7 @@ Units = Mapping[str, str]
 KINDS = {
     "force": "force",
     "width": "width",
+    "area": "area",
     "work": "energy",
     "energy": "energy",
     "dissipation": "energy",
@@ -64,10 +65,10 @@ def kind_of(name: str, units: Units = UNITS) -> tuple[str, str]:
     (('energy', 'mJ'), ('area', 'mm2'))
     """
     unit = units[name]
-    kind = KINDS.get(name.removesuffix("_x").rsplit("_", 1)[-1])
+    kind = KINDS.get(name.removesuffix("_x").removesuffix("_z").rsplit("_", 1)[-1])
     if kind is None:
         return column_text(name, unit), unit
-    if kind in ("force", "energy") and unit == UNITS[name]:
+    if kind in ("force", "energy") and unit == UNITS.get(name):
         kind = f"{kind} per depth"
     return column_text(kind, unit), unit
 
@@ -122,7 +123,7 @@ def values_of(result: Result, name: str) -> Any:
 
     Raises InputError for what is no column of numbers.
     """
-    names = [column for column in COLUMNS if column != "motion"]
+    names = [column for column in result.columns if column != "motion"]
     if name not in names:
         raise InputError("column", quoted(name), " | ".join(names))
-    return getattr(result, name)
+    return result[name]

@@ -1,10 +1,15 @@
-"""The regions of a mesh."""
+"""The regions of a mesh: its cells in the plane; of a solid the half behind its middle, so that the
+layers are seen, from below and in front.
+"""
 
 from __future__ import annotations
 
 from itertools import cycle
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from evfem.common.arrays import Ints
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.colours import REGIONS
 from evfem.plotting.fields import rounds
@@ -13,25 +18,73 @@ from evfem.plotting.figures import axes_or_new, whole_figure
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+#: where a solid is seen from, and what of its colours is left where a face is seen from the side
+EYE, DIMMEST = np.array([0.5, -0.65, 0.9]), 0.6
+#: nodes around a face: corners, and on quadratic cells the middles of its edges
+AROUND = {4: (0, 1, 2, 3), 9: (0, 4, 1, 5, 2, 6, 3, 7)}
+
 
 def regions(mesh: Mesh, ax: Axes | None = None) -> Axes:
     """The cells of an undeformed mesh, each region in a colour of its own:
     `regions(finger.mesh())`.
     """
-    from matplotlib.collections import PolyCollection
-
     own, ax = ax is None, axes_or_new(ax)
     if own:  # a legend beside axes in true proportions is cut off otherwise
         whole_figure(ax).set_layout_engine("compressed")
+    if mesh.dim == 3:
+        _draw_solid(mesh, ax)
+    else:
+        _draw_plane(mesh, ax)
+    ax.set_aspect("equal")
+    ax.autoscale_view()
+    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
+    return ax
+
+
+def _draw_plane(mesh: Mesh, ax: Axes) -> None:
+    from matplotlib.collections import PolyCollection
+
     outlines = mesh.points[rounds(mesh)]
     for (name, number), color in zip(mesh.region_names.items(), cycle(REGIONS), strict=False):
         cells, label = list(outlines[mesh.region == number]), name.replace("_", " ")
         ax.add_collection(
             PolyCollection(cells, facecolors=color, edgecolors="white", linewidths=0.2, label=label)
         )
-    ax.set_aspect("equal")
-    ax.autoscale_view()
     ax.set_xlabel("x (mm)")
     ax.set_ylabel("y (mm)")
-    ax.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False)
-    return ax
+
+
+def _draw_solid(mesh: Mesh, ax: Axes) -> None:
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import to_rgb
+
+    faces, region = cut_open(mesh)
+    towards = EYE / np.linalg.norm(EYE)
+    right = np.cross([0.0, 1.0, 0.0], towards)
+    right /= np.linalg.norm(right)
+    corner = mesh.points[faces[:, :4]]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    facing = normal @ towards / np.linalg.norm(normal, axis=1)
+    order = np.argsort(corner.mean(axis=1) @ towards)
+    order = order[facing[order] > 0.0]
+    outlines = mesh.points[faces[order][:, AROUND[faces.shape[1]]]]
+    seen = np.stack([outlines @ right, outlines @ np.cross(towards, right)], axis=-1)
+    colours = dict(zip(mesh.region_names.values(), cycle(REGIONS), strict=False))
+    plain = np.array([to_rgb(colours[number]) for number in region[order].tolist()])
+    shaded = plain * (DIMMEST + (1.0 - DIMMEST) * facing[order])[:, None]
+    ax.add_collection(PolyCollection(list(seen), facecolors=shaded, edgecolors="white", linewidths=0.1))
+    for name, number in mesh.region_names.items():
+        ax.scatter([], [], marker="s", color=colours[number], label=name.replace("_", " "))
+    ax.set_axis_off()
+
+
+def cut_open(mesh: Mesh) -> tuple[Ints, Ints]:
+    """Outer faces (K, 4 or 9), and their regions (K,), of the cells behind the middle of a solid's
+    length.
+    """
+    middle = 0.5 * (mesh.points[:, 2].min() + mesh.points[:, 2].max())
+    kept = mesh.points[mesh.cells[:, :8], 2].mean(axis=1) < middle
+    _, of_cell = mesh.faces
+    alone = np.bincount(of_cell[kept].ravel(), minlength=len(of_cell) * 6)[of_cell[kept]] == 1
+    region = np.broadcast_to(mesh.region[kept, None], alone.shape)
+    return mesh.cell_faces[kept][alone], region[alone]

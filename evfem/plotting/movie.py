@@ -6,7 +6,7 @@ colours are the same in every frame; a close-up goes along with the finger.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import CalledProcessError
@@ -18,14 +18,15 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.checks import count
 from evfem.common.storage import replacing
-from evfem.errors import InputError, StorageError
+from evfem.errors import InputError, StorageError, quoted
 from evfem.plotting.colours import BLACK, BLUE, GREEN, VERMILION
 from evfem.plotting.curves import abscissa, forces
-from evfem.plotting.fields import Scale, Window, check_field, scale_of, shown_values
+from evfem.plotting.fields import Scale, Window, check_field, scale_of
 from evfem.plotting.figures import WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
+from evfem.plotting.footprint import SkinView
 from evfem.plotting.labels import field_label
-from evfem.simulation.result import Result
+from evfem.simulation.result import POINT_FIELDS, Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,7 +52,8 @@ def animate(
 
     In a notebook the path shows itself as the picture.
 
-    Each frame shows the deformed finger as `deformed` does, and the forces with a mark where it is.
+    Each frame shows the deformed finger as `deformed` does, or the skin of a finger in three
+    dimensions as `footprint` does, and the forces with a mark where it is.
     `near="contact"` goes along with the finger, as does no other window. `fps` frames are shown in
     a second; keep more of them with `Output(every=...)`. A terminal or notebook shows a bar. The
     file is written whole or not at all. Raises InputError for another ending, for .mp4 where
@@ -59,6 +61,8 @@ def animate(
     """
     path, fps = Path(path), count("fps", fps, 60)
     check_field(field)
+    if result.mesh.dim == 3 and field not in POINT_FIELDS:
+        raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
     if not result.frames:
         raise InputError("result", "a result without frames", "a result with frames (Output(every=...))")
     write = _writer(path)
@@ -151,7 +155,7 @@ def _write_mp4(path: Path, reel: Reel, fps: int, update: Any) -> None:
 class Reel:
     """The frames of a result, each with its window, on one scale, in one figure."""
 
-    views: list[View]
+    views: Sequence[View | SkinView]
     windows: list[Window]
     scale: Scale
     figure: Figure
@@ -189,17 +193,18 @@ def make_reel(result: Result, field: str, near: Near, limits: tuple[float | None
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    views = [View(result, frame, field) for frame in result.frames]
+    kind = SkinView if result.mesh.dim == 3 else View
+    views = [kind(result, frame, field) for frame in result.frames]
     windows = _windows(views, near)
-    shown = [shown_values(result.mesh, v.frame, field, w) for v, w in zip(views, windows, strict=True)]
-    scale = scale_of(field, np.concatenate(shown), *limits)
+    shown = [view.shown(window) for view, window in zip(views, windows, strict=True)]
+    scale = scale_of(views[0].scaled_as, np.concatenate(shown), *limits)
     tall = 2.0 * round(0.5 * DPI * (figure_height(windows[0]) + CURVES_HEIGHT)) / DPI  # even, for ffmpeg
     figure = Figure(figsize=(WIDTH, tall), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     return Reel(views, windows, scale, figure)
 
 
-def _windows(views: list[View], near: Near) -> list[Window]:
+def _windows(views: Sequence[View | SkinView], near: Near) -> list[Window]:
     """A window for each view, all of one size: around all of them, or a close-up that goes along."""
     found = np.array([view.window(near) for view in views])
     x = np.array([view.frame.position for view in views]) if near == "contact" else np.zeros(len(views))

@@ -40,13 +40,11 @@ def contact_area(results: Results, ax: Axes | None = None) -> Axes:
     for (name, result), colour, _ in styled(found):
         rows = presses[name]
         load = values_of(result, "applied_force")[rows]
-        for column, text, style in (
-            ("contact_width", "edge to edge", "-"),
-            ("real_contact_width", "touching", "--"),
-        ):
+        width = "contact_area" if result.mesh.dim == 3 else "contact_width"
+        for column, text, style in ((width, "edge to edge", "-"), (f"real_{width}", "touching", "--")):
             label = f"{name}, {text}" if name else text
             ax.plot(load, values_of(result, column)[rows], style, color=colour, label=label, marker=".")
-    _label(ax, "applied_force", "contact_width", found)
+    _label(ax, "applied_force", width, found)
     ax.legend()
     return ax
 

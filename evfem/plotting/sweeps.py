@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
     from evfem.sweeps.run import SweepResult
 
+#: steps of a grid are uneven where the largest is so many times the smallest
+UNEVEN = 3.0
+
 
 def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | None = None) -> Axes:
     """Column `y` of a sweep over its column `x`, a line for each value of the column `by`.
@@ -51,7 +54,9 @@ def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | 
 def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = None) -> Axes:
     """Column `value` of a sweep of a grid as colours over its columns `x` and `y` of numbers.
 
-    Points without a number stay white. Raises InputError where two points have the same x and y.
+    Points without a number stay white. Where the numbers along an axis are far from evenly spaced,
+    as 0.001, 0.01, 0.1, their cells are all of one width, with the numbers below them. Raises
+    InputError where two points have the same x and y.
     """
     rows = _done(table, x, y, value)
     if not all(isinstance(row[key], (int, float)) for row in rows for key in (x, y)):
@@ -64,7 +69,7 @@ def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = 
     for row in rows:
         cells[np.searchsorted(up, row[y]), np.searchsorted(across, row[x])] = row[value]
     ax = axes_or_new(ax)
-    mapped = ax.pcolormesh(_edges(across), _edges(up), cells, cmap=ONE_SIGN)
+    mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=ONE_SIGN)
     ax.set(xlabel=key_label(x), ylabel=key_label(y))
     add_colorbar(mapped, ax, key_label(value))
     return ax
@@ -88,7 +93,21 @@ def _names(rows: Sequence[dict[str, Any]], x: str) -> list[Any]:
 
 
 def _value(by: str | None, value: Any) -> str:
-    return "" if by is None else f"{key_label(by).split(' (')[0]} {value}"
+    """What a line is called: `voltage 100 V`."""
+    if by is None:
+        return ""
+    text, _, unit = key_label(by).removesuffix(")").partition(" (")
+    shown = f"{value:g}" if type(value) is float else str(value)
+    return f"{text} {shown} {unit}".rstrip()
+
+
+def _sides(places: Any, axis: Any) -> Any:
+    """Borders of the cells along an axis."""
+    steps = np.diff(places)
+    if steps.size == 0 or steps.max() <= UNEVEN * steps.min():
+        return _edges(places)
+    axis.set_ticks(range(places.size), [f"{place:g}" for place in places])
+    return _edges(np.arange(places.size))
 
 
 def _edges(places: Any) -> Any:

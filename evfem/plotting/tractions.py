@@ -9,7 +9,7 @@ import numpy as np
 from evfem.plotting.colours import BLUE, GREEN, VERMILION
 from evfem.plotting.fields import frame_of
 from evfem.plotting.figures import axes_or_new
-from evfem.plotting.finger import told
+from evfem.plotting.finger import check_plane, told
 from evfem.simulation.result import Result
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) ->
 
     Shear and attraction are left out where they are 0 throughout.
     """
+    check_plane(result.mesh)
     shown = frame_of(result, frame)
     ax = axes_or_new(ax)
     pad = np.flatnonzero(np.isfinite(shown.gap))

@@ -19,7 +19,7 @@ from typing import Any
 from evfem.common.checks import MOST_STEPS
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import INSULATORS, Layer
-from evfem.errors import ABSENT, InputError, Mistakes, StorageError, unknown
+from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.layers import TABLE_2, Moduli
 from evfem.mesh.formats import LARGEST
@@ -44,6 +44,7 @@ from evfem.scene.keys import (
     kind_of,
     parse,
     shown,
+    unknown_key,
 )
 from evfem.scene.motion import Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
@@ -168,9 +169,12 @@ def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any
     parsed: Any = parse(SURFACES[kind], table, "surface")
     insulator = None if electrostatics is None else _insulator(electrostatics)
     common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
+    electrodes = getattr(electrostatics, "electrodes", None)
+    if electrodes is not None and kind != "flat":
+        raise InputError("electrostatics.electrodes", f"beside a surface of kind {kind}", "a flat surface")
     with at("surface"):
         if kind == "flat":
-            return Flat(**common) if insulator is None else Display(**common)
+            return Flat(**common) if insulator is None else Display(**common, electrodes=electrodes)
         if kind == "sinusoid":
             return Sinusoid(terms=parsed.terms, **common)
         if kind in TEXTURES:
@@ -222,7 +226,9 @@ def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[
         law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
     ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
     voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
-    same = {name: getattr(table, name) for name in ("air_layer", "direction", "field", "coupling")}
+    same = {
+        name: getattr(table, name) for name in ("air_layer", "direction", "field", "grounded", "coupling")
+    }
     same["roughness_gap"] = _roughness(table.roughness_gap)
     return {"law": law, "voltage": voltage, "drive": drive, **same}
 
@@ -251,7 +257,7 @@ def _finger(table: Mapping[str, Any], folder: Path) -> Any:
     known = {spec.name: spec for spec in fields(finger) if spec.init}
     mistakes = Mistakes()
     mistakes.found += [
-        unknown(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
+        unknown_key(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
         for name in parts
         if name not in (*known, "kind", "participant")
     ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import MISSING, fields
 from pathlib import Path
@@ -19,6 +19,7 @@ from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.timesignals import FASTEST
 from evfem.errors import ABSENT, InputError, near, readable, together, unknown
+from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import COUPLINGS, DIRECTIONS, FIELDS, Output, Solver
 from evfem.solver.hand import Hand
@@ -162,6 +163,8 @@ class ElectrostaticsTable(Table):
     air_layer: bool = optional("true | false", True)
     direction: Literal[DIRECTIONS] = optional(" | ".join(DIRECTIONS), DIRECTIONS[0])  # type: ignore[valid-type]
     field: Literal[FIELDS] = optional(" | ".join(FIELDS), FIELDS[0])  # type: ignore[valid-type]
+    electrodes: list[list[float]] | None = optional("rows [[from, to, share], ...] in mm, with gaps between")
+    grounded: bool = optional("true | false", True)
     coupling: Literal[COUPLINGS] = optional(" | ".join(COUPLINGS), COUPLINGS[0])  # type: ignore[valid-type]
     roughness_gap: float | dict[str, Any] = optional(
         "a length in mm from 0 to 1, or a table [electrostatics.roughness_gap] with a law", 0.0
@@ -187,6 +190,16 @@ SURFACES: Mapping[str, type[Table]] = {
 MOTIONS: Mapping[str, tuple[type[Table], type]] = {
     cls.kind: (derived(cls), cls) for cls in (Press, Slide, Hover, VoltageRamp, Wait)
 }
+#: tables that a key may have been meant for
+HOMES: Mapping[str, Collection[str]] = {
+    "[finger]": ("depth", *(spec.name for spec in fields(FingerPad))),
+    "[finger.electrical]": ElectricalTable.model_fields,
+    "[electrostatics]": ElectrostaticsTable.model_fields,
+    "[surface]": FlatTable.model_fields,
+    "[solver]": SolverTable.model_fields,
+    "[output]": OutputTable.model_fields,
+    "[[motion]]": {key for table, _ in MOTIONS.values() for key in table.model_fields},
+}
 
 T = TypeVar("T", bound=Table)
 
@@ -206,13 +219,29 @@ def parse(model: type[T], table: Mapping[str, Any], prefix: str) -> T:
         name, *deeper = map(str, one["loc"])
         key = _join(prefix, name) + "".join(f"[{part}]" for part in deeper if part.isdecimal())
         if one["type"] == "extra_forbidden":
-            mistakes[name] = unknown(key, name, known)
+            mistakes[name] = unknown_key(key, name, known)
             meant |= {*near(name, known)}
         elif name not in mistakes and not (one["type"] == "missing" and name in meant):
             given = ABSENT if one["type"] == "missing" else shown(one["input"])
             allowed = model.model_fields[name].description or "another value"
             mistakes[name] = InputError(key, given, allowed)
     raise together(list(mistakes.values()))
+
+
+def unknown_key(key: str, name: str, known: Sequence[str]) -> InputError:
+    """The error for a key that its table does not have, and which table has it.
+
+    >>> raise unknown_key("surface.insulator_eps_r", "insulator_eps_r", ["kind", "friction"])
+    Traceback (most recent call last):
+    evfem.errors.InputError: surface.insulator_eps_r: given an unknown key; allowed: kind, friction; \
+insulator_eps_r stands in [electrostatics]
+    """
+    mistake = unknown(key, name, known)
+    home = next((table for table, keys in HOMES.items() if name in keys), "")
+    here = re.sub(r"\[\d+\]", "", key.rpartition(".")[0])  # whose other kinds may have it
+    if home.strip("[]") in ("", here) or near(name, known):
+        return mistake
+    return InputError(key, mistake.given, f"{mistake.allowed}; {name} stands in {home}")
 
 
 def check_size(key: str, path: Path, most: int) -> None:

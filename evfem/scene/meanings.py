@@ -158,6 +158,8 @@ ELECTROSTATICS = {
     "air_layer": Text("", "false: only touching nodes carry force, eq. (10)"),
     "direction": Text("", "normal: Maxwell stress on the deformed outline"),
     "field": Text("", "full: Poisson's problem, not column by column; auto: where it matters"),
+    "electrodes": Text("mm, 1", "where electrodes end, and their share of the voltage; with field full"),
+    "grounded": Text("", "false: the finger has no charge; with field full"),
     "coupling": Text("", "staggered_once: the paper's, once in each step"),
     "roughness_gap": Text("mm", "what rough skin keeps between itself and the insulator in contact"),
 }

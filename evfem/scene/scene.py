@@ -159,7 +159,8 @@ class Scene:
     surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
     or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
     `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
-    "auto" where bounds say that it matters. `friction_law` says what the surface's coefficient of
+    "auto" where bounds say that it matters; only there may the finger be not `grounded`: without a
+    charge, above electrodes of different voltages. `friction_law` says what the surface's coefficient of
     friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
     `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
     drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
@@ -183,6 +184,7 @@ class Scene:
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
     depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
     output: Output = field(default=Output(), kw_only=True)
+    grounded: bool = field(default=True, kw_only=True)
     field: str = field(default="local", kw_only=True)  # the last one: from here on `field` is its default
 
     def __post_init__(self) -> None:
@@ -336,6 +338,12 @@ def _check_roughness(scene: Scene) -> None:
 
 def _check_field(scene: Scene) -> None:
     choice("electrostatics.field", scene.field, FIELDS)
+    if not isinstance(scene.grounded, bool):
+        raise InputError("electrostatics.grounded", quoted(scene.grounded), "true or false")
+    ended = getattr(scene.surface, "electrodes", None) is not None
+    if scene.field != "full" and (ended or not scene.grounded):
+        given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"
+        raise InputError("electrostatics.field", given, "full: the column law knows neither")
     if scene.field == "local":
         return
     reasons = {

@@ -157,9 +157,11 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     if not isinstance(insulator.eps_r, float):
         raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
     table |= {"insulator_thickness": insulator.thickness, "insulator_eps_r": insulator.eps_r}
+    if (electrodes := getattr(scene.surface, "electrodes", None)) is not None:
+        table["electrodes"] = [list(map(float, row)) for row in electrodes]
     if (rough := scene.roughness_gap) != 0.0:
         table["roughness_gap"] = _roughness_key(rough)
-    same = ("air_layer", "direction", "coupling", *(() if scene.field == "local" else ("field",)))
+    same = ("air_layer", "direction", "coupling", *(() if scene.field == "local" else ("field", "grounded")))
     return table | {name: getattr(scene, name) for name in same}
 
 

@@ -79,6 +79,9 @@ class History:
     snap_dissipation: Floats = field(metadata=column("N", "set free where stability was lost"))
     source_work: Floats = field(metadata=column("N", "of the voltage's source, where it is resolved in time"))
     leakage_dissipation: Floats = field(metadata=column("N", "by charge that crosses skin, gap, insulator"))
+    stretch_work: Floats = field(
+        metadata=column("N", "of the field on the pad's length, where it is resolved in time")
+    )
     field_energy: Floats = field(metadata=column("N", "of the electric field, where it is resolved in time"))
     substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
     newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))

@@ -22,6 +22,7 @@ from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.driven import attracting, lossless, sandwich, skin_thickness, solids
+from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.terms import Boundary
@@ -82,7 +83,8 @@ def make_model(scene: Scene) -> Model:
     if needed.has("time"):
         dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
     body = Body(space, laws, terms, dynamics)
-    limits = Limits(solver.tolerance, solver.strategy, solver.threads)
+    deepest = max((one.indentation or 0.0 for one in scene.motion if isinstance(one, Press)), default=0.0)
+    limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
     if not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
@@ -140,7 +142,7 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)
     assert isinstance(pad, Pad)
-    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin)
+    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin, not scene.grounded)
 
 
 def _check_quadratic(scene: Scene) -> None:

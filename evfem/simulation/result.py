@@ -109,7 +109,7 @@ class Result(History):
     the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
-    (`SPATIAL`): `result["position_z"]`, `result["tangential_force_z"]` and the contact areas.
+    (`SPATIAL`): `position_z`, `tangential_force_z` and the contact areas.
     """
 
     frames: list[Frame]
@@ -141,6 +141,16 @@ class Result(History):
     def __getitem__(self, name: str) -> Any:
         """A column by its name."""
         return self.in_space[name] if name in self.in_space else super().__getitem__(name)
+
+    @property
+    def position_z(self) -> Floats:
+        """z of the bone (mm); that of a finger in the plane stays 0."""
+        return self.in_space.get("position_z", np.zeros_like(self.position))
+
+    @property
+    def tangential_force_z(self) -> Floats:
+        """Sum of the contact forces against +z; none on a finger in the plane."""
+        return self.in_space.get("tangential_force_z", np.zeros_like(self.position))
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -352,9 +362,13 @@ class Saved:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A file with the state after the last converged step of a run, from which the run can go on."""
+    """A file with the state after the last converged step of a run, from which the run can go on.
+
+    The same object writes the rows of earlier steps again without making their text anew.
+    """
 
     path: Path
+    _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
 
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
         """Store the state in one step; the file before stays as it is if the disk refuses
@@ -362,9 +376,16 @@ class Checkpoint:
         """
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
-        plain_rows = [{name: plain(value) for name, value in row.items()} for row in rows]
-        header["rows"] = np.array(json.dumps(plain_rows))
+        header["rows"] = np.array(self._text_of(rows))
         save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
+
+    def _text_of(self, rows: Sequence[Row]) -> str:
+        """The rows as JSON."""
+        pairs = zip(rows, self._texts, strict=False)
+        same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
+        new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]
+        self._texts[same:] = new
+        return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
 
     def read(self, scene_digest: str) -> Saved:
         """The state of the same scene. Raises InputError for another scene's, another version's or

@@ -57,10 +57,10 @@ and the voltage that it had, which is the way of :math:`W_e`, and then charge fl
 
 .. math:: W_s = \Delta W_f + D_l + W_e + W_a
 
-with the ``field_energy`` of skin, gap and insulator and the work W_a of the field on the tributary
-lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction does not do and
-which is part of ``integrator_dissipation``. This holds for Strong and Troxel's law, which is the
-pressure of that field, and lacks the work on a roughness gap that changes with the load.
+with the ``field_energy`` of skin, gap and insulator, and with the ``stretch_work`` W_a of the field on
+the tributary lengths A, :math:`\int w\,dA` with its energy w per area, which a vertical traction
+leaves out. This holds for Strong and Troxel's law, which is the pressure of that field, and lacks the
+work on a roughness gap that changes with the load.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
@@ -90,6 +90,7 @@ SUMS = (
     "snap_dissipation",
     "source_work",
     "leakage_dissipation",
+    "stretch_work",
 )
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
@@ -188,9 +189,10 @@ class Part:
         drag = body.drag_dissipation(new.u)
         lost -= drag
         snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
-        flow, beside = self._flow(), self._lengthening()
-        snapped = (beside, drag + lost) if snap else (lost + beside, 0.0)
-        added = (given, pulled, friction, viscous, *snapped, flow.source_work, flow.leakage)
+        snapped = (0.0, drag + lost) if snap else (lost, 0.0)
+        flow = self._flow()
+        source = (flow.source_work, flow.leakage, self._stretching())
+        added = (given, pulled, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
     def electrostatic(self) -> float:
@@ -244,7 +246,7 @@ class Part:
             return flow
         return Flow(flow.source_work + charging.field_energy(charging.old), flow.leakage)
 
-    def _lengthening(self) -> float:
+    def _stretching(self) -> float:
         """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
         attraction = self.model.attraction
         if attraction is None or attraction.charging is None:
@@ -269,7 +271,7 @@ class Part:
         assert attraction is not None
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
         volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
-        if voltages[0] == voltages[1]:
+        if attraction.charging is not None:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]

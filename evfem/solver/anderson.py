@@ -24,15 +24,18 @@ from evfem.solver.state import State
 
 
 class Anderson:
-    """Remembers the last iterations of a step, as long as they used the same map."""
+    """Remembers the last iterations of a step, as long as they used the same map: the changes of
+    their steps and images, and the products of the former.
+    """
 
     def __init__(self) -> None:
         self.reset()
 
     def reset(self) -> None:
         """Forget the iterations: the map has changed."""
-        self._steps: list[Floats] = []
-        self._images: list[Floats] = []
+        self._last: tuple[Floats, Floats] | None = None
+        self._changes: list[tuple[Floats, Floats]] = []
+        self._products = np.zeros((0, 0))
 
     def next_iterate(self, before: State, after: State) -> State:
         """A better iterate than `after`, to which the map has taken `before`; `after` itself while
@@ -41,14 +44,28 @@ class Anderson:
         if not np.array_equal(before.status, after.status):
             self.reset()
             return after
-        image = _vector(after)
-        self._steps = [*self._steps[-ANDERSON_DEPTH:], (after.u - before.u).ravel()]
-        self._images = [*self._images[-ANDERSON_DEPTH:], image]
-        if len(self._steps) < 2:
+        step, image = (after.u - before.u).ravel(), _vector(after)
+        last, self._last = self._last, (step, image)
+        if last is None:
             return after
-        changes = np.diff(self._steps, axis=0)
-        shares = np.linalg.lstsq(changes @ changes.T, changes @ self._steps[-1], rcond=1e-12)[0]
-        return _state(after, image - shares @ np.diff(self._images, axis=0))
+        self._remember(step - last[0], image - last[1])
+        right = [change @ step for change, _ in self._changes]
+        shares = np.linalg.lstsq(self._products, right, rcond=1e-12)[0]
+        image = image.copy()
+        for share, (_, change) in zip(shares, self._changes, strict=True):
+            image -= share * change
+        return _state(after, image)
+
+    def _remember(self, step: Floats, image: Floats) -> None:
+        """Keep these changes, and drop what is older than `ANDERSON_DEPTH` iterations."""
+        self._changes = [*self._changes, (step, image)][-ANDERSON_DEPTH:]
+        kept = len(self._changes)
+        products = np.empty((kept, kept))
+        products[:-1, :-1] = self._products[
+            len(self._products) + 1 - kept :, len(self._products) + 1 - kept :
+        ]
+        products[-1] = products[:, -1] = [step @ change for change, _ in self._changes]
+        self._products = products
 
 
 def _vector(state: State) -> Floats:

@@ -74,20 +74,21 @@ def mkl_library() -> str | None:
     return next((place for place in found if Path(place).exists()), None)
 
 
-def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> float:
-    """A number added to the diagonal of S while it is computed: a bone that is free to move leaves
-    S singular.
+def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
+    """Numbers (m,) added to the diagonal of S while it is computed, as a bone that is free to move
+    leaves S singular: the diagonal of K, so that no row is lost in the rounding of a stiffer one.
     """
-    return float(np.abs(upper[pattern.diagonal[kept]]).max())
+    return np.abs(upper[pattern.diagonal[kept]])
 
 
 class Pardiso:
     """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many
-    factorisations.
+    factorisations. Factors of `single` precision give way to double ones where they fail.
     """
 
-    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
         self.pattern, self.kept = pattern, kept
+        self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library = pardiso_library()
         library.libmkl.MKL_Set_Num_Threads(threads)
         self._call_pardiso = library._mkl_pardiso
@@ -95,7 +96,7 @@ class Pardiso:
         # PARDISO numbers the Schur complement in ascending order of the unknowns
         self._order = np.argsort(kept)
         self.schur = np.zeros((kept.size, kept.size))
-        self._values = np.zeros(pattern.indices.size)
+        self._values = np.zeros(0)
         self._start(2)
 
     def _start(self, mtype: int) -> None:
@@ -104,66 +105,86 @@ class Pardiso:
         self._iparm = np.zeros(64, dtype=np.int32)
         # user values; METIS; no refinement; pivots below 1e-13 are perturbed (and counted); C indices; dense
         # Schur complement kept for solves
-        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 34: 1, 35: 2}.items():
+        single = int(self.real is np.float32)
+        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 27: single, 34: 1, 35: 2}.items():
             self._iparm[index] = value
         self._mark[:] = 0
         self._mark[self.kept] = 1
         self._analysed = False
+        self._phase, self._error = ctypes.c_int32(0), ctypes.c_int32(0)
+        self._fixed = self._arguments()
 
-    def _call(self, phase: int, b: Floats, x: Floats) -> int:
+    def _call(self, phase: int, b: Any, x: Any) -> int:
+        self._phase.value = phase
+        handle, before, after = self._fixed
+        self._call_pardiso(
+            handle, *before, self._values.ctypes, *after, b.ctypes, x.ctypes, ctypes.byref(self._error)
+        )
+        return self._error.value
+
+    def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:
+        """What every call has in common: the handle, what stands before the matrix's values, and
+        what stands behind them. Made once, for on small pads it takes as long as a solve.
+        """
+
         def number(value: int) -> Any:
             return ctypes.byref(ctypes.c_int32(value))
 
         def integers(array: Any) -> Any:
             return array.ctypes.data_as(ctypes.POINTER(ctypes.c_int32))
 
-        def values(array: Any) -> Any:
-            return array.ctypes.data_as(ctypes.c_void_p)
-
-        error = ctypes.c_int32(0)
-        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
-        kind = (number(1), number(1), number(self.mtype), number(phase), number(self.pattern.size))
-        matrix = (values(self._values), integers(self.pattern.indptr), integers(self.pattern.indices))
+        pattern, phase = self.pattern, ctypes.byref(self._phase)
+        matrix = (integers(pattern.indptr), integers(pattern.indices))
         control = (integers(self._mark), number(1), integers(self._iparm), number(0))
-        self._call_pardiso(handle, *kind, *matrix, *control, values(b), values(x), ctypes.byref(error))
-        return error.value
+        handle = self._handle.ctypes.data_as(ctypes.POINTER(ctypes.c_int64))
+        kind = (number(1), number(1), number(self.mtype), phase, number(pattern.size))
+        return handle, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
         """Factorise new values of the pattern; raises `Singular` if even the indefinite
         factorisation fails.
         """
         shift = shift_of_kept(self.pattern, self.kept, upper)
-        self._values = upper.copy()
-        self._values[self.pattern.diagonal[self.kept]] += shift
-        for mtype in (self.mtype, -2):
-            if mtype != self.mtype:
+        ways: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
+        for mtype, real in ways[ways.index((self.mtype, self.real)) :]:
+            if (mtype, real) != (self.mtype, self.real):
                 self.close()
+                self.real = real
                 self._start(mtype)
-            S, b = np.zeros_like(self.schur), np.zeros(self.pattern.size)
+            self._values = upper.astype(self.real)
+            self._values[self.pattern.diagonal[self.kept]] += shift
+            S, b = np.zeros(self.schur.shape, self.real), np.zeros(self.pattern.size, self.real)
             error = 0 if self._analysed else self._call(11, b, S)
             error = error or self._call(22, b, S)
             self._analysed = error == 0
             if error == 0 and self._iparm[PERTURBED] == 0 and np.isfinite(S).all():
-                self.schur = np.empty_like(S)
+                self.schur = np.empty(S.shape)
                 self.schur[np.ix_(self._order, self._order)] = S
                 self.schur[np.diag_indices_from(S)] -= shift
                 return
         raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        y = np.zeros_like(b)
-        self._call(331, np.ascontiguousarray(b), y)
-        g = y[self.kept].copy()
+        # the entries of the kept unknowns go past the factor: the bone's reaction, in single precision,
+        # would have a rounding larger than the forces that are left
+        interior = b.astype(self.real)
+        interior[self.kept] = 0.0
+        y = self._solve(331, interior)
+        g = b[self.kept] + y[self.kept]
         if self.mtype == -2:
-            z = np.zeros_like(b)
-            self._call(332, y, z)
-            y = z
+            y = self._solve(332, y)
         return y, g
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
-        state[self.kept] = kept
-        x = np.zeros_like(state)
-        self._call(333, state, x)
+        given = state.astype(self.real)  # sums of states are of double precision
+        given[self.kept] = kept
+        x = self._solve(333, given).astype(np.float64)
+        x[self.kept] = kept
+        return x
+
+    def _solve(self, phase: int, b: Any) -> Any:
+        x = np.zeros_like(b)
+        self._call(phase, b, x)
         return x
 
     def close(self) -> None:
@@ -193,7 +214,7 @@ class SuperLU:
         options = {"SymmetricMode": True, "Equil": False}
         A = self.pattern.full(upper)
         shift = shift_of_kept(self.pattern, self.kept, upper)
-        A = A + sparse.csr_matrix((np.full(self.kept.size, shift), (self.kept, self.kept)), shape=A.shape)
+        A = A + sparse.csr_matrix((shift, (self.kept, self.kept)), shape=A.shape)
         try:
             if self._ordering is None:
                 inner = A[self._interior][:, self._interior].tocsc()
@@ -213,7 +234,7 @@ class SuperLU:
             raise Singular("SuperLU moved the kept unknowns")
         lower, higher = self._lu.L[-m:, -m:].toarray(), self._lu.U[-m:, -m:].toarray()
         self._shifted = lower @ higher
-        self.schur = self._shifted - shift * np.eye(m)
+        self.schur = self._shifted - np.diag(shift)
 
     def _solve(self, b: Floats) -> Floats:
         assert self._ordering is not None
@@ -231,10 +252,12 @@ class SuperLU:
         return state + self._solve(b)
 
 
-def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
+def make_condensation(
+    pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False
+) -> Pardiso | SuperLU:
     """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
     try:
         pardiso_library()
     except ImportError:
         return SuperLU(pattern, kept, threads)
-    return Pardiso(pattern, kept, threads)
+    return Pardiso(pattern, kept, threads, single)

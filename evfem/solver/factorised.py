@@ -156,7 +156,7 @@ class FactorisedBody:
         rounding = self._rounding(state) / self.limits.tolerance
         largest = max(np.abs(reaction).max(), SMALLEST_FORCE, rounding)
         dim = state.bone.size
-        sums = np.abs(forces[:-dim].reshape(-1, dim).sum(axis=0)).max()
+        sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
         if target.hand is not None:
             missing.append(target.hand.missing(float(state.bone[0]), reaction))
@@ -399,14 +399,14 @@ class FactorisedBody:
         return findings(self.body, state, balance)
 
     def reusable(self) -> Reusable:
-        """Candidates, where the factorisation was made, and the last time step."""
+        """Candidates, where the factorisation was made and how precisely, and the last time step."""
         dynamics, linearisation = self.body.dynamics, self.linearisation
         duration = 0.0 if dynamics is None else dynamics.step
-        return Reusable(linearisation.candidates, linearisation.reusable, duration)
+        return Reusable(linearisation.candidates, linearisation.reusable, duration, linearisation.single)
 
     def resume(self, state: State, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
-        self.linearisation.candidates = carried.candidates
+        self.linearisation.candidates, self.linearisation.single = carried.candidates, carried.single
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.pressure)
             self.linearisation.restore(state, at)

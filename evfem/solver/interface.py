@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import CHANGES, HAIR, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
+from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, fold, surface_state
@@ -96,7 +96,8 @@ def steps_of_friction(surface: Any, short: float) -> Floats:
 class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
-    `contact_step` is the linear step in which its contact is solved.
+    `contact_step` is the linear step in which its contact is solved; nodes with a gap below
+    `neighbourhood` (mm) become candidates together.
     """
 
     contact_step = LinearContactStep
@@ -112,6 +113,7 @@ class Interface:
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
         self.duration = 0.0
+        self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""

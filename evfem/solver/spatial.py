@@ -35,6 +35,7 @@ class SkinInterface(Interface):
         self._facing = pad.facing(self.points)
         self.pins = Pins(np.zeros((0, 3)), pad.nodes.size)
         self.law, self.duration = None, 0.0
+        self.neighbourhood = 0.0  # a dense compliance of three unknowns each: only what is needed, and spare
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 3)."""

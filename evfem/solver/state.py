@@ -95,21 +95,26 @@ class TangentPoint:
 @dataclass(frozen=True, eq=False)
 class Reusable:
     """What a solver takes with it from step to step: the contact candidates (numbers of pad
-    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
+    nodes), where its factorisation was made if it has one, the seconds of the last time step, and
+    whether factors of single precision have served so far.
     """
 
     candidates: Ints
     tangent_point: TangentPoint | None
     duration: float
+    single: bool = False
 
 
 @dataclass(frozen=True)
 class Limits:
-    """When a step counts as solved, how hard it is tried, and by how many threads."""
+    """When a step counts as solved, how hard it is tried, by how many threads, and the deepest
+    indentation (mm) that will be asked for, 0 where that is not known.
+    """
 
     tolerance: float
     strategy: Strategy = field(default_factory=Strategy)
     threads: int = 1
+    deepest: float = 0.0
 
 
 @dataclass

@@ -117,8 +117,7 @@ class SweepFolder:
 
     def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
         """The table of all points so far."""
-        lines = [[_cell(row.get(name)) for name in columns] for row in rows]
-        write_text(self.path / TABLE, csv_text([columns, *lines]))
+        write_text(self.path / TABLE, sweep_csv(columns, rows))
         if find_spec("pyarrow") is not None:
             with replacing(self.path / PARQUET) as temporary:
                 _write_parquet(temporary, columns, rows)
@@ -135,6 +134,15 @@ def _sound(answer: Answer) -> bool:
         and isinstance(answer.message, str)
         and all(type(number) in (int, float) for number in numbers)
     )
+
+
+def sweep_csv(columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> str:
+    """The table of a sweep as csv: lists and truth values as in JSON.
+
+    >>> sweep_csv(["point", "status"], [{"point": 0, "status": "done"}])
+    'point,status\\n0,done\\n'
+    """
+    return csv_text([columns, *([_cell(row.get(name)) for name in columns] for row in rows)])
 
 
 def _cell(value: Any) -> Any:

@@ -21,13 +21,14 @@ import evfem
 from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
-from evfem.common.storage import alone_in
+from evfem.common.storage import alone_in, write_text
+from evfem.common.tables import frame
 from evfem.errors import InputError, NotConverged, readable, unknown
 from evfem.scene.file import loads
 from evfem.simulation.result import Result, origin
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
-from evfem.sweeps.folder import STATUS, Answer, SweepFolder
+from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
 from evfem.sweeps.pools import Open, Pool, open_pool, processes
 
 #: the table is written anew after so many seconds
@@ -53,6 +54,16 @@ class SweepResult:
         if all(value is None or type(value) in (int, float) for value in values):
             return np.array([math.nan if value is None else value for value in values])
         return values
+
+    def table(self) -> Any:
+        """A row for each point: a `pandas.DataFrame`, or where pandas is not installed a numpy
+        record array.
+        """
+        return frame({name: self[name] for name in self.columns})
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write the table as `evfem sweep` does (`sweep.csv`), whole or not at all."""
+        write_text(path, sweep_csv(self.columns, self.rows))
 
     def __repr__(self) -> str:
         """How many points, and what became of them."""

@@ -21,7 +21,7 @@ from evfem.textures.generate import Knobs, make
 from evfem.textures.importing import Source, from_csv, from_image, from_recording
 from evfem.textures.library import about, find, names, reference
 from evfem.textures.scans import from_scan
-from evfem.textures.texture import Texture, write
+from evfem.textures.texture import Texture, is_data, write
 from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture
 
 #: what each way of importing takes beside name, licence and note
@@ -174,6 +174,8 @@ def _check_outputs(given: argparse.Namespace) -> None:
     ):
         if path is not None and path.suffix.lower() not in endings:
             raise InputError(key, quoted(str(path)), f"a file called {', '.join(endings)}")
+        if path is not None and is_data(path):
+            raise InputError(key, f"{path}, which has the rows of a texture", "another file")
 
 
 def _render(curve: FrictionCurve, touch: Touch, device: Device, path: Path) -> None:

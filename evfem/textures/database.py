@@ -11,7 +11,7 @@ know the point: the root mean square of (mu - friction) / slope.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
@@ -23,19 +23,19 @@ from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.notices import milestone
 from evfem.common.storage import alone_in, write_text
-from evfem.common.tables import csv_text, read_table
+from evfem.common.tables import csv_text, read_columns, read_table
 from evfem.errors import InputError
 from evfem.scene.file import dump
 from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.pools import open_pool
 from evfem.sweeps.run import answered, compute
-from evfem.textures.estimators import METHODS, Estimator, best_width, left_out
+from evfem.textures.estimators import METHODS, Estimator, best_kernel, best_width, left_out
 from evfem.textures.parametric import RANGES, SAMPLES, Parametric, at, scene
 
 #: points of Sobol's sequence for each finger
 INNER = 192
-FILE = "textures-database.csv"
+FILE, KERNELS = "textures-database.csv", "textures-kernels.csv"
 CURVE = tuple(f"mu{i:02d}" for i in range(SAMPLES))
 ERRORS = {method: f"error_{method}" for method in METHODS}
 
@@ -51,14 +51,15 @@ class Database:
     textures: tuple[Parametric, ...]
     friction: Floats
     errors: Mapping[str, Floats]
+    scale: Floats
+    smoothing: float
 
     @cached_property
     def estimator(self) -> Estimator:
         """The estimator of responses at places in the box."""
-        points = np.array([texture.point() for texture in self.textures])
-        own = np.array([[texture.friction, texture.slope] for texture in self.textures])
-        responses = (self.friction - own[:, :1]) / own[:, 1:]
-        return Estimator(points, responses, best_width(points, responses))
+        points, responses = responses_of(self.textures, self.friction)
+        width = best_width(points * self.scale, responses)
+        return Estimator(points, responses, width, self.scale, self.smoothing)
 
     @property
     def relative_errors(self) -> dict[str, Floats]:
@@ -72,6 +73,13 @@ class Database:
         return min(self.relative_errors.items(), key=lambda one: float(np.nanmedian(one[1])))[0]
 
 
+def responses_of(textures: Sequence[Parametric], friction: Floats) -> tuple[Floats, Floats]:
+    """Places (N, 6) of textures, and the responses (N, SAMPLES) that are interpolated."""
+    points = np.array([texture.point() for texture in textures])
+    own = np.array([[texture.friction, texture.slope] for texture in textures])
+    return points, (friction - own[:, :1]) / own[:, 1:]
+
+
 def read(path: Path, ridged: bool) -> Database:
     """The database of one finger in a file that `compute_database` wrote."""
     table = read_table(path, "database")
@@ -81,7 +89,10 @@ def read(path: Path, ridged: bool) -> Database:
     rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
     textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
     friction = np.column_stack([table[name][of] for name in CURVE])
-    return Database(textures, friction, {method: table[name][of] for method, name in ERRORS.items()})
+    errors = {method: table[name][of] for method, name in ERRORS.items()}
+    kernels = read_columns(path.with_name(KERNELS), ["ridged", *RANGES, "smoothing"], "database")
+    _, *scale, smoothing = np.column_stack(kernels)[int(ridged)].tolist()
+    return Database(textures, friction, errors, np.array(scale), smoothing)
 
 
 @cache
@@ -114,7 +125,8 @@ def _evaluate(text: str) -> Answer:
 def compute_database(
     folder: str | Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> tuple[Path, dict[str, int]]:
-    """Run the model at every point that is not finished in `folder`, and write `FILE` there.
+    """Run the model at every point that is not finished in `folder`, and write
+    `FILE` and `KERNELS` there.
 
     `workers` and `scheduler` as in `evfem.sweep`. Returns the file, and how many points are done and
     how many are not converged.
@@ -134,17 +146,30 @@ def compute_database(
 
         compute(_evaluate, waiting, open_pool(workers, scheduler), keep)
         done = {one: answers[key] for key, one in jobs.items() if answers[key].status == "done"}
-        rows = [row for ridged in (False, True) for row in _rows(done, ridged)]
-        write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *ERRORS.values()], *rows]))
+        _write(folder, done)
     return folder / FILE, {"done": len(done), "not converged": len(jobs) - len(done)}
 
 
-def _rows(done: Mapping[Parametric, Answer], ridged: bool) -> list[list[str]]:
+def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
+    """Both files of the database."""
+    rows: list[list[str]] = []
+    kernels: list[list[str]] = []
+    for ridged in (False, True):
+        textures = tuple(one for one in done if one.ridged == ridged)
+        friction = np.array([[done[one].outputs[name] for name in CURVE] for one in textures], dtype=float)
+        friction = friction.round(6)  # what stands in the file is what is estimated from
+        scale, smoothing = best_kernel(*responses_of(textures, friction))
+        words = [f"{value:.4g}" for value in (*scale, smoothing)]
+        kernels.append([str(int(ridged)), *words])
+        written = np.array([float(word) for word in words])
+        rows += _rows(Database(textures, friction, {}, written[:-1], float(written[-1])), ridged)
+    write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
+    write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *ERRORS.values()], *rows]))
+
+
+def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
-    textures = tuple(one for one in done if one.ridged == ridged)
-    friction = np.array([[done[one].outputs[name] for name in CURVE] for one in textures], dtype=float)
-    friction = friction.round(6)  # what stands in the file is what is estimated from
-    estimator = Database(textures, friction, {}).estimator
+    estimator = database.estimator
     errors = [left_out(estimator, method) - estimator.responses for method in METHODS]
     sizes = np.sqrt(np.mean(np.square(errors), axis=2)).T
     return [
@@ -154,5 +179,5 @@ def _rows(done: Mapping[Parametric, Answer], ridged: bool) -> list[list[str]]:
             *(f"{mu:.6f}" for mu in curve),
             *(f"{size:.5g}" for size in beside),
         ]
-        for one, curve, beside in zip(textures, friction, sizes, strict=True)
+        for one, curve, beside in zip(database.textures, database.friction, sizes, strict=True)
     ]

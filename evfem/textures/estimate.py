@@ -21,7 +21,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.textures.database import shipped
-from evfem.textures.estimators import METHODS, NEAR, hull_weights, kernel
+from evfem.textures.estimators import METHODS, NEAR, hull_weights
 from evfem.textures.parametric import SAMPLES, SPEED, Parametric, at
 from evfem.textures.texture import Texture
 from evfem.textures.touch import FrictionCurve, Touch
@@ -29,6 +29,8 @@ from evfem.textures.touch import FrictionCurve, Touch
 #: wavelengths that are tried for a texture that ends, shares of its waves' variance that are enough
 #: and hardly anything, samples per period of the curve
 TRIED, ENOUGH, FINE = 300, 0.9, 96
+#: error of an estimate, as a share of the range that it shows, that is said
+MUCH = 0.5
 #: relative distance from the speed of the database that is said
 OTHER_SPEED = 0.05
 #: methods to choose from: by name, or whatever is best
@@ -143,9 +145,10 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     near = at(place, touch.ridged)
     database = shipped(touch.ridged)
     method = database.best if method == BEST else method
-    inside = hull_weights(database.estimator.points, place) is not None
-    response = database.estimator(place, method if inside or method != "linear" else "average")
-    weight = kernel(database.estimator.points, place, NEAR)
+    estimator = database.estimator
+    inside = hull_weights(estimator.points * estimator.scale, place * estimator.scale) is not None
+    response = estimator(place, method if inside or method != "linear" else "average")
+    weight = estimator.near(place, NEAR)
     errors = database.errors[method]
     known = np.isfinite(errors)
     error = near.slope * float(np.sqrt(np.sum((weight * errors**2)[known]) / weight[known].sum()))
@@ -157,6 +160,8 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     )
     curve = FrictionCurve(x, mu + (touch.friction - near.friction), f"estimate ({method})", error)
     notes = _notes(wanted, found, touch)
+    if error > MUCH * np.ptp(mu):
+        notes = (*notes, f"its error is as large as the changes that it shows: {MODEL}")
     if not inside:
         notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
     return Estimate(curve, method, notes, found)

@@ -154,7 +154,8 @@ class Texture:
 def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
     """Write a `.json` and its `.csv`, or both into a folder (a path without ending).
 
-    The `.json` is written last: without it there is no texture. Returns both paths.
+    The `.json` is written last: without it there is no texture. Returns both paths. Raises InputError
+    where the `.csv` is somebody's and not that of a texture, as of a measurement called the same.
 
     >>> wave = Texture("wave", "drawn", [0.0, 1.0], [0.0, 0.01], "CC0-1.0", period=2.0)
     >>> [path.name for path in write(wave, "wave.json")], read("wave.json").period
@@ -168,6 +169,9 @@ def write(texture: Texture, path: str | Path) -> tuple[Path, Path]:
             path.mkdir(parents=True, exist_ok=True)
         path = path / NAME
     data = path.with_suffix(".csv")
+    if data.exists() and not is_data(data):
+        given = f"{path}, and {data} is there and no texture's"
+        raise InputError("path", given, "a name whose .csv is free, or a texture to replace")
     write_text(data, texture.rows())
     write_text(path, json.dumps(texture.document(data.name), indent=1) + "\n")
     return path, data
@@ -205,6 +209,14 @@ def is_texture(path: Path) -> bool:
     """Whether a `.json` says that it is a texture."""
     try:
         return _table(path).get("format") == FORMAT
+    except InputError:
+        return False
+
+
+def is_data(path: Path) -> bool:
+    """Whether a `.csv` has the rows of the texture beside it."""
+    try:
+        return _table(path.with_suffix(".json")).get("data") == path.name
     except InputError:
         return False
 

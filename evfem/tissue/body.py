@@ -68,12 +68,12 @@ class Body:
 
     def expand(self, reduced: Floats) -> Floats:
         """Reduced displacements (n,) to nodal ones (N, dim)."""
-        return reduced[self.unknowns]
+        return reduced.take(self.unknowns)
 
     def forces(self, u: Floats) -> Floats:
         """Internal nodal forces (N, dim)."""
         # without the bone's travel: its rounding would outweigh the small forces of a finger far from here
-        total = self.tissue.forces(u - u[self.space.mesh.node_sets["bone"][0]])
+        total = self.tissue.forces(translated(u, -u[self.space.mesh.node_sets["bone"][0]]))
         for term in self._acting:
             total = total + term.forces(u)
         return total
@@ -107,3 +107,13 @@ class Body:
     def energy(self, u: Floats) -> float:
         """Stored energy of the tissue: N mm, in the plane per mm of depth."""
         return self.tissue.energy(u)
+
+
+def translated(u: Floats, way: Floats) -> Floats:
+    """Displacements (N, dim) and a translation (dim,) of all, axis by axis: numpy takes five times as
+    long over rows of two numbers.
+    """
+    moved = np.empty_like(u)
+    for axis, share in enumerate(way):
+        np.add(u[:, axis], share, out=moved[:, axis])
+    return moved

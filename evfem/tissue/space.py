@@ -18,7 +18,8 @@ hex27p1    L2 projection of ln J onto {1, X, Y, Z} of the cell   no
 
 On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test: there
 :math:`F^{-T}:\nabla v` of a constant F does not integrate to its value at the centroid. The mean
-deformation gradient does, by definition; on quads the two are the same.
+deformation gradient does, by definition (with the mean shape gradients of Flanagan and Belytschko,
+10.1002/nme.1620170504); on quads the two are the same.
 
 `theta = Pi ln J(samples)` is linear in ln J, hence
 :math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent is symmetric

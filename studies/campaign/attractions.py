@@ -4,6 +4,7 @@ over the position or over time, below 60 V/um in the insulator and 3000 V.
 
 from __future__ import annotations
 
+from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 
 from .draws import Draw, six_digits
@@ -46,6 +47,33 @@ def add_roughness(random: Draw, tables: Tables) -> None:
         found["open_gap"] = six_digits(gap * random.between(2.0, 10.0))
     whole = gap if law == "constant" and random.chance(0.5) else found
     tables["electrostatics"]["roughness_gap"] = whole
+
+
+def add_drive(random: Draw, tables: Tables) -> None:
+    """Perhaps an alternating voltage with what conducts: by its mean, or resolved where time passes."""
+    table, kinds = tables.get("electrostatics", {}), [one["kind"] for one in tables["motion"]]
+    if table.get("signal", {}).get("kind") == "sine" and random.chance(0.3):
+        kept = {name: table["signal"][name] for name in ("frequency", "amplitude")}
+        table["signal"] = {"kind": "square", **kept}
+    if not table or not random.chance(0.25):
+        return
+    found: Tables = {"waveform": random.one_of("sine", "square"), "skin": random.one_of(*SKINS)}
+    found |= {"gap_conductivity": random.spread(1e-10, 1e-6), "frequency": random.spread(10.0, 1e5)}
+    timed = "wait" in kinds and "voltage" not in kinds and table.get("direction") != "normal"
+    signal = table.get("signal", {})
+    if signal.get("kind") == "carrier" and not signal["resolved"]:
+        del found["frequency"]
+    elif timed and signal and signal["kind"] != "sampled":
+        del found["frequency"]
+        found["drive"] = "resolved"
+    elif timed and "voltage" in table:
+        wait = tables["motion"][kinds.index("wait")]
+        found |= {"drive": "resolved", "frequency": six_digits(wait["steps"] / (20.0 * wait["duration"]))}
+    elif signal.get("kind") == "carrier":
+        return
+    if "voltage" in table and "voltage" not in kinds and random.chance(0.5):
+        table["amplitude"] = abs(table.pop("voltage"))
+    table |= found
 
 
 def largest_voltage(table: Tables) -> float:

@@ -80,6 +80,10 @@ def _largest_force(result: Result) -> Floats:
     return np.maximum(np.abs([getattr(result, name) for name in names]).max(axis=0), FORCE)
 
 
+#: energies of the source's own balance
+ELECTRIC = ("field_energy", "leakage_dissipation")
+
+
 def largest_energy(result: Result) -> float:
     """Largest work or energy of a result at any time."""
     names = [name for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))]
@@ -89,7 +93,8 @@ def largest_energy(result: Result) -> float:
 def remainder(result: Result) -> Floats:
     """Works less what is stored, moving and dissipated, over the largest of all of them (rows,)."""
     given = result.external_work + result.electrostatic_work
-    kept = [getattr(result, name) for name in COLUMNS if name.endswith(("_energy", "_dissipation"))]
+    names = [name for name in COLUMNS if name.endswith(("_energy", "_dissipation"))]
+    kept = [getattr(result, name) for name in names if name not in ELECTRIC]
     return (given - np.sum(kept, axis=0)) / largest_energy(result)
 
 
@@ -194,7 +199,9 @@ def signs(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def no_attraction(scene: Scene, result: Result) -> Broken | None:
-    """Without voltage there is no attraction."""
+    """Without voltage there is no attraction, but that of charges."""
+    if scene.drive is not None and scene.drive.resolved:
+        return None
     off = result.voltage == 0.0
     pull = np.hypot(result.electrostatic_force, result.electrostatic_force_x)
     return _worst("no attraction", np.where(off, pull, 0.0), 0.0, result.step)

@@ -17,7 +17,11 @@ from .tables import Tables, copied, steps_of
 BUDGET_S, LEAST_S, FACTOR = 40.0, 3.0, 2.0
 #: keys without which a table is simpler, in groups that go together first
 PLAIN = {
-    "electrostatics": (("air_layer", "direction", "gap_eps_r", "coupling"), ("insulator_eps_r",)),
+    "electrostatics": (
+        ("air_layer", "direction", "gap_eps_r", "coupling"),
+        ("insulator_eps_r",),
+        ("drive", "frequency", "waveform", "skin", "gap_conductivity"),
+    ),
     "solver": (("element", "tolerance"), ("contact", "penalty_normal", "penalty_tangential"), ("dynamics",)),
 }
 #: what stands in for a key that a table must have

@@ -119,3 +119,16 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
 def test_what_is_no_measurement_is_refused(make, sentence):
     with pytest.raises(InputError, match=sentence):
         make()
+
+
+def test_a_file_in_newtons_is_divided_by_its_depth(tmp_path):
+    path = tmp_path / "load.csv"
+    path.write_text("applied_force,contact_width,sd\n0.2,30,1\n0.5,45,2\n")
+    curve = MeasuredCurve.from_csv(path, depth=10.0)
+    np.testing.assert_allclose(curve.at, [0.02, 0.05])  # N to N/mm
+    np.testing.assert_allclose(curve.values, [3.0, 4.5])  # mm2 to mm
+    np.testing.assert_allclose(curve.sd, [0.1, 0.2])
+    path.write_text("position,peak_contact_pressure\n1,0.03\n")
+    assert MeasuredCurve.from_csv(path, depth=10.0).values.tolist() == [0.03]  # no depth in it
+    with pytest.raises(InputError, match=r"data.depth: given 0.0; allowed: a depth in mm"):
+        MeasuredCurve.from_csv(path, depth=0.0)

@@ -174,3 +174,50 @@ def test_a_scene_file_knows_the_key(tmp_path):
     path.write_text(ev.scenefile.dump(one), encoding="utf-8")
     assert 'field = "auto"' in path.read_text(encoding="utf-8")
     assert ev.scenefile.load(path) == one
+
+
+ENDED = ev.Display(electrodes=[[-20.0, -0.1, 1.0], [0.1, 20.0, 0.0]])
+
+
+def test_a_floating_finger_on_two_electrodes_feels_a_quarter():
+    """Half of the voltage falls over each half of the pad; one electrode alone does not pull it."""
+    motion = [ev.Hover(gap=0.1)]
+    pulls = []
+    for display, grounded in ((ENDED, False), (ev.Display(), True), (ev.Display(), False)):
+        options = {"field": "full", "grounded": grounded, "direction": "normal"}
+        one = ev.Scene(SMOOTH, display, ev.StrongTroxel(), 300.0, motion, **options)
+        pulls.append(ev.simulate(one).electrostatic_force[0])
+    assert pulls[0] / pulls[1] == pytest.approx(0.25, rel=0.15)
+    assert abs(pulls[2]) < 1e-3 * pulls[1]
+
+
+def test_electrodes_that_end_need_the_full_field(tmp_path):
+    options = {"law": ev.StrongTroxel(), "voltage": 10.0, "motion": [ev.Press(force=0.05)]}
+    with pytest.raises(ev.InputError, match="electrodes that end"):
+        ev.Scene(SMOOTH, ENDED, **options)
+    with pytest.raises(ev.InputError, match="not grounded"):
+        ev.Scene(SMOOTH, ev.Display(), grounded=False, **options)
+    for rows in ([[0.0, 1.0, 2.0]], [[1.0, 0.0, 1.0]], [[0.0, 1.0, 1.0], [1.0, 2.0, -1.0]]):
+        with pytest.raises(ev.InputError, match=r"surface\.electrodes"):
+            ev.Display(electrodes=rows)
+    one = ev.Scene(SMOOTH, ENDED, field="full", grounded=False, **options)
+    path = tmp_path / "scene.toml"
+    path.write_text(ev.scenefile.dump(one), encoding="utf-8")
+    assert ev.scenefile.load(path) == one
+
+
+def test_a_pad_beside_the_electrode_is_pulled_towards_it():
+    """Past the edge hardly anything attracts; across it the pull goes back to the electrode."""
+    pad, points = arc(40, 40.0, 4.0)
+    points[:, 1] += 0.05
+    forces = []
+    for end in (9.0, 0.013, -9.0):
+        surface = ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]])
+        _, full = attractions(pad, points, surface)
+        forces.append(full.forces(points, 300.0, None).sum(axis=0))
+    on, across, beside = forces
+    assert across[1] == pytest.approx(0.5 * on[1], rel=0.1)
+    assert abs(beside[1]) < 1e-3 * abs(on[1])
+    # energy per width of a plate, which the electrode's edge gives up
+    plate = 0.5 * ev.eps_0 * 300.0**2 / (0.05 + 0.09 / 3.35 + 0.38 / 1650.0)
+    assert across[0] == pytest.approx(-plate, rel=0.2)

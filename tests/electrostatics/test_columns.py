@@ -86,3 +86,69 @@ def test_a_capacitance_is_above_the_columns_and_below_the_vertical_field():
     value = FILM_AND_AIR.solve(x, levels).value / eps_0
     low = columns_sum(x, levels[2] + 0.09 / 3.35)
     assert low < value < least_upper_sum(x, levels[2], 0.09, 3.35)
+
+
+def strips_pressure(period, slab, gap, volts):
+    """Mean pressure (MPa) of abutting strips at +-volts under a slab on a grounded plane: Fourier sum."""
+    n = np.arange(1, 200, 2)
+    k = 2.0 * np.pi * n / period
+    thickness, eps_r = slab
+    reach = np.cosh(k * thickness) + np.sinh(k * thickness) / np.tanh(k * gap) / eps_r
+    return eps_0 / 4.0 * np.sum((k * 4.0 * volts / (np.pi * n) / reach / np.sinh(k * gap)) ** 2)
+
+
+@pytest.mark.parametrize(("gap", "printed"), [(0.05, 932.68268), (0.5, 11.05853)])
+def test_strips_of_two_voltages(gap, printed):
+    """A quarter of a strip of either sign, the seam on a line."""
+    exact = strips_pressure(4.0, (0.05, 3.0), gap, 1000.0)
+    assert 1e6 * exact == pytest.approx(printed, rel=1e-6)
+    x = np.unique(
+        np.concatenate([1.0 - np.geomspace(4e-3, 1.0, 30), [1.0], 1.0 + np.geomspace(4e-3, 1.0, 30)])
+    )
+    level = 0.0 * x
+    rows = np.linspace(0.0, 1.0, 9)
+    found = Columns((3.0, 1.0), (rows, rows)).solve(
+        x, np.stack([level - 0.05, level, level + gap]), np.array([[-1.0, 1.0, 1.0], [1.0, 3.0, -1.0]])
+    )
+    mean = -0.5 * found.by_level[2].sum() * 1e6 / np.ptp(x)
+    assert mean == pytest.approx(exact, rel=1.5e-3)  # a fifth of the slab is columns on them
+
+
+def halves(right):
+    """Two electrodes with a gap in between, the right one at a share of the voltage."""
+    return np.array([[-9.0, 0.09, 1.0], [0.16, 9.0, right]])
+
+
+@pytest.mark.parametrize("floating", [False, True])
+def test_derivatives_with_electrodes_that_end(floating):
+    """The lines move over the electrodes, which stay."""
+    rng = np.random.default_rng(5)
+    x, levels = wave(17, 0.05)
+    dx, rise = rng.normal(size=x.shape), rng.normal(size=levels.shape)
+    dx[[0, -1]], rise[:2] = 0.0, 0.1
+
+    def energy(s):
+        return FILM_AND_AIR.solve(x + s * dx, levels + s * rise, halves(-0.5), floating).value
+
+    found = FILM_AND_AIR.solve(x, levels, halves(-0.5), floating)
+    step = 2e-5
+    quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
+    slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
+    assert found.by_x @ dx + np.sum(found.by_level * rise) == pytest.approx(slope, rel=1e-7)
+
+
+def test_a_body_without_charge_takes_the_mean_of_the_voltages():
+    x, levels = np.linspace(-1.0, 1.25, 46), np.repeat([[-0.09], [0.0], [0.05]], 46, axis=1)
+    alone = FILM_AND_AIR.solve(x, levels, np.array([[-9.0, 9.0, 1.0]]), floating=True)
+    assert abs(alone.value) < 1e-9 * eps_0
+    two = FILM_AND_AIR.solve(x, levels, halves(0.0), floating=True)
+    grounded = FILM_AND_AIR.solve(x, levels, halves(0.0))
+    assert two.phi[0, -1] == pytest.approx(0.5, abs=0.01)
+    assert two.by_level[2].sum() == pytest.approx(0.5 * grounded.by_level[2].sum(), rel=0.06)
+
+
+def test_an_electrode_without_end_is_one_that_reaches_beyond():
+    x, levels = wave(17, 0.05)
+    whole = FILM_AND_AIR.solve(x, levels)
+    far = FILM_AND_AIR.solve(x, levels, np.array([[-9.0, 9.0, 1.0]]))
+    assert far.value == pytest.approx(whole.value, rel=1e-4)

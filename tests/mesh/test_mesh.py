@@ -1,9 +1,12 @@
 """The mesh container: edges, raising to quadratic cells, thickness of layers, shape of cells."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from evfem.errors import InputError
+from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import CELLS, Mesh, layer_thickness, raised
 from evfem.mesh.quality import scaled_jacobian
 
@@ -173,3 +176,49 @@ def test_the_table_of_cells_agrees_with_meshio():
         block = meshio.CellBlock(name, np.zeros((1, kind.nodes), dtype=int))
         assert (block.dim, block.data.shape[1]) == (kind.dimension, kind.nodes)
         assert (vtk_to_meshio_type[kind.vtk], gmsh_to_meshio_type[kind.gmsh]) == (name, name)
+
+
+@pytest.mark.parametrize("kind", ["quad", "quad9", "triangle", "triangle6"])
+def test_a_point_lies_in_the_cell_around_it(kind):
+    from matplotlib.path import Path
+
+    rng = np.random.default_rng(0)
+    mesh = strip(order=1)
+    if kind.startswith("triangle"):
+        cells = np.concatenate([mesh.cells[:, [0, 1, 2]], mesh.cells[:, [0, 2, 3]]])
+        mesh = replace(mesh, cells=cells, kind="triangle", region=np.zeros(len(cells), int))
+    mesh = mesh if kind in ("quad", "triangle") else raised(mesh)
+    mesh = replace(mesh, points=mesh.points + rng.uniform(-0.15, 0.15, mesh.points.shape))  # slants, bends
+    around = [cell[: mesh.corners] for cell in mesh.cells]
+    if mesh.order == 2:
+        m = mesh.corners
+        around = [np.column_stack([cell[:m], cell[m : 2 * m]]).ravel() for cell in mesh.cells]
+    points = rng.uniform([-0.5, -0.5], [4.5, 3.5], (500, 2))
+    inside = np.array([Path(mesh.points[nodes]).contains_points(points) for nodes in around])
+    assert inside.sum(axis=0).max() == 1
+    np.testing.assert_array_equal(
+        mesh.cells_at(points), np.where(inside.any(axis=0), inside.argmax(axis=0), -1)
+    )
+    np.testing.assert_array_equal(mesh.cells_at(mesh.centres), np.arange(len(mesh.cells)))
+
+
+def test_the_middle_of_a_bent_triangle_is_that_of_its_coordinates():
+    bent = raised(triangle())
+    points = bent.points.copy()
+    points[bent.cells[0, 3]] += [0.0, -0.3]  # N_3 = 4 r s is 4/9 in the middle
+    moved = replace(bent, points=points).centres - bent.centres
+    np.testing.assert_allclose(moved, [[0.0, -0.3 * 4.0 / 9.0]], atol=1e-15)
+
+
+def test_the_middle_of_every_cell_of_a_ridged_pad_lies_in_it():
+    mesh = FingerPad(resolution="coarse").mesh()
+    np.testing.assert_array_equal(mesh.cells_at(mesh.centres), np.arange(len(mesh.cells)))
+
+
+def test_a_point_on_an_edge_lies_in_one_of_its_cells():
+    mesh = strip(columns=6, order=2)
+    found = mesh.cells_at([[2.0, 1.0], [2.0, 2.0], [1.9, 2.0], [9.0, 9.0]])
+    assert (found[:3] >= 0).all()
+    assert found[3] == -1
+    with pytest.raises(InputError, match=r"points: given shape \(2,\) in 2 dimensions; allowed: \(k, 2\)"):
+        mesh.cells_at([1.0, 2.0])

@@ -51,6 +51,18 @@ def test_forces_are_drawn_over_the_step_when_a_press_precedes_the_slide():
     assert [text.get_text() for text in ax.texts] == ["press", "slide"]
 
 
+def test_names_of_short_motions_do_not_run_into_each_other():
+    kinds = ["press"] * 3 + ["slide"] * 16 + ["wait"] * 160
+    numbers = [0] * 3 + [1] * 16 + [2] * 160
+    result = replace(run_of(kinds), motion_index=np.array(numbers))
+    ax = forces(result, over="step")
+    ax.figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in ax.texts]
+    assert [text.get_text() for text in ax.texts] == ["press", "slide", "wait"]
+    assert not any(one.overlaps(other) for i, one in enumerate(boxes) for other in boxes[:i])
+    assert boxes[0].y0 == boxes[2].y0  # only where it must be is a name in a row of its own
+
+
 def test_forces_are_drawn_over_what_is_asked_for():
     result = fake_result()
     ax = forces(result, over="position")

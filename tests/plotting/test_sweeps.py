@@ -29,6 +29,13 @@ def test_a_line_for_each_value_of_a_column_in_rising_order():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("gap (mm)", "electrostatic force, last (N/mm)")
 
 
+def test_lines_of_numbers_say_their_unit():
+    names = ("surface.friction", "electrostatics.voltage", OUT)
+    rows = [(x, v, x * v) for x in (0.1, 0.2) for v in (100.0, 200.0)]
+    ax = sweep(table(rows, names), names[0], OUT, by=names[1])
+    assert [line.get_label() for line in ax.get_lines()] == ["voltage 100 V", "voltage 200 V"]
+
+
 def test_what_is_varied_beside_is_points_without_a_line():
     (line,) = sweep(table(GRID), GAP, OUT).get_lines()
     assert line.get_linestyle() == "None"
@@ -70,6 +77,16 @@ def test_a_map_has_a_cell_around_each_point():
     assert (ax.get_xlabel(), ax.get_ylabel()) == ("force (N/mm)", "friction")
     (bar,) = [one for one in ax.figure.axes if one is not ax]
     assert bar.get_ylabel() == "electrostatic force, last (N/mm)"
+
+
+def test_a_map_of_decades_has_cells_of_one_width_and_says_the_numbers():
+    names = ("electrostatics.insulator_thickness", "surface.friction", OUT)
+    rows = [(x, y, x * y) for x in (0.001, 0.01, 0.1) for y in (0.1, 0.3)]
+    ax = sweep_map(table(rows, names), names[0], names[1], OUT)
+    edges = ax.collections[0].get_coordinates()
+    np.testing.assert_allclose(edges[0, :, 0], [-0.5, 0.5, 1.5, 2.5])
+    np.testing.assert_allclose(edges[:, 0, 1], [0.0, 0.2, 0.4])
+    assert [text.get_text() for text in ax.get_xticklabels()] == ["0.001", "0.01", "0.1"]
 
 
 def test_what_is_no_map_gets_a_sentence():

@@ -326,6 +326,14 @@ WRONG = [
     (SHORT, "kind = 'flat'", "kind = 3", "surface.kind", "given 3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfrictoin = 0.3", "surface.frictoin", "allowed: friction?"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nterms = []", "surface.terms", "an unknown key"),
+    (
+        SHORT,
+        "kind = 'flat'",
+        "kind = 'flat'\ninsulator = 'film'",
+        "surface.insulator",
+        "; insulator stands in [electrostatics]",
+    ),
+    (SHORT, "version = 1", "version = 1\ndepth = 10", "depth", "; depth stands in [finger]"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = -0.3", "surface.friction", "given -0.3"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = nan", "surface.friction", "given nan"),
     (SHORT, "kind = 'flat'", "kind = 'flat'\nfriction = 'a lot'", "surface.friction", 'given "a lot"'),
@@ -557,3 +565,10 @@ def test_every_key_that_comes_from_a_dataclass_says_what_is_allowed():
     ]
     for table in tables:
         assert all(field.description for field in table.model_fields.values()), table
+
+
+def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():
+    with pytest.raises(InputError) as caught:
+        loads(SHORT + "distance = 1.0\n")
+    assert caught.value.key == "motion[0].distance"
+    assert "stands in" not in str(caught.value)

@@ -3,6 +3,7 @@ of the files, but not stricter.
 """
 
 import json
+import re
 import tomllib
 from dataclasses import fields
 
@@ -261,6 +262,16 @@ def test_what_a_template_comments_out_is_a_default(name, tmp_path):
             assert not defaults or value in defaults, line
             checked += 1
     assert checked >= 2
+
+
+@pytest.mark.parametrize("name", templates.TEMPLATES)
+def test_a_template_names_every_kind(name):
+    """A comment `one | two | ...` beside a kind or a law has all there are."""
+    text = templates.text(name)
+    for kinds in (keys.SURFACES, keys.MOTIONS, LAWS):
+        for line in text.splitlines():
+            told = set(re.findall(r"\w+", line.rpartition("#")[2])) & set(kinds)
+            assert len(told) < 3 or told == set(kinds), line
 
 
 def test_a_template_makes_a_scene_and_overwrites_nothing(tmp_path):

@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
+from evfem.contact.edge import outline_nodes
 from evfem.errors import InputError
 from evfem.scene.plan import plan
 from evfem.scene.spatial import factor_memory
@@ -46,6 +47,13 @@ def test_a_finger_in_the_plane_slides_along_x():
     flat = ev.Scene(ev.FingerPad(resolution="coarse"), ev.Flat(), motion=[PRESS, ev.Slide(1.0, angle=10.0)])
     with pytest.raises(InputError, match=r"motion\[1\].angle: given 10 degrees with a finger in the plane"):
         plan(flat)
+
+
+def test_what_is_of_the_plane_alone_refuses_a_whole_finger():
+    with pytest.raises(InputError, match="three dimensions"):
+        ev.reduce(dome_scene(PRESS, ev.Slide(1.0)))
+    with pytest.raises(InputError, match="three dimensions"):
+        outline_nodes(dome())
 
 
 def test_the_plan_says_what_a_whole_finger_needs():

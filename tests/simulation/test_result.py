@@ -371,3 +371,15 @@ def test_objects_do_not_get_into_a_checkpoint(tmp_path):
     with pytest.raises(InputError, match="objects"):
         Checkpoint(tmp_path / "c.npz").write("a", {"x": np.array([{}], dtype=object)}, [])
     assert not list(tmp_path.iterdir())
+
+
+def test_rows_written_again_are_those_of_a_fresh_checkpoint(tmp_path):
+    """Rows added, taken away, and replaced by equal and by other ones."""
+    rows = [fake_row(step) for step in range(1, 6)]
+    once = Checkpoint(tmp_path / "once.npz")
+    other = [*rows[:1], fake_row(2) | {"position": 7.0}, fake_row(3)]
+    for given in (rows[:2], rows[:4], rows[:3], rows, other, [dict(row) for row in rows], []):
+        once.write("digest", {}, given)
+        fresh = Checkpoint(tmp_path / "fresh.npz")
+        fresh.write("digest", {}, given)
+        assert once.path.read_bytes() == fresh.path.read_bytes()

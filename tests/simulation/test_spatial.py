@@ -33,7 +33,7 @@ def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
     assert_allclose(slid.normal_force - slid.electrostatic_force, slid.applied_force, rtol=1e-7)
     assert balance(slid) < 1e-7
     assert slid.frames[-1].contact_status.max() == SLIP
-    shear = np.array([slid.tangential_force[-1], slid["tangential_force_z"][-1]])
+    shear = np.array([slid.tangential_force[-1], slid.tangential_force_z[-1]])
     assert_allclose(np.hypot(*shear), 0.3 * slid.normal_force[-1], rtol=2e-3)
     assert_allclose(np.degrees(np.arctan2(*shear[::-1])), 30.0, atol=0.3)
     assert_allclose([slid.position[-1], slid["position_z"][-1]], 0.5 * np.array([np.cos(np.pi / 6), 0.5]))

@@ -18,6 +18,7 @@ from evfem.simulation.model import make_model
 from evfem.solver.condensation import Singular
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
+from evfem.tissue.laws import NeoHookean
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
@@ -32,7 +33,7 @@ def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
     """A linearisation at rest, its model and its state."""
     surface = Display(y=-0.1, insulator=INSULATOR) if surface is None else surface
     law = Kaczmarek() if voltage and law is None else law
-    model = make_model(Scene(body, surface, law, voltage, motion=[Press(indentation=0.1)], **options))
+    model = make_model(Scene(body, surface, law, voltage, motion=[Press(force=0.1)], **options))
     state = model.equilibrium.rest(np.zeros(2), voltage)
     model.equilibrium.body.linearisation.begin(state, False)
     return model.equilibrium.body.linearisation, model, state
@@ -113,6 +114,7 @@ def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
     linear, model, state = made()
     state = bent(model, state)
     linear.choose_candidates(state, 0.2)
+    linear.single = False
     linear.factorise(state)
     body = model.body
     K = body.pattern.full(body.tangent(state.u)).toarray()
@@ -131,6 +133,7 @@ def test_a_force_on_a_candidate_arrives_whole_at_the_bone():
     """
     linear, _, state = made()
     linear.choose_candidates(state, 0.2)
+    linear.single = False
     linear.factorise(state)
     rows = linear.tangent.bone_rows
     np.testing.assert_allclose(rows, np.tile(-np.eye(2), linear.candidates.size), atol=1e-10)
@@ -306,3 +309,63 @@ def test_an_attraction_that_does_not_change_has_no_part(how):
     linear.choose_candidates(state, 0.6)
     linear.factorise(state)
     np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
+
+
+# -- precision of the factors ----------------------------------------------------------------------------
+
+
+def renewals(linear, state, *residuals):
+    """Ask for a tangent with iterations that have stalled at each of these residuals."""
+    for residual in residuals:
+        linear.refactorise_if_needed(state, [residual, residual])
+    return linear.single
+
+
+def test_a_tangent_that_must_be_renewed_near_the_equilibrium_is_doubted():
+    linear, _, state = made(body=FINE)
+    linear.choose_candidates(state, 0.2)
+    assert renewals(linear, state, 0.5, 0.5, 1e-2, 1e-4)
+    candidates = linear.candidates
+    assert not renewals(linear, state, 1e-5)
+    assert linear.reusable is not None
+    assert linear.candidates is candidates
+
+
+def test_one_renewal_in_each_step_is_no_doubt():
+    linear, _, state = made(body=FINE)
+    linear.choose_candidates(state, 0.2)
+    for _ in range(3):
+        linear.begin(state, False)
+        assert renewals(linear, state, 1e-4)
+
+
+def test_nearly_incompressible_tissue_has_factors_of_double_precision():
+    stiff = replace(FINE, materials={name: NeoHookean(E=0.05, nu=0.499) for name in FINE.materials})
+    assert made(body=FINE)[0].single
+    assert not made(body=stiff)[0].single
+
+
+@pytest.mark.parametrize("doubted", [False, True])
+def test_a_resumed_run_keeps_to_the_precision(doubted):
+    linear, model, state = made(body=FINE)
+    linear.choose_candidates(state, 0.2)
+    renewals(linear, state, 1e-4, *([1e-5] if doubted else []))
+    _, again, _ = made(body=FINE)
+    again.equilibrium.resume(state, model.equilibrium.reusable())
+    resumed = again.equilibrium.body.linearisation
+    assert resumed.single is not doubted
+    np.testing.assert_array_equal(resumed.tangent.schur, linear.tangent.schur)
+
+
+def test_what_the_deepest_press_may_reach_is_chosen_at_once():
+    """The outline is a parabola: what lies 0.8 mm above its lowest point is reached by that much."""
+    steep, surface, chosen = finger(block(40, 2, sag=1.5)), Display(y=-0.1, insulator=INSULATOR), []
+    for motion in ([Press(indentation=0.1), Press(indentation=0.8)], [Press(force=0.1)]):
+        model = make_model(Scene(steep, surface, motion=motion))
+        linear = model.equilibrium.body.linearisation
+        linear.choose_candidates(model.equilibrium.rest(np.zeros(2), 0.0), 0.101)
+        chosen.append(set(linear.candidates))
+    height = model.mesh.points[model.pad.nodes, 1]
+    inside = set(np.flatnonzero(height - height.min() <= 0.8))
+    assert inside <= chosen[0]
+    assert not inside <= chosen[1]

@@ -11,6 +11,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import FingerPad
@@ -79,6 +80,9 @@ def test_every_choice_of_a_scene_file_is_drawn(drawn):
     assert {"strong_troxel", "kaczmarek"} < seen("electrostatics", "law")
     assert {"staggered", "staggered_once"} < seen("electrostatics", "coupling")
     assert {"normal"} < seen("electrostatics", "direction")
+    assert {"resolved"} < seen("electrostatics", "drive")
+    assert {"sine", "square"} < seen("electrostatics", "waveform")
+    assert set(SKINS) < seen("electrostatics", "skin")
     assert {False} < seen("electrostatics", "air_layer")
     assert set(INSULATORS) < seen("electrostatics", "insulator")
     assert {True, False} <= seen("finger", "ridges")

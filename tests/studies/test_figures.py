@@ -19,7 +19,11 @@ common, laws = (importlib.import_module(f"{studies.__name__}.{name}") for name i
 CASES = ("HVHD", "HVLD", "LVLD")
 
 
-@pytest.mark.parametrize("name", ["section321", "laws", "fig05", "fig06", "fig07", "fig08", "fig09", "fig10"])
+NAMES = ["section321", "laws", "fig05", "fig06", "fig07", "fig08", "fig09", "fig10"]
+NAMES += ["frequency", "hypotheses"]
+
+
+@pytest.mark.parametrize("name", NAMES)
 def test_study_leaves_numbers_curves_and_picture(name, tmp_path):
     result = studies.run(name, quick=True, out=tmp_path / "new")
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
@@ -165,3 +169,32 @@ def test_every_folder_of_studies_is_packed_into_the_wheel():
     assert {f"evfem.{'.'.join(folder.parts)}" for folder in folders} == {
         name for name in packed if name.startswith("evfem.studies")
     }
+
+
+def test_frequency_has_the_printed_pressures_and_the_ratio_of_the_waveforms():
+    """14022.5 and 10.4123 Pa at 1 Hz, 9540.57 Pa at 100 kHz; a square wave fluctuates 13 times as much as
+    a sine at 15 Hz, and as much at about 190 Hz; the clutch's losses do not depend on the voltage.
+    """
+    numbers = studies.run("frequency", quick=True)["numbers"]
+    assert numbers["mean_Pa.leak_0.1_Hz"] == pytest.approx(14022.5, abs=0.05)
+    assert numbers["mean_Pa.gabriel_dry.1_Hz"] == pytest.approx(10.4123, abs=5e-5)
+    assert numbers["mean_Pa.gabriel_dry.100000_Hz"] == pytest.approx(9540.57, abs=5e-3)
+    assert numbers["model.vardar.square_over_sine.15_Hz"] == pytest.approx(13.0, abs=0.5)
+    assert numbers["square_over_sine.equal_at_Hz"] == pytest.approx(190.0, rel=0.03)
+    assert numbers["model.nakamura.largest_over_first"] > 1.2
+    assert numbers["model.aliabbasi.gap_conductivity_S_per_m"] == pytest.approx(6.815e-8, abs=5e-12)
+    assert numbers["published.rauf.fast_over_slow_most"] < 0.655
+
+
+def test_hypotheses_bring_the_law_down_to_the_measured_median():
+    """The lifts by case, back in the law: medians of measured over computed force are (1 - share)^2."""
+    numbers = studies.run("hypotheses", quick=True)["numbers"]
+    forces = importlib.import_module(f"{studies.__name__}.measured").participant_forces()
+    for case, volts in zip(CASES, (2000.0, 2000.0, 1414.0), strict=True):
+        share = numbers[f"lift.median_V.{case}"] / volts
+        ratio = np.median(common.participants()[case] / forces["strong_troxel", case])
+        assert (1.0 - share) ** 2 == pytest.approx(ratio, rel=1e-9)
+        # behind 0.09 mm / 3.35 the charge that makes up for a lift of 1 V
+        charge = numbers[f"charge.median_uC_per_m2.{case}"] / numbers[f"lift.median_V.{case}"]
+        assert charge == pytest.approx(8.8541878e-12 * 3.35 / 9e-5 * 1e6, rel=1e-6)
+        assert 0.05 < numbers[f"distance.median_mm.{case}"] < 0.5

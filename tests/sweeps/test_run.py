@@ -99,6 +99,9 @@ def test_the_folder_has_table_parquet_and_provenance(plan, tmp_path):
     assert made["grid"] == {"surface.friction": [0.2, 0.4, -1.0], "motion.0.indentation": [0.1, 0.2]}
     assert made["versions"]["evfem"] == ev.__version__
     assert made["complete"]
+    result.to_csv(tmp_path / "again.csv")
+    assert (tmp_path / "again.csv").read_bytes() == (tmp_path / "out" / "sweep.csv").read_bytes()
+    assert result.table()["status"].tolist() == result["status"]
 
 
 def test_samples_are_in_the_provenance(plan, tmp_path):

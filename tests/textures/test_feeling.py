@@ -5,7 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evfem.textures.feeling import BANDS, Device, playback, render
+from evfem.textures.feeling import BANDS, Device, exact_voltage, playback, render
+from evfem.textures.library import reference
 from evfem.textures.touch import FrictionCurve, Touch
 
 X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
@@ -70,3 +71,14 @@ def test_a_file_has_a_round_full_scale_and_both_frictions():
     assert natural == 0.3
     share = (found.signal.largest / told.full_scale) ** 2
     assert natural + share * (largest - natural) == pytest.approx(found.curve.friction.max())
+
+
+@pytest.mark.slow
+def test_the_exact_voltage_gives_the_force_of_the_texture():
+    touch = Touch(ridged=False, length=0.5)
+    found = exact_voltage(reference("wave-2mm"), touch, Device(friction=0.2))
+    slipping = found.comparison.position > touch.friction * touch.load * 100.0
+    wanted = found.reference.result.applied_tangential_force.max()
+    assert np.abs(found.comparison.error[slipping]).max() < 1e-6 * wanted
+    assert found.voltage.position[-1] == pytest.approx(0.5)
+    assert found.voltage.voltage.min() > 100.0

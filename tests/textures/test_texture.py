@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from evfem.cli import main
 from evfem.errors import InputError
 from evfem.textures.library import find, names, reference
 from evfem.textures.texture import KEYS, Texture, read, write
@@ -114,3 +115,27 @@ def test_twenty_textures_are_shipped_with_a_licence_and_are_the_same_every_time(
 def test_a_reference_texture_that_does_not_exist_is_refused_with_a_guess():
     with pytest.raises(InputError, match="perhaps weave"):
         find("waeve")
+
+
+def test_a_measurement_of_the_same_name_is_not_replaced(tmp_path):
+    mine = tmp_path / "wave.csv"
+    mine.write_text("x,height\n0,1\n")
+    with pytest.raises(InputError, match=r"wave\.csv is there and no texture's"):
+        write(WAVE, tmp_path / "wave.json")
+    assert mine.read_text() == "x,height\n0,1\n"
+    assert not (tmp_path / "wave.json").exists()
+    mine.unlink()
+    for _ in range(2):
+        write(WAVE, tmp_path / "wave.json")
+    assert read(tmp_path / "wave.json").length == 4.0
+
+
+@pytest.mark.parametrize(("key", "out"), [("--out", "wave.csv"), ("--signal", "wave.csv")])
+def test_results_go_to_no_texture_and_are_refused_before_the_slide(tmp_path, capsys, monkeypatch, key, out):
+    monkeypatch.setattr("evfem.textures.commands.simulate_texture", lambda *_: pytest.fail("was run"))
+    _, rows = write(WAVE, tmp_path / "wave.json")
+    before = rows.read_text()
+    given = ["texture", "simulate", str(tmp_path / "wave.json"), key, str(tmp_path / out)]
+    assert main(given) == 2
+    assert f"{key}: given" in capsys.readouterr().err
+    assert rows.read_text() == before

@@ -199,6 +199,7 @@ def test_compiled_tissue_is_the_form(element):
         lambda tissue: tissue.pressure_change(u, du),
         lambda tissue: tissue.pressure_forces(u, q),
         lambda tissue: np.array([tissue.energy(u), tissue.smallest_J(u)]),
+        lambda tissue: np.column_stack(tissue.cell_stress(u)),
     ):
         expected = of(plain)
         np.testing.assert_allclose(of(fast), expected, atol=2e-12 * np.abs(expected).max())

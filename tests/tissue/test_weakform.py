@@ -249,6 +249,8 @@ def test_compiled_kernels_equal_the_plain_path(element):
     np.testing.assert_allclose(tangent_of(space, u, fast).toarray(), K, atol=1e-12 * np.abs(K).max())
     assert fast.smallest_J(u) == pytest.approx(plain.smallest_J(u), rel=1e-13)
     assert fast.energy(u) == pytest.approx(plain.energy(u), rel=1e-12)
+    for found, expected in zip(fast.cell_stress(u), plain.cell_stress(u), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max())
 
 
 def test_compiled_loops_are_used_where_they_were_built():

@@ -117,7 +117,8 @@ class Copy:
         """New text, and nothing left of what was compiled from the old one."""
         file.write_text(text, encoding="utf-8")
         if file.suffix == ".h":
-            source, include = file.with_name("loops.c"), sysconfig.get_paths()["include"]
+            name = "solids.c" if file.name.startswith("solid") else "loops.c"
+            source, include = file.with_name(name), sysconfig.get_paths()["include"]
             compiled = source.with_suffix(".abi3.so")
             words = ["cc", "-O1", "-shared", "-fPIC", f"-I{include}", str(source), "-o", str(compiled)]
             subprocess.run(words, check=True, capture_output=True)

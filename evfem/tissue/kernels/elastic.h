@@ -197,3 +197,27 @@ INLINE double smallest_volume(const mesh *m, int n, const double *u) {
     }
     return smallest;
 }
+
+/* Means over the cells of the Cauchy stress xx, yy, zz, xy, and of J, (B, 5): J sigma = mu F F^T + q with
+   the pressure q (B, Q) at the points, zz with F_zz = 1. */
+INLINE void cell_stresses(const mesh *m, int n, const double *u, const stored *mu, const stored *pressure,
+                          stored *out) {
+    const points *at = &m->at;
+    for (Py_ssize_t b = 0; b < m->blocks; b++) {
+        lanes ue[2 * MOST_NODES], total = {0}, means[5] = {{0}};
+        gather(u, m->nodes + b * n * LANES, n, ue);
+        for (int q = 0; q < at->count; q++) {
+            Py_ssize_t point = b * at->count + q;
+            tensor H = displacement_gradient(ue, at->reference + 2 * n * q, at->inverse + 4 * point, n);
+            lanes w = m->weight[point], J = 1.0 + volume_change(H), share = w / J;
+            lanes xx = 1.0 + H.xx, yy = 1.0 + H.yy;
+            total += w;
+            means[0] += share * (mu[b] * (xx * xx + H.xy * H.xy) + pressure[point]);
+            means[1] += share * (mu[b] * (H.yx * H.yx + yy * yy) + pressure[point]);
+            means[2] += share * (mu[b] + pressure[point]);
+            means[3] += share * mu[b] * (xx * H.yx + H.xy * yy);
+            means[4] += w * J;
+        }
+        for (int i = 0; i < 5; i++) out[5 * b + i] = means[i] / total;
+    }
+}

@@ -5,6 +5,7 @@
 /* -- one version for each instruction set ---------------------------------------------------- */
 
 #define STRAINS (DIM * (DIM + 1) / 2)
+#define STRESSES (DIM == 2 ? 4 : 6)
 
 #define VERSION(SUFFIX, ISA)                                                                             \
     ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
@@ -23,6 +24,10 @@
                                            double *out) {                                                \
         SIZED(volume_forces, u, pressure, out)                                                               \
     }                                                                                                    \
+    ISA static void stresses_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
+                                      const stored *pressure, stored *out) {                            \
+        SIZED(cell_stresses, u, mu, pressure, out)                                                       \
+    }                                                                                                    \
     ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
     ISA static void strains_##SUFFIX(const mesh *m, const double *u, stored *out) {                      \
         SIZED(viscous_strains, u, out)                                                                   \
@@ -37,7 +42,8 @@
     }                                                                                                    \
     static const versions version_##SUFFIX = {                                                           \
         forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
-        smallest_##SUFFIX, strains_##SUFFIX, viscous_##SUFFIX,     viscous_tangent_##SUFFIX};
+        stresses_##SUFFIX, smallest_##SUFFIX, strains_##SUFFIX,    viscous_##SUFFIX,                     \
+        viscous_tangent_##SUFFIX};
 
 typedef struct {
     double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
@@ -45,6 +51,7 @@ typedef struct {
                     const int32_t *, double *);
     void (*log_volumes)(const mesh *, const double *, const double *, stored *);
     void (*volume_forces)(const mesh *, const double *, const stored *, double *);
+    void (*stresses)(const mesh *, const double *, const stored *, const stored *, stored *);
     double (*smallest)(const mesh *, const double *);
     void (*strains)(const mesh *, const double *, stored *);
     double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
@@ -159,6 +166,20 @@ static PyObject *call_volume_forces(PyObject *self, PyObject *args) {
     return finish(&r, Py_NewRef(Py_None));
 }
 
+static PyObject *call_stresses(PyObject *self, PyObject *args) {
+    PyObject *cells, *u, *mu, *pressure, *out;
+    request r;
+    if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &mu, &pressure, &out)) return NULL;
+    read_request(&r, cells, u, mu, NULL, 0);
+    const stored *given = hold(&r.all, pressure, 'd', r.m.blocks * points_of(&r.m) * LANES, 0);
+    stored *found = hold(&r.all, out, 'd', r.m.blocks * (STRESSES + 1) * LANES, 1);
+    if (PyErr_Occurred()) return finish(&r, NULL);
+    Py_BEGIN_ALLOW_THREADS
+    version->stresses(&r.m, r.u, r.first, given, found);
+    Py_END_ALLOW_THREADS
+    return finish(&r, Py_NewRef(Py_None));
+}
+
 static PyObject *call_smallest_J(PyObject *self, PyObject *args) {
     PyObject *cells, *u;
     request r;
@@ -222,6 +243,9 @@ static PyMethodDef methods[] = {
      "log_volumes(cells, u, du, out): ln J (B, S, LANES), or its change along du if that is not None."},
     {"volume_forces", call_volume_forces, METH_VARARGS,
      "volume_forces(cells, u, pressure, out): add the nodal forces (N, DIM) of pressure (B, S, LANES)."},
+    {"stresses", call_stresses, METH_VARARGS,
+     "stresses(cells, u, mu, pressure, out): cell means (B, STRESSES + 1, LANES) of the Cauchy stress xx, yy,\n"
+     "zz, xy, yz, xz and of J, with the pressure (B, Q, LANES)."},
     {"smallest_J", call_smallest_J, METH_VARARGS, "smallest_J(cells, u): smallest volume ratio of all samples."},
     {"strains", call_strains, METH_VARARGS, "strains(cells, u, out): Green strains (B, Q, STRAINS, LANES)."},
     {"viscous", call_viscous, METH_VARARGS,

@@ -141,3 +141,27 @@ INLINE double smallest_volume(const mesh *m, int n, const double *u) {
     }
     return smallest;
 }
+
+/* Means over the cells of the Cauchy stress xx, yy, zz, xy, yz, xz, and of J, (B, 7): J sigma = mu F F^T + q
+   with the pressure q (B, Q) at the points. */
+INLINE void cell_stresses(const mesh *m, int n, const double *u, const stored *mu, const stored *pressure,
+                          stored *out) {
+    for (Py_ssize_t b = 0; b < m->blocks; b++) {
+        lanes ue[DIM * MOST_NODES], total = {0}, means[7] = {{0}};
+        gather(u, m->nodes + b * n * LANES, n, ue);
+        for (int q = 0; q < m->points; q++) {
+            tensor F = displacement_gradient(m, b, q, ue, n), S;
+            lanes w = m->weight[b * m->points + q], J = 1.0 + volume_change(F), share = w / J;
+            EACH(i) F.a[i][i] += 1.0;
+            EACH(i) EACH(j) S.a[i][j] = share * mu[b] * (F.a[i][0] * F.a[j][0] + F.a[i][1] * F.a[j][1] +
+                                                         F.a[i][2] * F.a[j][2]);
+            EACH(i) means[i] += S.a[i][i] + share * pressure[b * m->points + q];
+            means[3] += S.a[0][1];
+            means[4] += S.a[1][2];
+            means[5] += S.a[0][2];
+            means[6] += w * J;
+            total += w;
+        }
+        for (int i = 0; i < 7; i++) out[7 * b + i] = means[i] / total;
+    }
+}

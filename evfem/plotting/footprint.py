@@ -1,0 +1,169 @@
+"""The footprint: fields of the skin of a finger in three dimensions, seen from below.
+
+x points to the right and z, along the finger, up. Pressure, shear and attraction have smooth colours
+between the nodes, statuses one colour for each node's share of the faces around it. What is not
+touched by a traction is skin without a colour.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.skin import ENDS, Skin, make_skin
+from evfem.errors import InputError, quoted
+from evfem.mesh.faces import PLACES, shape_functions
+from evfem.plotting.colours import TISSUE
+from evfem.plotting.fields import Scale, Window, frame_of, scale_of, values_of, within
+from evfem.plotting.figures import add_colorbar, axes_or_new
+from evfem.plotting.finger import Near, checked_window, figure_height, label_bar, told
+from evfem.plotting.labels import field_label
+from evfem.plotting.outline import TRACTIONS
+from evfem.simulation.result import POINT_FIELDS, Frame, Result
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: margin around what is shown as a share of its width
+MARGIN, AROUND = 0.03, 0.2
+#: triangles of a face with 4 or 9 nodes
+FANS = {4: [[0, 1, 2], [0, 2, 3]]}
+FANS[9] = [[8, i, 4 + i] for i in range(4)] + [[8, 4 + i, (i + 1) % 4] for i in range(4)]
+
+
+def footprint(
+    result: Result,
+    field: str = "contact_pressure",
+    frame: int = -1,
+    ax: Axes | None = None,
+    *,
+    near: Near = None,
+    vmin: float | None = None,
+    vmax: float | None = None,
+) -> Axes:
+    """The skin of a finger in three dimensions seen from below, coloured by a field: `gap`,
+    `contact_pressure`, `shear_traction` (its magnitude), `electrostatic_traction` or
+    `contact_status`, in true proportions.
+
+    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
+    lower, upper) of x and z in mm shows that. Colours go from `vmin` to `vmax`, by default over what
+    is shown. Returns the axes; raises InputError for another field or frame, and for a plane finger.
+    """
+    if field not in POINT_FIELDS:
+        raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
+    if result.mesh.dim != 3:
+        raise InputError("result", "a plane finger", "a finger in three dimensions; deformed(result) else")
+    view = SkinView(result, frame_of(result, frame), field)
+    window = view.window(near)
+    scale = scale_of(view.scaled_as, view.shown(window), vmin, vmax)
+    ax = axes_or_new(ax, figure_height(window))
+    mapped = view.draw(ax, window, scale)
+    ax.set_title(told(result, view.frame), fontsize="medium")
+    label_bar(add_colorbar(mapped, ax, field_label(field), scale.extend), field)
+    return ax
+
+
+@dataclass(frozen=True, eq=False)
+class SkinView:
+    """A frame of a result in three dimensions, and the field that its skin is coloured by; with the
+    methods of `evfem.plotting.finger.View`.
+    """
+
+    result: Result
+    frame: Frame
+    field: str
+
+    @property
+    def scaled_as(self) -> str:
+        """The field whose scale it has: the magnitude of the shear has no sign."""
+        return "contact_pressure" if self.field == "shear_traction" else self.field
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The skin of the mesh."""
+        return make_skin(self.result.mesh)
+
+    @cached_property
+    def position(self) -> Floats:
+        """Current positions (P, 3) of the skin's nodes in mm."""
+        return (self.result.mesh.points + self.frame.displacement)[self.skin.nodes]
+
+    @property
+    def values(self) -> Floats:
+        """The field at the skin's nodes (P,)."""
+        return values_of(self.frame, self.field)[self.skin.nodes]
+
+    def window(self, near: Near) -> Window:
+        """What is shown: left, right, lower and upper end in mm."""
+        place = self.position[:, ::2]
+        if near is None:
+            return _around(place, MARGIN)
+        if not isinstance(near, str):
+            return checked_window(near)
+        if near != "contact":
+            raise InputError("near", quoted(near), "contact, or a window (left, right, lower, upper) in mm")
+        touching = self.frame.contact_status[self.skin.nodes] > 0
+        if not touching.any():
+            gap = self.frame.gap[self.skin.nodes]
+            touching = gap <= np.nanmin(gap) + 0.05 * np.nanmax(gap)
+        return _around(place[touching], AROUND)
+
+    def shown(self, window: Window) -> Floats:
+        """The values inside a window."""
+        return self.values[within(self.position[:, ::2], window)]
+
+    def draw(self, ax: Axes, window: Window, scale: Scale) -> Any:
+        """Draw the view into axes, and return what a colour bar needs."""
+        from matplotlib.collections import PolyCollection
+
+        faces = self.skin.faces[self.skin.facing(self.position)]
+        place = self.position[:, ::2]
+        skin = PolyCollection(list(place[faces[:, :4]]), facecolors=TISSUE, edgecolors=TISSUE, linewidths=0.3)
+        ax.add_collection(skin)
+        mapped = self._draw_shares(ax, faces) if self.field == "contact_status" else self._draw(ax, faces)
+        scale.apply(mapped)
+        mapped.set_rasterized(True)
+        ax.set(xlim=window[:2], ylim=window[2:], aspect="equal", xlabel="x (mm)", ylabel="z (mm)")
+        return mapped
+
+    def _draw(self, ax: Axes, faces: Ints) -> Any:
+        """Smooth colours in triangles through all nodes."""
+        from matplotlib.tri import Triangulation
+
+        triangles, values = np.concatenate([faces[:, fan] for fan in FANS[faces.shape[1]]]), self.values
+        x, z = self.position[:, 0], self.position[:, 2]
+        if self.field in TRACTIONS:
+            triangles = triangles[(values[triangles] != 0.0).any(axis=1)]
+        if not len(triangles):
+            return ax.scatter([], [], c=[])
+        return ax.tripcolor(Triangulation(x, z, triangles), values, shading="gouraud")
+
+    def _draw_shares(self, ax: Axes, faces: Ints) -> Any:
+        """One colour for each node's share of a face."""
+        from matplotlib.collections import PolyCollection
+
+        m, shares, values = faces.shape[1], [], []
+        for node, place in enumerate(PLACES[:m]):
+            (a, b), (c, d) = (ENDS[m][float(t)] for t in place)
+            value, _ = shape_functions(m, np.array([(a, c), (b, c), (b, d), (a, d)]))
+            shares.append(np.einsum("qm,kmc->kqc", value, self.position[faces][..., ::2]))
+            values.append(self.values[faces[:, node]])
+        array = np.concatenate(values).astype(float)
+        mapped = PolyCollection(list(np.concatenate(shares)), array=array, edgecolors="face", linewidths=0.2)
+        return ax.add_collection(mapped)
+
+
+def _around(place: Floats, margin: float) -> Window:
+    """A window around points (n, 2), with so much of their width beyond them."""
+    low, high = place.min(axis=0), place.max(axis=0)
+    wide = margin * max(float(np.max(high - low)), 1e-3)
+    return (
+        float(low[0] - wide),
+        float(high[0] + wide),
+        float(low[1] - wide),
+        float(high[1] + wide),
+    )

@@ -1,0 +1,99 @@
+"""The footprint shows what the result says of the skin, where it says it."""
+
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+from numpy.testing import assert_allclose
+from tools.domes import Dome, dome, dome_scene
+from tools.fakes import fake_result
+
+import evfem as ev
+from evfem.contact.skin import make_skin
+from evfem.errors import InputError
+from evfem.plotting import animate, contact_area, contact_pressure, deformed, footprint, forces, regions
+from evfem.plotting.fields import values_of
+from evfem.simulation.run import simulate
+
+
+@pytest.fixture(scope="module")
+def result():
+    shape = dome((7, 2, 6), (4.0, 2.0, 3.0), radius=3.0)
+    motion = [ev.Press(indentation=0.15, steps=1), ev.Slide(0.2, steps=2, angle=60.0)]
+    return simulate(dome_scene(*motion, finger=Dome(shape)))
+
+
+def place_of(result):
+    skin = make_skin(result.mesh)
+    return skin, (result.mesh.points + result.frames[-1].displacement)[skin.nodes]
+
+
+def test_smooth_colours_are_the_nodes_values_at_their_x_and_z(result):
+    ax = footprint(result, "gap")
+    skin, place = place_of(result)
+    mesh = next(one for one in ax.collections if type(one).__name__ == "TriMesh")
+    assert_allclose(mesh.get_array(), result.frames[-1].gap[skin.nodes])
+    assert_allclose(mesh._triangulation.x, place[:, 0])
+    assert_allclose(mesh._triangulation.y, place[:, 2])
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("x (mm)", "z (mm)")
+    assert ax.get_xlim()[0] < place[:, 0].min() < place[:, 0].max() < ax.get_xlim()[1]
+
+
+def test_tractions_leave_the_untouched_skin_without_colour(result):
+    mesh = next(c for c in footprint(result).collections if type(c).__name__ == "TriMesh")
+    skin, _ = place_of(result)
+    pressed = result.frames[-1].contact_pressure[skin.nodes] != 0.0
+    triangles = mesh._triangulation.triangles
+    assert 0 < len(triangles) < 2 * len(skin.faces)
+    assert pressed[triangles].any(axis=1).all()
+
+
+def test_statuses_fill_the_shares_of_the_nodes_with_their_colour(result):
+    ax = footprint(result, "contact_status", near="contact")
+    shares = [c for c in ax.collections if isinstance(c, PolyCollection)][-1]
+    skin, place = place_of(result)
+    corners = np.array([path.vertices[:4] for path in shares.get_paths()])
+    x, z = corners[..., 0], corners[..., 1]
+    area = 0.5 * np.abs((x * np.roll(z, -1, axis=1) - z * np.roll(x, -1, axis=1)).sum(axis=1))
+    status = values_of(result.frames[-1], "contact_status")[skin.nodes]
+    touching = skin.tributary(place)[status > 0].sum()
+    assert_allclose(area[shares.get_array() > 0].sum(), touching, rtol=0.02)
+    assert_allclose(area.sum(), skin.tributary(place).sum(), rtol=1e-6)
+
+
+def test_shear_is_a_magnitude_and_has_colours_from_zero(result):
+    axes = footprint(result, "shear_traction").figure.axes
+    bar = next(one for one in axes if one.get_label() == "<colorbar>")
+    assert bar.get_ylim()[0] == 0.0
+    assert "shear traction (MPa)" in (bar.get_ylabel(), bar.get_xlabel())
+
+
+def test_a_close_up_is_around_what_touches_or_is_nearest(result):
+    close, whole = (footprint(result, near=near).get_xlim() for near in ("contact", None))
+    assert whole[0] < close[0] < close[1] < whole[1]
+    assert footprint(result, near=(-1.0, 1.0, -0.5, 0.5)).get_ylim() == (-0.5, 0.5)
+    hover = simulate(dome_scene(ev.Hover(gap=0.3)))
+    assert abs(sum(footprint(hover, "gap", near="contact").get_xlim())) < 0.1
+    assert len(footprint(hover).collections) > 0  # nothing presses
+
+
+def test_other_fields_fingers_and_pictures_are_refused(result, tmp_path):
+    with pytest.raises(InputError, match="field"):
+        footprint(result, "von_mises")
+    with pytest.raises(InputError, match="near"):
+        footprint(result, near="everything")
+    with pytest.raises(InputError, match="plane finger"):
+        footprint(fake_result())
+    for draw in (deformed, contact_pressure):
+        with pytest.raises(InputError, match="three dimensions"):
+            draw(result)
+    with pytest.raises(InputError, match="three dimensions"):
+        regions(result.mesh)
+    with pytest.raises(InputError, match="field"):
+        animate(result, tmp_path / "stress.gif", "von_mises")
+
+
+def test_curves_have_newtons_and_square_millimetres(result, tmp_path):
+    assert "(N)" in forces(result).get_ylabel()
+    assert contact_area(result).get_ylabel() == "area (mm²)"
+    path = animate(result, tmp_path / "slide.gif", "contact_pressure", near="contact", progress=False)
+    assert path.stat().st_size > 1000

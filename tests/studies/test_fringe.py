@@ -1,0 +1,44 @@
+"""The study of what the column law misses."""
+
+import numpy as np
+import pytest
+from evfem.studies import fringe
+
+from evfem import studies
+
+
+@pytest.fixture(scope="module")
+def numbers(tmp_path_factory):
+    out = tmp_path_factory.mktemp("fringe")
+    found = studies.run("fringe", quick=True, out=out)["numbers"]
+    assert (out / "fringe.png").stat().st_size > 10_000
+    return found
+
+
+def test_ridges_over_the_film_as_computed_elsewhere(numbers):
+    """-4.2 % at 0.25 mm and -11.4 % in contact, by boundary integrals; always between the bounds."""
+    assert numbers["ridge.t7.film.0.25mm.columns_percent"] == pytest.approx(-4.2, abs=0.1)
+    assert numbers["ridge.t7.film.0mm.columns_percent"] == pytest.approx(-11.4, abs=0.2)
+    assert abs(numbers["ridge.t7.touchscreen.0mm.columns_percent"]) < 0.1
+    for key, value in numbers.items():
+        assert not (key.endswith("low_percent") and value > 1e-3), key
+        assert not (key.endswith("high_percent") and value < -1e-3), key
+
+
+def test_a_field_spreads_in_the_skin_from_smooth_contacts(numbers):
+    assert numbers["spreading.smooth"] > 1.5
+    assert 1.0 < numbers["spreading.5um"] < numbers["spreading.1um"] < 1.25
+
+
+def test_ridged_fingers_gain_more_than_smooth_ones(numbers):
+    for case in ("HVHD", "HVLD", "LVLD", "pressed"):
+        ridged, smooth = (numbers[f"finger.{name}.{case}.full_over_local"] for name in ("ridged", "smooth"))
+        assert ridged > smooth > 1.0, case
+
+
+def test_both_ridges_have_the_height_of_the_fingers():
+    for shape in ("t7", "sinus"):
+        x, height = fringe.ridge(shape, 101)
+        assert np.ptp(height) == pytest.approx(0.15)
+        assert height[50] == 0.0
+        assert x[-1] == 0.5
