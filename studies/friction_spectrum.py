@@ -124,5 +124,5 @@ def draw(series: list[Series]) -> Figure:
         axes.set(xlabel="frequency (Hz)")
     left.set(ylabel="amplitude of friction over load")
     right.set(ylabel="the same over the height (1/mm)", ylim=(0.03, 60.0))
-    right.legend(fontsize=6.5, loc="upper left", ncols=2)
+    right.legend(fontsize=5.5, loc="upper left", ncols=2)
     return figure

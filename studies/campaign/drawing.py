@@ -31,8 +31,19 @@ def draw(seed: int, number: int) -> Tables:
         tables["output"] = {"every": random.whole(1, 5), "precision": precision, "compression": True}
     add_roughness(random, tables)
     add_friction_law(random, tables)
+    _add_hand(random, tables)
     add_drive(random, tables)
     return copied(tables)
+
+
+def _add_hand(random: Draw, tables: Tables) -> None:
+    """Perhaps a hand; it knows of time only where all slides do."""
+    if not random.chance(0.12):
+        return
+    hand: Tables = {"stiffness": random.spread(0.02, 10.0)}
+    if all("speed" in motion for motion in tables["motion"] if motion["kind"] == "slide"):
+        hand |= {"damping": random.spread(1e-6, 1e-3), "mass": random.spread(1e-9, 1e-6)}
+    tables["hand"] = hand
 
 
 def _solver(random: Draw, tables: Tables) -> Tables:
