@@ -204,6 +204,6 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     for one, label in zip(series[-2:], ("towards the display", "along x"), strict=True):
         axes[3].plot(one.x, one.y, label=label)
     axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
-    axes[3].legend(fontsize=7)
+    axes[3].legend(fontsize=7, loc="upper left")
     panel_letter(axes[3], "d")
     return figure

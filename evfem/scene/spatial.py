@@ -50,6 +50,8 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.direction != "vertical":
         found.append(("electrostatics.direction", f"{scene.direction} {SOLID}", "vertical"))
+    if scene.law is not None and scene.field != "local":
+        found.append(("electrostatics.field", f"{scene.field} {SOLID}", "local"))
     if not isinstance(roughness_of(scene.roughness_gap), (ConstantRoughness, type(None))):
         allowed = "a number: separations that depend on the pressure are those of the plane"
         found.append(("electrostatics.roughness_gap", f"a law {SOLID}", allowed))

@@ -76,6 +76,16 @@ def add_drive(random: Draw, tables: Tables) -> None:
     table |= found
 
 
+def add_field(random: Draw, tables: Tables) -> None:
+    """Perhaps the full field, where the scene has what it needs."""
+    table = tables.get("electrostatics", {"law": ""})
+    driven = {"frequency", "waveform", "drive", "skin", "gap_conductivity"} & set(table)
+    if table["law"] != "strong_troxel" or driven or not table.get("air_layer", True):
+        return
+    if random.chance(0.2):
+        table["field"] = random.one_of("auto", "full")
+
+
 def largest_voltage(table: Tables) -> float:
     """The voltage below 3000 V with 60 V/um in the insulator (V)."""
     if "insulator" in table:

@@ -8,7 +8,7 @@ Sizes follow the finger's: `scale` is its width over that of Table 2.
 
 from __future__ import annotations
 
-from .attractions import add_drive, add_roughness, add_voltage, electrostatics
+from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
 from .bodies import TABLE_2_WIDTH, finger, width
 from .draws import Draw
 from .grounds import add_friction_law, surface
@@ -33,6 +33,7 @@ def draw(seed: int, number: int) -> Tables:
     add_friction_law(random, tables)
     _add_hand(random, tables)
     add_drive(random, tables)
+    add_field(random, tables)
     return copied(tables)
 
 

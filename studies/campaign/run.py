@@ -68,15 +68,15 @@ def _each(task: Task, keys: Sequence[Key], apart: Sequence[Apart], unit: str, do
         finally:
             free.put(one)
 
-    total = done + len(keys)
-    bar = notices.bar(total, unit, done, notices.drawable() and bool(keys))
+    total, drawn = done + len(keys), notices.drawable() and bool(keys)
+    bar = notices.bar(total, unit, done, drawn)
     with ThreadPoolExecutor(len(apart)) as pool:
         futures: list[Future[Any]] = [pool.submit(with_one, key) for key in keys]
         try:
             for count, future in enumerate(as_completed(futures), done + 1):
                 future.result()
                 bar.update(1)
-                if bar.disable:
+                if not drawn:
                     notices.milestone(unit, count, total)
         except BaseException:  # Ctrl-C: what is running is ended, what waits is not begun
             pool.shutdown(wait=False, cancel_futures=True)

@@ -110,6 +110,9 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
+    "motion.angle": "of fingers in three dimensions, which are not drawn",
+    "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
+    "electrostatics.grounded": "false has no balance of the source to be checked by",
     "finger.ridge_scan": "a measured outline, which no generator can draw",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
