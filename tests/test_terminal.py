@@ -141,7 +141,7 @@ def test_help_fits(monkeypatch, capsys, command):
 
 @pytest.mark.parametrize(
     ("given", "words"),
-    [("rnu", "did you mean run?"), ("studies", "did you mean study?"), ("fly", "'schema') (see")],
+    [("rnu", "did you mean run?"), ("stdy", "did you mean study?"), ("fly", "'schema') (see")],
 )
 def test_a_misspelt_command_is_guessed(capsys, given, words):
     assert cli.main([given]) == 2

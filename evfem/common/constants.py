@@ -52,11 +52,11 @@ MORE                    so many times the iterations may be used where the resid
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
-DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice as    discs
-                        many each time that they come again
+DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
+                        as many each time that they come again
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
-DISC_FALL               where they come again, a step after which the forces miss the laws by more  discs
-                        than this fraction of before is shortened
+DISC_FALL               where they come again, a step after which the forces miss the laws by     discs
+                        more than this fraction of before is shortened
 DISC_ROUNDS             so often before the contact problem is given up                           discs
 DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction

@@ -35,7 +35,7 @@ from evfem.errors import EvfemError
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
 SERIES_GAP = 1e-4
-#: outer edges steeper than this, |n_y| below it, belong to the flanks
+#: outer edges steeper than this, ``|n_y|`` below it, belong to the flanks
 FLANK = 0.3
 #: rows as shares of the layers' heights: fine where insulator and skin meet the air
 INSULATOR = 1.0 - np.linspace(1.0, 0.0, 5) ** 2

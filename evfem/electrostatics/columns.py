@@ -13,8 +13,8 @@ lowest curve and 0 on the highest one; on the two ends its normal derivative is 
 numbered along the lines the matrix of `evfem.electrostatics.poisson.poisson` is a narrow band: it
 needs neither ordering nor symbolic analysis, whatever the outline does.
 
-The derivatives of the discrete C = eps_0 times the minimal integral of eps |grad phi|^2 by all x_k
-and y_lk are exact: C is stationary in the potential, so they are virtual works
+The derivatives of the discrete C = eps_0 times the minimal integral of ``eps |grad phi|^2`` by all
+x_k and y_lk are exact: C is stationary in the potential, so they are virtual works
 :math:`-2 \int T : \nabla V` of the velocities V with which a curve's point takes the cells along.
 """
 
@@ -71,7 +71,7 @@ class Columns:
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
-        >>> round(found.value / eps_0, 9), round(found.by_level[1].sum() / eps_0, 6)
+        >>> round(found.value / eps_0, 9), round(float(found.by_level[1].sum() / eps_0), 6)
         (10.0, -100.0)
         """
         if electrodes is None:

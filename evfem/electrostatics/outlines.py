@@ -27,7 +27,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Values, finite
 from evfem.errors import InputError
 
-#: ends of an outline steeper than this, |n_y| < 0.3, are flanks of a body that goes on above
+#: ends of an outline steeper than this, ``|n_y| < 0.3``, are flanks of a body that goes on above
 FLANK = 0.3
 ONE_WAY = "walls that go one way"
 #: heights closer than this share of the largest length are one height

@@ -13,8 +13,8 @@ faster along some parameters than along others.
 - linear interpolation between the corners of the Delaunay simplex that holds p. Its weights w solve
   ``min sum_i w_i |p_i|^2`` with ``sum_i w_i p_i = p, sum_i w_i = 1, w >= 0``, the lower hull of the
   points lifted to a paraboloid; where nothing solves it, p is outside the hull of the points;
-- radial basis functions exp(-|r|^2 / 2) with a linear polynomial and `smoothing` on the diagonal
-  (scipy's `RBFInterpolator`).
+- radial basis functions ``exp(-|r|^2 / 2)`` with a linear polynomial and `smoothing` on the
+  diagonal (scipy's `RBFInterpolator`).
 
 The scale and the smoothing are those with the smallest mean error when each point is left out in
 turn, which is known without solving again: ``e_i = (A^-1 r)_i / (A^-1)_ii`` (Rippa 1999,

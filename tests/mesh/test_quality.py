@@ -161,7 +161,9 @@ def test_pairs_within_a_reach_are_those_of_a_search_tree(dim):
 def test_parts_are_the_components_of_the_graph_of_cells(edges):
     of_cell = np.random.default_rng(edges).integers(0, edges, (600, 4))
     table = coo_array((np.ones(of_cell.size), (np.repeat(np.arange(600), 4), of_cell.ravel())))
-    expected, _ = connected_components(table @ table.T, directed=False)
+    graph = (table @ table.T).tocsr()
+    graph.indices, graph.indptr = (part.astype(np.int32) for part in (graph.indices, graph.indptr))
+    expected, _ = connected_components(graph, directed=False)
     assert quality._parts(of_cell, edges) == expected > 0
 
 

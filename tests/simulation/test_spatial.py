@@ -90,7 +90,8 @@ def test_resumed_it_ends_as_it_would_have(tmp_path):
     file.write(scene.digest(), kept["arrays"], whole.rows[:3])
     resumed = simulate(scene, resume=file.read(scene.digest()))
     for name in (*FORCES, "position_z", "contact_area", "external_work"):
-        assert resumed[name].tolist() == whole[name].tolist()
+        # without PARDISO the order of sums in the factors differs
+        assert_allclose(resumed[name], whole[name], rtol=1e-12, atol=1e-15)
 
 
 def test_results_are_saved_whole(slid, tmp_path):

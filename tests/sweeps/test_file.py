@@ -37,15 +37,15 @@ def test_a_grid_has_every_combination_and_rows_change_together():
     sweep = read("""
     [grid]
     "surface.friction" = [0.1, 0.2]
-    [grid.hand]
+    [grid.grip]
     light = { "motion.0.force" = 0.05, "motion.1.distance" = 1.0 }
     firm = { motion.0.force = 0.5, motion.1.distance = 2.0 }
     """)
     points = sweep.points()
     assert [p.index for p in points] == [0, 1, 2, 3]
-    assert sweep.labels == ["hand"]
+    assert sweep.labels == ["grip"]
     assert sweep.parameters == ["surface.friction", "motion.0.force", "motion.1.distance"]
-    found = [(p.labels["hand"], *p.parameters.values()) for p in points]
+    found = [(p.labels["grip"], *p.parameters.values()) for p in points]
     assert found == [
         ("light", 0.1, 0.05, 1.0),
         ("firm", 0.1, 0.5, 2.0),
@@ -148,14 +148,14 @@ MISTAKES = [
     ("[grid]\nsurface.friction = []", "grid.surface.friction: given no values; allowed: a list of values"),
     ("[grid]\nsurface.friction = 0.3", "grid.surface.friction: given 0.3; allowed: a list of values"),
     ("[grid]\nsurface.friction = [1979-05-27]", "allowed: numbers, text, true or false, and lists of them"),
-    ("[grid]\nhand = { a = 1 }", "grid.hand.a: given 1; allowed: a table {key = value, ...}"),
-    ("[grid]\nhand = { a = { x = 1 } }", 'grid.hand.a: given "x"; allowed: TABLE.KEY'),
+    ("[grid]\ngrip = { a = 1 }", "grid.grip.a: given 1; allowed: a table {key = value, ...}"),
+    ("[grid]\ngrip = { a = { x = 1 } }", 'grid.grip.a: given "x"; allowed: TABLE.KEY'),
     (
-        "[grid.hand]\na = { surface.y = 1.0 }\nb = { surface.friction = 1.0 }",
-        "grid.hand.b: given surface.friction; allowed: the keys of the first row: surface.y",
+        "[grid.grip]\na = { surface.y = 1.0 }\nb = { surface.friction = 1.0 }",
+        "grid.grip.b: given surface.friction; allowed: the keys of the first row: surface.y",
     ),
     (
-        "[grid]\nsurface.friction = [0.1]\n[grid.hand]\na = { surface.friction = 1.0 }",
+        "[grid]\nsurface.friction = [0.1]\n[grid.grip]\na = { surface.friction = 1.0 }",
         "surface.friction: given the same column twice",
     ),
     ("[grid]\nsurface.friction = [0.1]\n[gird]", "gird: given an unknown key; allowed: grid?"),
