@@ -4,7 +4,8 @@ the names that it uses exist, what it lists is complete, it builds.
 A page's Python blocks run in order, in one namespace and a folder of their own. A `text` block
 after one is what it prints, `...` standing for anything. TOML blocks are scenes or sweeps, `evfem`
 lines in `sh` blocks are understood by the command. `<!-- not run: reason -->` or
-`<!-- needs vtk -->` before a block says why it does not run here.
+`<!-- needs vtk -->` before a block says why it does not run here; `<!-- needs fast -->` that it takes
+minutes without PARDISO.
 """
 
 import doctest
@@ -14,6 +15,7 @@ import shlex
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -64,7 +66,7 @@ def run(page, wanted, capsys):
     for kind, text, mark, line in blocks(page):
         place = f"{page}:{line + 1}"
         if mark not in wanted:
-            assert mark.startswith(("not run: ", "needs vtk")), place
+            assert mark is None or mark.startswith(("not run: ", "needs ")), place
             printed = None
         elif kind == "python":
             exec(compile("\n" * line + text, str(DOCS / page), "exec"), namespace)
@@ -90,6 +92,16 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
     monkeypatch.setattr(elements, "ELEMENTS", table)
     run(page, {None}, capsys)
+
+
+@pytest.mark.solver
+@pytest.mark.skipif(find_spec("pypardiso") is None, reason="takes minutes without it")
+def test_blocks_that_take_long_without_pardiso_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    slow = [page for page in PAGES if "<!-- needs fast -->" in (DOCS / page).read_text(encoding="utf-8")]
+    for page in slow:
+        run(page, {"needs fast"}, capsys)
+    assert Path("footprint.png").exists()
 
 
 def anchors(page):
