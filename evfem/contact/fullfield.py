@@ -246,7 +246,7 @@ class FieldAttraction(Attraction):
         place = lines @ position
         frame = surface_state(self.surface, place)
         insulator = self.surface.insulator
-        rough = self._separation(position[:, 0], pressing) * np.ones(self._size)
+        rough = self._separation(position, pressing) * np.ones(self._size)
         lowest = SERIES_GAP * insulator.thickness / insulator.eps_r
         gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
         ground = place[:, 1] - frame.gap

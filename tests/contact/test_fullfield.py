@@ -221,3 +221,22 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     # energy per width of a plate, which the electrode's edge gives up
     plate = 0.5 * ev.eps_0 * 300.0**2 / (0.05 + 0.09 / 3.35 + 0.38 / 1650.0)
     assert across[0] == pytest.approx(-plate, rel=0.2)
+
+
+def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
+    finger = ev.FingerPad(resolution="coarse", ridges=False)
+
+    def pulled(gap, rough):
+        scene = ev.Scene(
+            finger,
+            ev.Display(ev.FILM),
+            ev.StrongTroxel(),
+            500.0,
+            ev.Hover(gap),
+            field="full",
+            roughness_gap=rough,
+        )
+        return ev.simulate(scene).electrostatic_force[-1]
+
+    assert pulled(0.1, 0.002) == pytest.approx(pulled(0.102, 0.0), rel=1e-3)
+    assert pulled(0.1, 0.002) < 0.99 * pulled(0.1, 0.0)
