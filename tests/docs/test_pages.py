@@ -95,13 +95,14 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.solver
-@pytest.mark.skipif(find_spec("pypardiso") is None, reason="takes minutes without it")
 def test_blocks_that_take_long_without_pardiso_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     slow = [page for page in PAGES if "<!-- needs fast -->" in (DOCS / page).read_text(encoding="utf-8")]
-    for page in slow:
-        run(page, {"needs fast"}, capsys)
-    assert Path("footprint.png").exists()
+    assert slow
+    if find_spec("pypardiso") is not None:  # `.ci/run` runs the tests with this mark with it
+        for page in slow:
+            run(page, {"needs fast"}, capsys)
+        assert Path("footprint.png").exists()
 
 
 def anchors(page):
