@@ -152,16 +152,21 @@ def make_pad(mesh: Mesh) -> Pad:
     """The pad of a plane mesh; raises InputError where no outer edge belongs to it."""
     if mesh.dim == 3:
         raise InputError("finger.mesh", "a finger in three dimensions", "a plane finger")
-    edges = mesh.edges_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
-    if not len(edges):
-        raise InputError(
-            "finger.mesh",
-            "no outer edge whose nodes are all on `pad`",
-            "point data or a physical group `pad`",
-        )
-    nodes, local = np.unique(edges, return_inverse=True)
+    return Pad(*sides_of_pad(mesh))
+
+
+def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
+    """Pad nodes (P,), its edges or faces by their places among them, and which follow no bone (P,);
+    raises InputError where no outer side belongs to the pad.
+    """
+    of, side = (mesh.edges_of, "edge") if mesh.dim == 2 else (mesh.faces_of, "face")
+    sides = of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
+    if not len(sides):
+        given = f"no outer {side} whose nodes are all on `pad`"
+        raise InputError("finger.mesh", given, "point data or a physical group `pad`")
+    nodes, local = np.unique(sides, return_inverse=True)
     free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))
-    return Pad(nodes, local.reshape(edges.shape), free)
+    return nodes, local.reshape(sides.shape), free
 
 
 @dataclass(frozen=True)

@@ -290,39 +290,44 @@ def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: I
     return np.where(lost, STICK, status)
 
 
+def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:
+    """Open nodes whose attraction changes with the gap, drops of the attraction (2 k,) that follow
+    from the statuses alone, and its gain per contact force (k,), which rough faces have.
+    """
+    k, attraction = problem.size, problem.attraction
+    drop, gain = np.zeros(2 * k), np.zeros(k)
+    if attraction is None:
+        return np.zeros(0, dtype=np.int64), drop, gain
+    is_open = status == OPEN
+    drop[:k] = np.where(is_open, 0.0, -attraction.gain_on_closing)
+    if attraction.roughness is not None:
+        drop[:k] += np.where(is_open, attraction.roughness.loss_on_opening, 0.0)
+        gain = attraction.roughness.gain
+    return np.flatnonzero(is_open & (attraction.negative_stiffness > 0.0)), drop, gain
+
+
 def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
     """Contact forces (2 k,), drops of the attraction (2 k,) and extra unknowns (p,) for given
     statuses: one dense linear system.
     """
-    k, C, extra = problem.size, problem.compliance, problem.extra_unknowns
+    k, C, extra, attraction = problem.size, problem.compliance, problem.extra_unknowns, problem.attraction
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     # shear force per pressing force of slipping nodes: against the slip
     against = (status == BACKWARD).astype(float) - (status == FORWARD)
     ratio = problem.friction * against
-    attracted = np.zeros(0, dtype=np.int64)
-    if problem.attraction is not None:
-        attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
+    attracted, drop, gain = _attracted(problem, status)
+    gain = gain[active]
     rows = np.concatenate([active, k + stick, attracted])
-    matrix = C[np.ix_(rows, rows)]
-    gain = np.zeros(active.size)
-    rough = None if problem.attraction is None else problem.attraction.roughness
-    if rough is not None:
-        gain = rough.gain[active]
-        matrix[:, : active.size] *= 1.0 - gain
+    matrix, right, known = C[np.ix_(rows, rows)], -problem.start[rows], drop
+    matrix[:, : active.size] *= 1.0 - gain
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
-    right = -problem.start[rows]
-    drop = np.zeros(2 * k)
-    if problem.attraction is not None:
-        drop[active] = -problem.attraction.gain_on_closing[active]
-        if rough is not None:
-            drop[:k] += np.where(status == OPEN, rough.loss_on_opening, 0.0)
+    if attraction is not None:
         right -= C[rows] @ drop
         own = np.arange(rows.size - attracted.size, rows.size)
-        matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
-        right[own] += problem.attraction.reference_gap[attracted]
-    known = drop
+        matrix[own, own] -= 1.0 / attraction.negative_stiffness[attracted]
+        right[own] += attraction.reference_gap[attracted]
     if problem.cohesion is not None:
         shear = np.concatenate([np.zeros(k), problem.cohesion * against])
         right -= C[rows] @ shear

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError
+from evfem.contact.pad import sides_of_pad
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.mesh.mesh import Mesh
 
@@ -128,13 +128,4 @@ def _hull_area(points: Floats) -> float:
 
 def make_skin(mesh: Mesh) -> Skin:
     """The skin of a mesh of hexahedra; raises InputError where no outer face belongs to its pad."""
-    faces = mesh.faces_of("pad") if "pad" in mesh.node_sets else np.zeros((0, 4), dtype=np.int64)
-    if not len(faces):
-        raise InputError(
-            "finger.mesh",
-            "no outer face whose nodes are all on `pad`",
-            "point data or a physical group `pad`",
-        )
-    nodes, local = np.unique(faces, return_inverse=True)
-    free = ~np.isin(nodes, mesh.node_sets.get("bone", np.zeros(0, dtype=np.int64)))
-    return Skin(nodes, local.reshape(faces.shape), free)
+    return Skin(*sides_of_pad(mesh))

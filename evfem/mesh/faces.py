@@ -11,8 +11,7 @@ from itertools import product
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.errors import InputError, quoted
-from evfem.mesh.mesh import Mesh
+from evfem.mesh.mesh import Mesh, interface_of
 
 #: corners, middles of the edges and centre of a face, in the order of its nodes
 PLACES = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (0, -1), (1, 0), (0, 1), (-1, 0), (0, 0)], dtype=float)
@@ -47,16 +46,7 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     The interface is every face that a cell of `region` shares with a cell of another region. Raises
     `InputError` if there is no such region or interface.
     """
-    if region not in mesh.region_names:
-        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
-    inside = mesh.region == mesh.region_names[region]
-    faces, of_cell = mesh.faces
-    own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(faces)) for cells in (inside, ~inside))
-    shared = (own > 0) & (other > 0)
-    interface = mesh.cell_faces[inside][shared[of_cell[inside]]]
-    if not len(interface):
-        raise InputError("region", quoted(region), "a region that has another one below it")
-    return _distance(mesh.points[nodes], mesh.points[interface])
+    return _distance(mesh.points[nodes], mesh.points[interface_of(mesh, region)])
 
 
 def _distance(points: Floats, patches: Floats) -> Floats:

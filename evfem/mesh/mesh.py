@@ -249,6 +249,23 @@ def _with_middles(nodes: Ints, edges: Ints, outer: np.ndarray, first: int) -> In
     return np.union1d(nodes, first + np.flatnonzero(both))
 
 
+def interface_of(mesh: Mesh, region: str) -> Ints:
+    """Nodes (K, ...) of every side (edge, or face of hexahedra) that a cell of `region` shares with
+    a cell of another region. Raises `InputError` if there is no such region or side.
+    """
+    if region not in mesh.region_names:
+        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
+    inside = mesh.region == mesh.region_names[region]
+    sides, of_cell = mesh.edges if mesh.dim == 2 else mesh.faces
+    own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(sides)) for cells in (inside, ~inside))
+    shared = (own > 0) & (other > 0)
+    of_cells = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
+    interface = of_cells[inside][shared[of_cell[inside]]]
+    if not len(interface):
+        raise InputError("region", quoted(region), "a region that has another one below it")
+    return interface
+
+
 def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that
     layer there.
@@ -257,16 +274,7 @@ def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
     quadratic cells it is the parabola through the edge's nodes. Raises `InputError` if there is no
     such region or interface.
     """
-    if region not in mesh.region_names:
-        raise InputError("region", quoted(region), " | ".join(mesh.region_names))
-    inside = mesh.region == mesh.region_names[region]
-    edges, of_cell = mesh.edges
-    own, other = (np.bincount(of_cell[cells].ravel(), minlength=len(edges)) for cells in (inside, ~inside))
-    shared = (own > 0) & (other > 0)
-    interface = mesh.cell_edges[inside][shared[of_cell[inside]]]
-    if not len(interface):
-        raise InputError("region", quoted(region), "a region that has another one below it")
-    curves = _parabolas(mesh.points[interface])
+    curves = _parabolas(mesh.points[interface_of(mesh, region)])
     points = mesh.points[nodes]
     chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)
     return np.concatenate([_distance(points[chunk], curves) for chunk in chunks])
