@@ -174,10 +174,7 @@ class FingerPad:
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
-        for name, (low, high, unit) in RANGES.items():
-            key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
-            with mistakes.of_a_part():
-                set_frozen(self, **{name: real(key, getattr(self, name), allowed, Within(low, high))})
+        take_numbers(self, RANGES, mistakes)
         with mistakes.of_a_part():
             if not isinstance(self.ridges, bool):
                 raise InputError("finger.ridges", quoted(self.ridges), "true or false")
@@ -280,6 +277,14 @@ def participant_sizes(name: str) -> dict[str, Any]:
     sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
     sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
     return {"width": width, "height": height, **sizes}
+
+
+def take_numbers(finger: object, ranges: Mapping[str, tuple[float, float, str]], mistakes: Mistakes) -> None:
+    """Make each field of `ranges` (lowest, highest, unit) a number within it, or collect a mistake."""
+    for name, (low, high, unit) in ranges.items():
+        key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
+        with mistakes.of_a_part():
+            set_frozen(finger, **{name: real(key, getattr(finger, name), allowed, Within(low, high))})
 
 
 def all_materials(own: object, layers: Sequence[TissueLayer]) -> dict[str, Any]:

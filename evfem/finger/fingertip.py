@@ -17,11 +17,19 @@ from typing import Any
 import numpy as np
 
 from evfem import data
-from evfem.common.checks import Within, choice, real, set_frozen
+from evfem.common.checks import choice, set_frozen
 from evfem.common.views import called, changed, short, table
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
-from evfem.finger.fingerpad import CLEARANCE, RANGES, STEEPEST, STEEPEST_FLAT, Electrical, all_materials
+from evfem.finger.fingerpad import (
+    CLEARANCE,
+    RANGES,
+    STEEPEST,
+    STEEPEST_FLAT,
+    Electrical,
+    all_materials,
+    take_numbers,
+)
 from evfem.finger.fingerpad import participant_sizes as sizes_in_section
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
 from evfem.finger.layers import LAYERS, thickness_of
@@ -144,10 +152,7 @@ class Fingertip:
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
-        for name, (low, high, unit) in TIP_RANGES.items():
-            key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
-            with mistakes.of_a_part():
-                set_frozen(self, **{name: real(key, getattr(self, name), allowed, Within(low, high))})
+        take_numbers(self, TIP_RANGES, mistakes)
         with mistakes.of_a_part():
             choice("finger.resolution", self.resolution, tuple(TIP_RESOLUTIONS))
         with mistakes.of_a_part():
