@@ -210,7 +210,7 @@ SOLVER = {
     "penalty_normal": Text("N/mm3", "with contact = penalty"),
     "penalty_tangential": Text("N/mm3", "with contact = penalty and friction"),
     "tolerance": Text("", "largest free residual over the largest reaction, of every step"),
-    "threads": Text("", "of linear algebra"),
+    "threads": Text("", "of the factorisation"),
     "strategy": Text("", "how hard steps are tried"),
 }
 STRATEGY = {
