@@ -37,8 +37,8 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges alternating "
-        "roughness forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges relaxation "
+        "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
