@@ -114,8 +114,8 @@ SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
 
 
 def test_a_hovering_pad_feels_the_field_of_its_outline():
-    """The same polyline in `rigid_field`, where its ends are planes of symmetry."""
-    pad, points = arc(40, 3.0, 1.0, quadratic=False)
+    """The same points in `rigid_field`, which takes the curve; its ends are planes of symmetry."""
+    pad, points = arc(80, 3.0, 1.0, quadratic=False)
     points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
     local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
     x = np.append(points[:, 0], 1.0 + points[1:, 0])
