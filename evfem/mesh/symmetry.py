@@ -11,6 +11,8 @@ from evfem.mesh.mesh import Mesh
 
 #: points count as mirror images of each other within this share of the mesh's width
 CLOSE = 1e-9
+#: places are told apart by this share, no round number: those of meshes are not in between
+GRID = 0.7320508e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,22 +59,25 @@ def right_half(mesh: Mesh) -> Half | None:
 
 def _images(points: Floats) -> Ints | None:
     """The number of each point's mirror image about x = 0; None where one has none."""
-    from scipy.spatial import cKDTree
-
-    close = CLOSE * float(np.ptp(points[:, 0]))
-    distance, image = cKDTree(points).query(points * np.array([-1.0, 1.0]))
-    found = np.asarray(image, dtype=np.int64)
-    paired = np.array_equal(found[found], np.arange(len(points)))
-    return found if distance.max() <= close and paired else None
+    width = float(np.ptp(points[:, 0]))
+    mirrored = points * np.array([-1.0, 1.0])
+    # in order of rounded places, in which points and their images come alike
+    order, other = (np.lexsort(np.rint(some / (GRID * width)).T) for some in (points, mirrored))
+    if np.abs(points[order] - mirrored[other]).max() > CLOSE * width:
+        return None
+    image = np.empty(len(points), dtype=np.int64)
+    image[order] = other
+    return image if np.array_equal(image[image], np.arange(len(points))) else None
 
 
 def _same_parts(mesh: Mesh, image: Ints) -> bool:
     """Whether the images of cells are cells of the same region, and those of a set are in it."""
     sets = (np.array_equal(np.sort(image[some]), np.sort(some)) for some in mesh.node_sets.values())
-    return _listed(mesh.cells, mesh.region) == _listed(image[mesh.cells], mesh.region) and all(sets)
+    cells, images = _listed(mesh.cells, mesh.region), _listed(image[mesh.cells], mesh.region)
+    return np.array_equal(cells, images) and all(sets)
 
 
-def _listed(cells: Ints, region: Ints) -> list[list[int]]:
+def _listed(cells: Ints, region: Ints) -> Ints:
+    """Cells (E, n) as sorted rows with their region behind, in an order of their own."""
     rows = np.column_stack([np.sort(cells, axis=1), region])
-    listed: list[list[int]] = rows[np.lexsort(rows.T)].tolist()
-    return listed
+    return rows[np.lexsort(rows.T)]

@@ -50,11 +50,16 @@ class Body:
         self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)
         self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
         self.unknowns[bone] = self.bone
-        self.pattern = Pattern(self.unknowns[space.nodes, 0] // dim, dim)
         self.held: Ints = self.unknowns[middle, 0] if middle.size else middle
         if middle.size:
             self.held = np.union1d(self.held, self.bone[:1])
         self._uncoupled = self.pattern.beside(self.held) if middle.size else middle
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Where the entries of the reduced tangent are."""
+        dim = self.space.mesh.dim
+        return Pattern(self.unknowns[self.space.nodes, 0] // dim, dim)
 
     @cached_property
     def drag(self) -> Drag:
