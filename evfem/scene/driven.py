@@ -17,10 +17,13 @@ from evfem.electrostatics.drive import Drive, mean_law
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, OpenCircuit
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import VoltageRamp
+
+#: voltages that follow from the charge of the electrode
+CHARGED = (OpenCircuit, ChargeControl)
 
 
 def applied(scene: Any) -> Any:
@@ -100,8 +103,8 @@ def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich | RelaxingSa
 def check_drive(scene: Any) -> None:
     """Raise InputError where drive, law, voltage and motions do not fit together."""
     drive = scene.drive
-    if isinstance(scene.voltage, OpenCircuit) and (drive is None or not drive.resolved):
-        raise InputError("electrostatics.voltage", "OpenCircuit", "with a resolved drive")
+    if isinstance(scene.voltage, CHARGED) and (drive is None or not drive.resolved):
+        raise InputError("electrostatics.voltage", type(scene.voltage).__name__, "with a resolved drive")
     if drive is None:
         return
     if scene.law is None:
@@ -135,8 +138,8 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, TimeSignal) and drive.frequency is not None:
         given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
         raise InputError("electrostatics.frequency", given, "nothing here")
-    if isinstance(voltage, OpenCircuit) and np.any(seen_at(scene.ground.insulator, frequency(scene))[1]):
-        allowed = "an insulator that does not conduct, with an open circuit"
+    if isinstance(voltage, CHARGED) and np.any(seen_at(scene.ground.insulator, frequency(scene))[1]):
+        allowed = "an insulator that does not conduct, with an open circuit or a given charge"
         raise InputError("surface.insulator", "a conductor", allowed)
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"

@@ -13,8 +13,9 @@ import numpy as np
 
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.dielectrics import Dielectric
-from evfem.electrostatics.laws import Layer
+from evfem.electrostatics.laws import Layer, StrongTroxel
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.driven import frequency, sandwich, solids
 from evfem.scene.scene import Scene
@@ -31,11 +32,17 @@ def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
     assert drive is not None
     at = frequency(scene)
     what = "direct voltage" if at is None else f"{drive.waveform} of {at:g} Hz"
-    if isinstance(scene.voltage, TimeSignal):
+    if isinstance(scene.voltage, OpenCircuit):
+        what = f"open circuit: {scene.voltage.voltage:g} V, disconnected after {scene.voltage.after:g} s"
+    elif isinstance(scene.voltage, ChargeControl):
+        what = "given charge of the electrode, whatever voltage that takes"
+    elif isinstance(scene.voltage, TimeSignal):
         what = f"{type(scene.voltage).__name__} signal"
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
     charge = _charge(scene, thickness, eps_r)
     parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
+    if drive.resolved and not isinstance(scene.law, StrongTroxel):
+        parts.append("no balance of the source, which only Strong and Troxel's law has")
     if not drive.resolved and at is not None:
         parts.append(f"left out: the swing of the attraction at {2.0 * at:g} Hz")
     return "; ".join(parts)
