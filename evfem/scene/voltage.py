@@ -97,13 +97,14 @@ def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
 
 
 #: keys of [electrostatics] that make a drive of it, with what they are without one
-DRIVE = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": "mean"}
+DRIVE = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": None}
 
 
 def drive_of(table: Any, folder: Path) -> Drive | None:
     """The drive of the table [electrostatics], None where no key asks for one."""
     given = {name: getattr(table, name) for name in DRIVE}
-    if given == DRIVE:
+    alone = {name: value for name, value in given.items() if value != DRIVE[name]}
+    if not alone or (alone == {"drive": "mean"} and table.signal is None):
         return None
     resolved = given.pop("drive") == "resolved"
     with at("electrostatics"):

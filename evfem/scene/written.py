@@ -151,7 +151,7 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
     table |= voltage_keys(scene.voltage)
     if scene.drive is not None:
-        table |= _drive_keys(scene.drive)
+        table |= _drive_keys(scene.drive) or {"drive": "mean"}
     insulator = scene.ground.insulator
     if not isinstance(insulator.eps_r, float):
         raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
