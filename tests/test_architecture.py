@@ -37,8 +37,8 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges alternating "
-        "roughness forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges "
+        "relaxation alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
@@ -49,12 +49,12 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
         "findings "
-        "equilibrium factorised relaxation stepping",
+        "equilibrium factorised relaxation path stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "fieldchoice timescales spatial plan",
+        "fieldchoice timescales spatial way plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

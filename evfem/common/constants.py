@@ -74,6 +74,11 @@ CHANGES                 so many changes of side in one step show that neither si
                         consistent
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
+PATH_FIRST              where the error of the path decides, the first part of a scene, as a      press
+                        fraction of its first step
+PATH_CHANGE             a part is at most so many times as long as the one before where the
+                        error of the path decides, or as much shorter; that part times
+PATH_SAFETY             this is tried
 COARSER                 after a release the next one within the same step comes at a part so      texture
                         many times as long
 DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
@@ -130,6 +135,7 @@ HAIR = 1e-9
 SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
+PATH_FIRST, PATH_CHANGE, PATH_SAFETY = 1.0 / 16.0, 4.0, 0.9
 COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1

@@ -12,9 +12,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
-from evfem.electrostatics.charges import Sandwich, constants
+from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.drive import Drive, mean_law
 from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, OpenCircuit
 from evfem.errors import ABSENT, InputError
@@ -79,22 +80,21 @@ def attracting(scene: Any, skin: Layer, insulator: Layer) -> tuple[Any, Layers]:
     if drive is None:
         return scene.law, Layers.of(skin, insulator)
     if drive.resolved:
-        stack = sandwich(scene, skin, insulator)
         thickness = np.asarray(skin.thickness) + insulator.thickness
-        return scene.law, Layers(stack.skin + stack.insulator, thickness)
+        return scene.law, Layers(sandwich(scene, skin, insulator).reference, thickness)
     return mean_law(scene.law, drive, at, (skin, insulator))
 
 
 def lossless(scene: Any, layer: Layer) -> Layer:
-    """A layer with its real permittivity alone, at the drive's frequency."""
-    return Layer(layer.thickness, constants(layer, frequency(scene))[0])
+    """A layer with its real permittivity alone, at the drive's frequency or static without one."""
+    return Layer(layer.thickness, seen_at(layer, frequency(scene))[0])
 
 
-def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich:
+def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich | RelaxingSandwich:
     """The layers of a resolved drive as its charges see them."""
     gap = {"gap_conductivity": scene.drive.gap_conductivity}
     gap["gap_eps_r"] = getattr(scene.law, "gap_eps_r", 1.0)
-    return Sandwich.of(skin, insulator, frequency=frequency(scene), **gap)
+    return stack_of(skin, insulator, frequency=frequency(scene), **gap)
 
 
 def check_drive(scene: Any) -> None:
@@ -135,7 +135,7 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, TimeSignal) and drive.frequency is not None:
         given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
         raise InputError("electrostatics.frequency", given, "nothing here")
-    if isinstance(voltage, OpenCircuit) and np.any(constants(scene.ground.insulator, frequency(scene))[1]):
+    if isinstance(voltage, OpenCircuit) and np.any(seen_at(scene.ground.insulator, frequency(scene))[1]):
         allowed = "an insulator that does not conduct, with an open circuit"
         raise InputError("surface.insulator", "a conductor", allowed)
     if isinstance(voltage, Carrier) and not voltage.resolved:

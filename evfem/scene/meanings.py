@@ -221,6 +221,8 @@ STRATEGY = {
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
     "relaxation": Text("", "whether a finger without an equilibrium near is released"),
+    "steps": Text("", "one part each unless it fails, or parts as the error of the path allows"),
+    "path_error": Text("", "of a part, with steps = auto: a share of the force on the bone"),
 }
 OUTPUT = {
     "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),

@@ -29,6 +29,7 @@ from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage,
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
+from evfem.scene.way import said
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
@@ -334,6 +335,9 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
             f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
+    steps = said(scene)
+    if steps:
+        lines.append(steps)
     return (
         *lines,
         f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",

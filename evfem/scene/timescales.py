@@ -11,6 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.dielectrics import Dielectric
+from evfem.electrostatics.laws import Layer
+from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
 from evfem.protocols import TimeSignal
 from evfem.scene.driven import frequency, sandwich, solids
 from evfem.scene.scene import Scene
@@ -39,7 +43,11 @@ def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
 
 def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
     """Below which frequencies gap and skin discharge where they touch."""
-    stack = sandwich(scene, *solids(scene, thickness, eps_r))
+    at, layers = frequency(scene), solids(scene, thickness, eps_r)
+    assert scene.drive is not None
+    solid, film = (Layer(one.thickness, Dielectric(*_constants(one, at))) for one in layers)
+    leak, medium = scene.drive.gap_conductivity, getattr(scene.law, "gap_eps_r", 1.0)
+    stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=medium)
     skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
     said = []
     if gap > 0.0:
@@ -47,7 +55,23 @@ def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
     if skin > 0.0:
         corner = skin / (1.0 + float(np.max(stack.skin)) / float(np.max(stack.insulator))) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
-    return said or ["charge: nothing conducts"]
+    relaxing = _relaxing(scene, layers) if scene.drive.resolved else []
+    return [*(said or ["charge: nothing conducts"]), *relaxing]
+
+
+def _constants(layer: Layer, at: float | None) -> tuple[float, tuple[()], float]:
+    """Permittivity, no poles, and conductivity of a layer at a frequency (Hz)."""
+    eps_r, sigma = seen_at(layer, at)
+    return float(np.max(eps_r)), (), float(np.max(sigma))
+
+
+def _relaxing(scene: Scene, layers: tuple[Layer, Layer]) -> list[str]:
+    """How many poles the dielectrics of a resolved drive have, and how slow."""
+    stack = sandwich(scene, *layers)
+    if not isinstance(stack, RelaxingSandwich):
+        return []
+    times = np.concatenate([stack.skin.tau, stack.insulator.tau])
+    return [f"charge: {times.size} Debye poles relax in {times.min():.2g} to {times.max():.2g} s"]
 
 
 def bandwidth(scene: Scene) -> float:

@@ -23,6 +23,7 @@ from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
+from evfem.scene.way import allowed_error
 from evfem.simulation.checkpoint import (
     ledger_arrays,
     ledger_of,
@@ -130,7 +131,9 @@ class Run:
         self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
+        self.stepper = Stepper(
+            self.model.equilibrium, scene.coupling, body=self.model.body, allowed=allowed_error(scene)
+        )
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -326,6 +329,8 @@ class Run:
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
         }
+        if self.stepper.allowed is not None:
+            solver["path_error"] = self.stepper.path_error
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
         )

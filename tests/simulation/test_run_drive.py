@@ -93,6 +93,20 @@ def test_the_balance_of_a_soft_hovering_pad_closes_with_the_source():
     assert np.abs(found.electrostatic_work).max() > 0.0
 
 
+def test_a_skin_with_debye_poles_closes_its_balance_and_has_the_mean_of_the_phasor():
+    """The balance of a soft pad, the mean of one that is far enough off to be rigid."""
+    wet = ev.electrostatics.SKINS["gabriel_wet"].debye(1.0, 1e5)
+    drive = ev.Drive(frequency=FREQUENCY, skin=wet, gap_conductivity=1e-4, resolved=True)
+    soft = ev.simulate(scene(drive, [ev.Hover(0.02), ev.Wait(0.25 / FREQUENCY, steps=5)]))
+    assert closed(soft).max() < 1e-9
+    assert soft.leakage_dissipation[-1] > 0.0
+    steps = 24
+    found = ev.simulate(scene(drive, [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]))
+    mean = ev.simulate(scene(replace(drive, resolved=False), [ev.Hover(2.0)]))
+    last = found.electrostatic_force[-steps:].mean()
+    assert last == pytest.approx(mean.electrostatic_force[-1], rel=(2.0 * np.pi / steps) ** 2 / 3.0)
+
+
 @pytest.mark.slow
 def test_the_balance_of_a_sliding_pad_closes_with_the_source():
     drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-8, resolved=True)
