@@ -37,8 +37,8 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges "
-        "relaxation alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges relaxation "
+        "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
@@ -63,7 +63,7 @@ ROOMS = {
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file schema folder pools run",
+        "samples file units schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
