@@ -58,7 +58,7 @@ class Elimination:
         q, C = np.flatnonzero(stiffness > 0.0), whole.compliance
         missing = reference_gap[q] - whole.start[q]
         M = C[np.ix_(q, q)] - np.diag(1.0 / stiffness[q])
-        found = np.linalg.solve(M, np.column_stack([missing, whole.columns[q], C[q]]))
+        found: Floats = np.linalg.solve(M, np.column_stack([missing, whole.columns[q], C[q]])).astype(float)
         p = whole.columns.shape[1]
         constant, by_extra, by_force = found[:, 0], found[:, 1 : 1 + p], found[:, 1 + p :]
         onto, r = C[:, q], whole.rows[:, q]
