@@ -37,7 +37,7 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges relaxation "
+        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges relaxation "
         "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (

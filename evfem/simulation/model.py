@@ -25,6 +25,7 @@ from evfem.scene.driven import attracting, lossless, sandwich, skin_thickness, s
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
+from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
 from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
 from evfem.solver.factorised import FactorisedBody
@@ -70,6 +71,8 @@ def make_model(scene: Scene) -> Model:
     needed = plan_on(scene, mesh, element)
     for warning in needed.warnings:
         notices.warn(warning)
+    if needed.has("tissue"):
+        check_memory(mesh)
     space = make_space(mesh, element)
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])

@@ -6,7 +6,7 @@ import pytest
 import evfem as ev
 from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
-from evfem.contact.fullfield import FieldAttraction, facing, in_line
+from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
 from evfem.contact.pad import Pad
 from evfem.simulation.model import make_model
 
@@ -114,8 +114,8 @@ SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
 
 
 def test_a_hovering_pad_feels_the_field_of_its_outline():
-    """The same polyline in `rigid_field`, where its ends are planes of symmetry."""
-    pad, points = arc(40, 3.0, 1.0, quadratic=False)
+    """The same points in `rigid_field`, which takes the curve; its ends are planes of symmetry."""
+    pad, points = arc(80, 3.0, 1.0, quadratic=False)
     points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
     local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
     x = np.append(points[:, 0], 1.0 + points[1:, 0])
@@ -242,3 +242,22 @@ def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
     rough = pulled(0.1, 0.002)
     assert rough == pytest.approx(pulled(0.102, 0.0), rel=1e-3)
     assert rough < 0.99 * pulled(0.1, 0.0)
+
+
+@pytest.mark.parametrize("filling", [1.0, 3.8])
+def test_bounds_know_what_fills_the_gap(filling):
+    """Above a flat outline both are the capacitance of a plate; above a curved one the field's is
+    between them.
+    """
+    film = ev.Layer(0.001, 3.9)
+    x = np.linspace(0.0, 2.0, 5)
+    flat = certificate(x, np.full(5, 0.009), film, np.zeros(5), filling)
+    plate = ev.eps_0 * 2.0 / (0.009 / filling + 0.001 / 3.9)
+    assert [flat.lower, flat.upper] == pytest.approx([plate, plate], rel=1e-12)
+    pad, points = arc(30, 8.0, 2.0)
+    points[:, 1] += 0.009
+    surface, law = ev.Display(insulator=film, y=0.0), ev.StrongTroxel(filling)
+    skin = ev.Layer(np.full(len(points), 0.38), 1650.0)
+    layers = ev.Layers.of(skin, film)
+    full = FieldAttraction(law, layers, pad, surface, "normal", edges=facing(pad, points), skin=skin)
+    full.check(points)
