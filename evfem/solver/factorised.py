@@ -47,7 +47,7 @@ from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
 from evfem.contact.stability import Verge, verge
 from evfem.solver.anderson import Anderson
-from evfem.solver.control import Drive, DrivenStep, Target
+from evfem.solver.control import DrivenStep, Target, VoltageProblem
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
@@ -278,7 +278,7 @@ class FactorisedBody:
             return self.linearisation.factor.forward(self.body.reduce(nodal))
 
         squared = (state.voltage / KILOVOLT) ** 2
-        return target.drive.solve(step, Drive(squared, self._solve, unit))
+        return target.drive.solve(step, VoltageProblem(squared, self._solve, unit))
 
     def _limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target
