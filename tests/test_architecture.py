@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh archive faces solids quality formats vtu msh file",
+        "hexahedron mesh symmetry archive faces solids quality formats vtu msh file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -49,12 +49,12 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
         "findings "
-        "equilibrium factorised relaxation path stepping",
+        "equilibrium mirrored factorised relaxation path stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "fieldchoice timescales spatial way plan",
+        "fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

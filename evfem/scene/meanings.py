@@ -213,6 +213,7 @@ SOLVER = {
     "penalty_tangential": Text("N/mm3", "with contact = penalty and friction"),
     "tolerance": Text("", "largest free residual over the largest reaction, of every step"),
     "threads": Text("", "of linear algebra"),
+    "symmetry": Text("", "whether a scene that is its own mirror image is computed from its right half"),
     "strategy": Text("", "how hard steps are tried"),
 }
 STRATEGY = {

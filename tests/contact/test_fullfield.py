@@ -223,6 +223,17 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     assert across[0] == pytest.approx(-plate, rel=0.2)
 
 
+def test_the_force_does_not_waver_when_nodes_pass_an_edge():
+    """A flat pad: all the same wherever the edge is between two columns 0.025 mm apart."""
+    pad, points = arc(40, 40.0, 4.0)
+    points[:, 1] = 0.1
+    forces = []
+    for end in np.linspace(0.0, 0.025, 6):
+        _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]]))
+        forces.append(full.forces(points, 300.0, None).sum(axis=0)[0])
+    assert np.ptp(forces) < 0.01 * abs(np.mean(forces))
+
+
 def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
     finger = ev.FingerPad(resolution="coarse", ridges=False)
 
