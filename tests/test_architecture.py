@@ -42,8 +42,8 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction fullfield signorini follower "
-        "condensed coulomb sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield elimination signorini "
+        "follower condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
