@@ -25,7 +25,7 @@ from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, skin_of
+from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, locking, skin_of
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.symmetry import half_of
 from evfem.scene.terms import Boundary
@@ -143,6 +143,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
     others = unresolved(scene, mesh), too_fast(scene), left_out(scene), *drifting(scene, mesh, moduli)
+    locked = locking(element, scene.finger.materials, mesh.dim)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
@@ -165,7 +166,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, mesh, terms),
-        warnings=(*doubts(scene, mesh, moduli), *(text for text in others if text is not None)),
+        warnings=(*doubts(scene, mesh, moduli), *locked, *(text for text in others if text is not None)),
     )
 
 

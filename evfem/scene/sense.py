@@ -28,9 +28,10 @@ from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
 from evfem.tensor import STEP, Array, complex_step, difference
+from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.forms import Form
 from evfem.tissue.laws import NeoHookean
-from evfem.tissue.splitlaw import SplitLaw, split
+from evfem.tissue.splitlaw import SplitLaw, nearly_incompressible, split
 
 #: strain at which a user's material is evaluated beside rest, and the step of differences there
 STRAIN, STRAIN_STEP = 0.02, 1e-3
@@ -45,6 +46,8 @@ SKIN = 0.4
 #: shear modulus over that of Table 2 in a `FingerPad`, and in a mesh (MPa) of its softest material and of
 #: the others, at most
 TIMES_TABLE_2, SOFTEST, HARD = 1e4, 1e3, 2e4
+#: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
+LOCKED = 1e5
 #: field (V/um) that breaks any solid down, and a voltage (V) that is a mistake whatever the field
 BREAKDOWN, HIGHEST_VOLTAGE = 300.0, 5e5
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
@@ -217,6 +220,19 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     shear moduli (MPa) of the materials.
     """
     return (*_hard(scene, moduli), *_small(scene), *_breakdown(scene), *_hovering(scene, mesh))
+
+
+def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
+    """A sentence for a material so nearly incompressible that an element which measures the volume
+    at every point locks: forces many times too large, or no equilibrium.
+    """
+    if ELEMENTS[element][2] != "point":
+        return
+    locked = [name for name, law in materials.items() if nearly_incompressible(split(law), dim, LOCKED)]
+    if locked:
+        cells = "p2 triangles lock" if element == "p2" else f"{element} cells lock"
+        other = "quadrilaterals with q2p1" if element == "p2" else "q2p1 or q1_fbar"
+        yield f"{' and '.join(locked)} hardly changes volume at all, and {cells}: use {other}"
 
 
 def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:

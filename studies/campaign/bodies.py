@@ -54,7 +54,7 @@ def _sized(random: Draw) -> Tables:
     table |= _bone(wide, height, sum(layers.values()))
     table["ridges"] = random.chance(0.5)
     if table["ridges"]:
-        table |= _ridges(random, wide)
+        table |= _ridges(random, wide, layers["stratum_corneum"])
     if random.chance(0.3):
         table["materials"] = _materials(random)
     return table
@@ -72,8 +72,10 @@ def _bone(wide: float, height: float, layers: float) -> Tables:
     }
 
 
-def _ridges(random: Draw, wide: float) -> Tables:
-    """Ridges that are at most 0.3 of their pitch high, with walls that can be meshed."""
+def _ridges(random: Draw, wide: float, skin: float) -> Tables:
+    """Ridges that are at most 0.3 of their pitch high and leave 0.3 of the `skin` (mm) below them,
+    with walls that can be meshed.
+    """
     pitch = random.between(0.3, min(0.8, 0.045 * wide))
     table: Tables = {"ridge_width": pitch, "ridge_phase": random.between(-1.0, 1.0)}
     exponent = random.between(2.0, 8.0)
@@ -84,7 +86,7 @@ def _ridges(random: Draw, wide: float) -> Tables:
         crest, groove = random.between(0.0, 0.4), random.between(0.0, 0.3)
         table |= {"ridge_crest": crest, "ridge_groove": groove}
         steepest *= 0.7 * (1.0 - crest - groove)
-    table["ridge_height"] = random.between(0.02, max(0.021, steepest))
+    table["ridge_height"] = random.between(0.02, min(max(0.021, steepest), 0.699 * skin))
     return table
 
 

@@ -18,7 +18,7 @@ from evfem.errors import InputError
 from evfem.scene import file as scenefile
 from evfem.scene.plan import plan, scene_mesh
 from evfem.scene.scene import default_scene
-from evfem.scene.sense import check_parts, doubts
+from evfem.scene.sense import check_parts, doubts, locking
 from evfem.tissue.splitlaw import split
 
 ROOT = Path(__file__).parents[2]
@@ -371,3 +371,11 @@ def test_looking_takes_next_to_no_time():
         doubts(asked, mesh, moduli)
         best = min(best, time.perf_counter() - begin)
     assert best < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("element", "nu", "said"), [("q2", 0.4999999, True), ("q2p1", 0.4999999, False), ("q2", 0.4999, False)]
+)
+def test_an_element_that_locks_in_incompressible_tissue_is_doubted(element, nu, said):
+    found = [*locking(element, {"tissue": ev.NeoHookean(E=0.1, nu=nu)}, 2)]
+    assert found == (["tissue hardly changes volume at all, and q2 cells lock: use q2p1 or q1_fbar"] * said)
