@@ -189,7 +189,7 @@ def split(law: Any, dim: int = 2) -> SplitLaw:
     return cast(SplitLaw, UserLaw(law))
 
 
-def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float = INCOMPRESSIBLE) -> bool:
+def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float | None = None) -> bool:
     """Whether a law is at rest so many `times` stiffer against a change of volume than in shear,
     d2W/dtheta2 / mu; by default so that its pressure is worth an unknown of its own
     (`evfem.solver.pressure`).
@@ -204,7 +204,7 @@ def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float = INCOMPRESS
     if law.volume_measure == "trace":
         return False
     *_, k = law.split_tangent(identity(dim, 2), np.zeros((1, 1)))
-    return float(np.mean(k)) > times * law.shear_modulus
+    return float(np.mean(k)) > (INCOMPRESSIBLE if times is None else times) * law.shear_modulus
 
 
 def stepped_tangent(
