@@ -26,6 +26,7 @@ from evfem.scene.file import read_text, tables_of
 from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
 from evfem.scene.written import VERSION, dump
+from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
 
@@ -215,7 +216,7 @@ def check_output(output: Any, motions: int) -> None:
     motions.
     """
     words = output.split(".") if isinstance(output, str) else []
-    columns = [name for name in COLUMNS if name != "motion"]
+    columns = [name for name in (*COLUMNS, *SPATIAL) if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"
     if not 2 <= len(words) <= 3 or words[1] not in STATISTICS:
         raise InputError("outputs", shown(output), allowed)
