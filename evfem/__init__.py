@@ -43,7 +43,7 @@ _NAMES = {
     "electrostatics.signalfile": ("Playback", "read_signal", "write_signal"),
     "electrostatics.signals": ("Amplifier", "FollowForce", "VoltageProfile"),
     "electrostatics.drive": ("Drive",),
-    "electrostatics.timesignals": ("Carrier", "OpenCircuit", "Sampled", "Sine", "Square"),
+    "electrostatics.timesignals": ("Carrier", "ChargeControl", "OpenCircuit", "Sampled", "Sine", "Square"),
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
     "fast.model": ("FastModel", "reduce"),
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),

@@ -46,6 +46,7 @@ from evfem.electrostatics.signals import Amplifier as Amplifier
 from evfem.electrostatics.signals import FollowForce as FollowForce
 from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
+from evfem.electrostatics.timesignals import ChargeControl as ChargeControl
 from evfem.electrostatics.timesignals import OpenCircuit as OpenCircuit
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine

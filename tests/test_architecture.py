@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh archive faces solids quality formats vtu msh file",
+        "hexahedron mesh symmetry archive faces solids quality formats vtu msh file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -37,7 +37,7 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges relaxation "
+        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges relaxation "
         "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
@@ -49,12 +49,12 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
         "findings "
-        "equilibrium factorised relaxation path stepping",
+        "equilibrium mirrored factorised relaxation path stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "fieldchoice timescales spatial way plan",
+        "fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
@@ -63,7 +63,7 @@ ROOMS = {
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file schema folder pools run",
+        "samples file units schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

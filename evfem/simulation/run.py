@@ -16,8 +16,9 @@ from threadpoolctl import threadpool_limits
 
 from evfem.common import notices
 from evfem.common.notices import LOG
+from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import OpenCircuit
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
@@ -48,9 +49,16 @@ from evfem.solver.control import (
     VoltageControl,
 )
 from evfem.solver.hand import AT_REST, Grip
+from evfem.solver.mirrored import Mirrored
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
+
+#: coulombs in a nanocoulomb per millimetre, per metre of depth
+NANO = 1e-6
+
+#: coulombs per metre of depth in a nanocoulomb per millimetre
+NANO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -162,6 +170,17 @@ class Run:
         voltage = self.voltage
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
+    def _kept(self, time: float, begin: float) -> KeptCharge | None:
+        """What prescribes the electrode's charge at `time` (s) in a step that begins at `begin`, if
+        anything does.
+        """
+        voltage = self.voltage
+        if isinstance(voltage, ChargeControl):
+            return KeptCharge(0.0, NANO * voltage.charge_at(time) / eps_0)
+        if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
+            return KeptCharge(voltage.voltage)
+        return None
+
     # -- from motions to targets
 
     def requests(self) -> Iterator[Request]:
@@ -180,10 +199,8 @@ class Run:
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
-                if isinstance(self.voltage, OpenCircuit) and now >= self.voltage.after:
-                    begin, end = (
-                        replace(one, drive=KeptCharge(self.voltage.voltage)) for one in (begin, end)
-                    )
+                if (kept := self._kept(now + seconds, now)) is not None:
+                    begin, end = (replace(one, drive=kept) for one in (begin, end))
                 path = self._path(begin, end, now, seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
@@ -273,7 +290,7 @@ class Run:
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage
             if isinstance(end.drive, KeptCharge):
-                return end.drive
+                return self._kept(begin + fraction * seconds, begin) or end.drive
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
             if self._follows(seconds):
@@ -331,6 +348,8 @@ class Run:
         }
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
+        if isinstance(self.model.equilibrium, Mirrored):
+            solver["halved"] = not self.model.equilibrium.broken
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
         )

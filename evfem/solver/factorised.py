@@ -47,12 +47,12 @@ from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
 from evfem.contact.stability import Verge, verge
 from evfem.solver.anderson import Anderson
-from evfem.solver.control import Drive, DrivenStep, Target
+from evfem.solver.control import DrivenStep, Target, VoltageProblem
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
-from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
+from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Record, Reusable, State, StepFailed
 from evfem.tissue.body import Body
 
 
@@ -73,11 +73,16 @@ class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
     def __init__(
-        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
+        self,
+        body: Body,
+        interface: Interface,
+        attraction: Attraction | None,
+        limits: Limits,
+        record: Record | None = None,
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
-        self.linearisation = Linearisation(body, interface, attraction, limits)
+        self.linearisation = Linearisation(body, interface, attraction, limits, record)
         self.pressure = Pressure(body.tissue, self.linearisation)
         self.record = self.linearisation.record
         self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
@@ -273,7 +278,7 @@ class FactorisedBody:
             return self.linearisation.factor.forward(self.body.reduce(nodal))
 
         squared = (state.voltage / KILOVOLT) ** 2
-        return target.drive.solve(step, Drive(squared, self._solve, unit))
+        return target.drive.solve(step, VoltageProblem(squared, self._solve, unit))
 
     def _limited(
         self, step: LinearContactStep, found: StepSolution, state: State, target: Target

@@ -40,6 +40,8 @@ from evfem.tissue.body import Body
 
 #: a change of the voltage that is rounding (relative), and a voltage that is none (V)
 ROUNDING, TINY = 1e-14, 1e-300
+#: a change that is more than this share of the one before is slow
+SLOWLY = 0.1
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
@@ -174,11 +176,16 @@ class Stepper:
     def _disconnected(
         self, state: State, target: Target, attraction: Attraction, charging: Charging
     ) -> State:
-        """Equilibria under voltages that bring the electrode's charge to what it was, until the
-        voltage no longer changes.
+        """Equilibria under voltages that bring the electrode's charge to what is prescribed or was,
+        until the voltage no longer changes. Where it settles slowly, or not, by the secant of what
+        the last two lacked.
         """
         equilibrium, voltage, change = self.equilibrium, state.voltage, np.inf
-        charge = charging.electrode_charge(charging.old)
+        assert isinstance(target.drive, KeptCharge)
+        charge = target.drive.charge
+        if charge is None:
+            charge = charging.electrode_charge(charging.old)
+        tried: tuple[float, float] | None = None
         for _ in range(STAGGERED_LIMIT):
             new = self._coupled(state, replace(target, drive=GivenVoltage(voltage)))
             place, pressing = equilibrium.interface.resting(new), new.contact_force[:, 0]
@@ -188,8 +195,11 @@ class Stepper:
             # as far as the equilibria are exact: to rounding where nothing deforms
             if change <= ROUNDING or (change <= equilibrium.tolerance and change > 0.1 * before):
                 return replace(new, charges=end.charges)
-            voltage = found
-        raise StepFailed("the voltage of the open circuit does not settle", equilibrium.record.residuals)
+            lacking, following = found - voltage, found
+            if tried is not None and change > SLOWLY * before and lacking != tried[1]:
+                following = voltage - lacking * (voltage - tried[0]) / (lacking - tried[1])
+            tried, voltage = (voltage, lacking), following
+        raise StepFailed("the voltage of a given charge does not settle", equilibrium.record.residuals)
 
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""

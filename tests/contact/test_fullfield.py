@@ -114,8 +114,8 @@ SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
 
 
 def test_a_hovering_pad_feels_the_field_of_its_outline():
-    """The same polyline in `rigid_field`, where its ends are planes of symmetry."""
-    pad, points = arc(40, 3.0, 1.0, quadratic=False)
+    """The same points in `rigid_field`, which takes the curve; its ends are planes of symmetry."""
+    pad, points = arc(80, 3.0, 1.0, quadratic=False)
     points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
     local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
     x = np.append(points[:, 0], 1.0 + points[1:, 0])
@@ -221,6 +221,17 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     # energy per width of a plate, which the electrode's edge gives up
     plate = 0.5 * ev.eps_0 * 300.0**2 / (0.05 + 0.09 / 3.35 + 0.38 / 1650.0)
     assert across[0] == pytest.approx(-plate, rel=0.2)
+
+
+def test_the_force_does_not_waver_when_nodes_pass_an_edge():
+    """A flat pad: all the same wherever the edge is between two columns 0.025 mm apart."""
+    pad, points = arc(40, 40.0, 4.0)
+    points[:, 1] = 0.1
+    forces = []
+    for end in np.linspace(0.0, 0.025, 6):
+        _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]]))
+        forces.append(full.forces(points, 300.0, None).sum(axis=0)[0])
+    assert np.ptp(forces) < 0.01 * abs(np.mean(forces))
 
 
 def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
