@@ -1,12 +1,13 @@
 """Fingerprints under a fingertip: what whorl, loop and arch do to stiffness, onset of sliding and
 attraction, and how much that depends on the direction of the slide.
 
-Table 2's pad with the ridges of each pattern, and with parallel ones along the finger, is pressed
-over the paper's display under 1000 V and slid under the held load across (x) and along the finger
-(z). Expected: parallel ridges give way more easily across than along themselves, curved ones have
-both directions under the contact and hardly differ; once everything slips, friction is the
-coefficient times the pressing force for every pattern and direction, so patterns differ in how
-sliding begins and in the attraction of their contact, and not in the end.
+Table 2's pad with the ridges of each pattern, with parallel ones along the finger and with none, is
+pressed over the paper's display under 1000 V and slid under the held load across (x) and along the
+finger (z). Expected: parallel ridges give way more easily across than along themselves, curved ones
+have both directions under the contact and differ little more than the smooth pad, which is longer
+than wide; once everything slips, friction is the coefficient times the pressing force for every
+pattern and direction, so patterns differ in how sliding begins and in the attraction of their
+contact, and not in the end.
 
 The pitch is 0.75 mm, half as much again as a finger's, so that a curved pattern has 20k nodes; what
 pitch, mesh and steps change stands in the numbers, of parallel ridges.
@@ -87,7 +88,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     slides = SLIDES[:3] if quick else SLIDES
     found = {(one, way): slide(pad(one), DIRECTIONS[way], slides) for one in patterns for way in DIRECTIONS}
     smooth = ev.Fingertip(ridges="none", resolution="coarse")
-    found |= {("smooth", "x"): slide(smooth, 0.0, slides[:1])}
+    found |= {("smooth", way): slide(smooth, angle, slides[:1]) for way, angle in DIRECTIONS.items()}
     numbers = pattern_numbers(found, patterns)
     numbers |= {} if quick else error_numbers(found)
     series = [
@@ -102,7 +103,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 def pattern_numbers(found: dict[tuple[str, str], Slid], patterns: list[str]) -> dict[str, float]:
     """Stiffness and onset each way, areas and attraction of the pressed pad."""
-    numbers: dict[str, float] = {"smooth.x.stiffness_N_per_mm": found["smooth", "x"].stiffness}
+    numbers: dict[str, float] = {}
     for (one, way), slid in found.items():
         result = slid.result
         if way == "x":
@@ -110,13 +111,14 @@ def pattern_numbers(found: dict[tuple[str, str], Slid], patterns: list[str]) -> 
                 unit = {"electrostatic_force": "N", "indentation": "mm"}.get(key, "mm2")
                 numbers[f"{one}.{key}_{unit}"] = float(result[key][PRESSED])
             numbers[f"{one}.nodes"] = len(result.mesh.points)
+        numbers[f"{one}.{way}.stiffness_N_per_mm"] = slid.stiffness
         if one in PATTERNS:
-            numbers[f"{one}.{way}.stiffness_N_per_mm"] = slid.stiffness
             numbers[f"{one}.{way}.onset_mm"] = slid.onset
             numbers[f"{one}.{way}.friction_at_the_end_over_full_slip"] = float(slid.share[-1])
-    for one in patterns:
+    for one in (*patterns, "smooth"):
         ratio = found[one, "z"].stiffness / found[one, "x"].stiffness
         numbers[f"verdict.{one}.stiffness_z_over_x"] = ratio
+    for one in patterns:
         numbers[f"verdict.{one}.onset_z_over_x"] = found[one, "z"].onset / found[one, "x"].onset
         pull = numbers[f"{one}.electrostatic_force_N"] / numbers["smooth.electrostatic_force_N"]
         numbers[f"verdict.{one}.attraction_over_smooth"] = pull
@@ -159,12 +161,14 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
             slid = found[one, way]
             axes[1, 0].plot(slid.distance, slid.share, style, color=PATTERNS[one], marker="o", markersize=3)
     axes[1, 0].set(xlabel="slide (mm)", ylabel="friction over that of full slip", ylim=(0, 1.05))
-    _bars(axes[1, 1], patterns, {way: [found[one, way].stiffness for one in patterns] for way in DIRECTIONS})
+    bars = ["smooth", *patterns]
+    _bars(axes[1, 1], bars, {way: [found[one, way].stiffness for one in bars] for way in DIRECTIONS})
     axes[1, 1].set_ylabel("stiffness (N/mm)")
     smooth = found["smooth", "x"].result.electrostatic_force[PRESSED]
     pull = [found[one, "x"].result.electrostatic_force[PRESSED] / smooth for one in patterns]
     axes[1, 2].bar(patterns, pull, color=[PATTERNS[one] for one in patterns])
     axes[1, 2].set_ylabel("attraction over that of a smooth pad")
+    axes[1, 2].tick_params(axis="x", labelsize="small")
     for ax, letter in zip(axes[1], "def", strict=True):
         panel_letter(ax, letter)
     axes[1, 0].legend(handles=_handles(patterns), fontsize="x-small")
@@ -174,10 +178,11 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
 def _bars(ax: Any, names: list[str], values: dict[str, list[float]]) -> None:
     place = np.arange(len(names))
     for shift, (way, heights), hatch in zip((-0.2, 0.2), values.items(), ("", "///"), strict=True):
-        colours = [PATTERNS[name] for name in names]
+        colours = [PATTERNS.get(name, "C4") for name in names]
         ax.bar(place + shift, heights, 0.4, color=colours, hatch=hatch, edgecolor="white", label=way)
     ax.set_xticks(place, names)
-    ax.set_title("plain: along x, hatched: along z", fontsize="small", loc="right")
+    ax.tick_params(axis="x", labelsize="small")
+    ax.set_xlabel("plain: along x, hatched: along z", fontsize="small")
 
 
 def _handles(patterns: list[str]) -> list[Any]:
