@@ -28,10 +28,13 @@ from evfem.common.constants import KILOVOLT
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import RelaxingSandwich
+from evfem.tensor import STEP
 
 #: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
 #: charge on; Gauss points of each
 LONGER, POINTS = 3.0, 8
+#: places at which the voltage that the law sees is remembered
+REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +76,7 @@ class Charging:
     def begin(self, old: Charged, seconds: float) -> None:
         """A step begins at the state `old`."""
         self.old, self.seconds = old, seconds
+        self._known: dict[tuple[bytes, float, bytes], tuple[Floats, Floats]] = {}
 
     def carried(self, length: Floats) -> Floats:
         """The charges (M, P) of the beginning on other tributary lengths (P,)."""
@@ -84,10 +88,27 @@ class Charging:
         return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
 
     def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """The voltage (P,) that the force law sees at the end of the step."""
+        """The voltage (P,) that the force law sees at the end of the step; gaps (P,) may have a small
+        imaginary part, for derivatives.
+        """
         if self.seconds == 0.0:
             return self.stack.effective(gap, voltage, self.carried(length))
-        return self.stack.effective(gap, voltage, self.after(gap, voltage, length))
+        value, slope = self._at(np.real(gap), voltage, length)
+        return value + 1j * np.imag(gap) * slope if np.iscomplexobj(gap) else value
+
+    def _at(self, gap: Floats, voltage: float, length: Floats) -> tuple[Floats, Floats]:
+        """That voltage (P,) and its derivative by the gap, remembered for the last few places: an
+        iteration asks for forces and their derivative, one after the other.
+        """
+        key = (gap.tobytes(), voltage, length.tobytes())
+        if (known := self._known.get(key)) is not None:
+            return known
+        near = gap + 1j * STEP
+        seen = self.stack.effective(near, voltage, self.after(near, voltage, length))
+        if len(self._known) >= REMEMBERED:
+            del self._known[next(iter(self._known))]
+        self._known[key] = found = (np.asarray(seen.real), np.asarray(seen.imag / STEP))
+        return found
 
     def electrode_charge(self, at: Charged) -> float:
         """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it."""

@@ -110,6 +110,7 @@ def reference(hand, speed):
     return (begin - way.y_events[0][0][0]) / speed, way.t_events[0][0]
 
 
+@pytest.mark.slow
 def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
     """The slip is followed in 600 steps, the sticking spring before and after it in few: it is as
     straight as they are. Backward Euler takes a part of the swing that falls with the step.
@@ -193,3 +194,13 @@ def test_a_scene_file_says_it_and_what_cannot_be_is_refused():
         )  # fmt: skip
     with pytest.raises(InputError, match="hand"):
         slab(0.1, slid(1.0, 5))
+
+
+def test_the_hand_of_a_finger_has_the_published_slopes():
+    """4.04 N/m, 3.23e-5 kg and 13.8 Hz for every mm/s, arXiv:2505.11162; over a depth of 8 mm."""
+    hand = ev.Hand.of_finger(50.0, depth=8.0)
+    assert hand.stiffness * 8.0 == pytest.approx(4.04e-3 * 50.0)  # N/mm
+    assert hand.mass * 8.0 == pytest.approx(3.23e-5 * 1e-3 * 50.0)  # t
+    assert hand.stiffness / (2.0 * np.pi * hand.damping) == pytest.approx(13.8 * 50.0)
+    with pytest.raises(ev.InputError, match="speed"):
+        ev.Hand.of_finger(0.0)
