@@ -275,6 +275,7 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
         axes[4].bar(np.arange(len(CASES)) + 0.27 * (k - 1), heights, 0.25, label=label)
     axes[4].set_xticks(range(len(CASES)), list(CASES))
     axes[4].set_ylabel("participants' median (mN)")
+    axes[4].margins(y=0.4)
     axes[4].legend(fontsize=7, loc="upper right")
     panel_letter(axes[4], "e")
     return figure
