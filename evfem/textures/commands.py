@@ -15,11 +15,11 @@ from evfem.electrostatics.signalfile import write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
 from evfem.textures.cleaning import Cleaning
-from evfem.textures.estimate import estimate
+from evfem.textures.estimate import estimate, known_error
 from evfem.textures.feeling import Device, exact_voltage, playback, render
 from evfem.textures.generate import Knobs, make
 from evfem.textures.importing import Source, from_csv, from_image, from_recording
-from evfem.textures.library import about, find, names, reference
+from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture, is_data, write
 from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture
@@ -155,6 +155,10 @@ def _estimate(given: argparse.Namespace) -> None:
     _check_outputs(given)
     found = estimate(find(given.name), touch, given.method)
     _curve(found.curve, given.out)
+    if given.name in REFERENCES:
+        finger = "ridged" if touch.ridged else "smooth"
+        error = known_error(given.name, touch.ridged, given.method)
+        print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
     for note in found.notes:
         tell(f"note: {note}")
     if given.signal is not None:
