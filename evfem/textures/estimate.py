@@ -23,7 +23,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.textures.correction import corrected
-from evfem.textures.database import reference_curves, shipped
+from evfem.textures.database import Database, reference_curves, shipped
 from evfem.textures.estimators import METHODS, NEAR, hull_weights
 from evfem.textures.library import REFERENCES, reference
 from evfem.textures.parametric import SPEED, Parametric, at
@@ -33,8 +33,8 @@ from evfem.textures.texture import Texture
 from evfem.textures.touch import FrictionCurve, Touch, steps_over, surface_of
 
 #: wavelengths that are tried for a texture that ends, share of its waves' variance that is enough,
-#: mm of slide beyond that of a texture that ends
-TRIED, ENOUGH, BESIDE = 300, 0.9, 1.0
+#: mm before and behind the slide over a texture that does not repeat within it
+TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
 #: error of an estimate, as a share of the range that it shows, that is said
 MUCH = 0.5
 #: relative distance from the speed of the database that is said
@@ -151,24 +151,45 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     near = at(place, touch.ridged)
     database = shipped(touch.ridged)
     method = database.best if method == BEST else method
+    response, error, inside = _asked(database, place, method)
+    x, mu, missing = _friction(texture, touch, near, response)
+    notes = _notes(wanted, found, touch)
+    if near.slope * error > MUCH * np.ptp(mu):
+        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
+    if missing:
+        notes = (*notes, f"no equilibrium was found on {missing:.0%} of the slide: {MODEL}")
+    if not inside:
+        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
+    curve = FrictionCurve(x, mu, f"estimate ({method})", near.slope * error)
+    return Estimate(curve, method, notes, found)
+
+
+def _asked(database: Database, place: Floats, method: str) -> tuple[Floats, float, bool]:
+    """The correction (3,) at a place (6,), the error of the points near it over the slope, and
+    whether it is inside their hull.
+    """
     estimator = database.estimator
     inside = hull_weights(estimator.points * estimator.scale, place * estimator.scale) is not None
     response = estimator(place, method if inside or method != "linear" else "average")
-    weight = estimator.near(place, NEAR)
     errors = database.errors[method]
     known = np.isfinite(errors)
-    error = near.slope * float(np.sqrt(np.sum((weight * errors**2)[known]) / weight[known].sum()))
+    weight = estimator.near(place, NEAR)[known]
+    return response, float(np.sqrt(weight @ errors[known] ** 2 / weight.sum())), inside
+
+
+def _friction(
+    texture: Texture, touch: Touch, near: Parametric, response: Floats
+) -> tuple[Floats, Floats, float]:
+    """x (n,) in mm, the corrected friction (n,) there, and the share of it that was not found and is
+    interpolated.
+    """
     x, linear, period = linear_friction(texture, replace(touch, friction=near.friction, load=near.load))
+    found = np.isfinite(linear)
+    if not found.all():
+        linear = np.interp(x, x[found], linear[found]) if found.any() else np.full_like(x, near.friction)
     mu = corrected(x, linear, response, near.slope, period) + (touch.friction - near.friction)
     along = np.linspace(0.0, touch.length, steps_over(touch.length) + 1)
-    mu = np.interp(along, x, mu, period=period)
-    curve = FrictionCurve(along, mu, f"estimate ({method})", error)
-    notes = _notes(wanted, found, touch)
-    if error > MUCH * np.ptp(mu):
-        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
-    if not inside:
-        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
-    return Estimate(curve, method, notes, found)
+    return along, np.interp(along, x, mu, period=period), 1.0 - float(found.mean())
 
 
 def known_error(name: str, ridged: bool, method: str = BEST) -> float:
@@ -182,12 +203,12 @@ def known_error(name: str, ridged: bool, method: str = BEST) -> float:
 
 
 def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, float]:
-    """x (n,) in mm from 0, the friction (n,) there of a pad that yields linearly, and after how many
-    mm it repeats: the texture's period, or a little more than the slide.
+    """x (n,) in mm, the friction (n,) there of a pad that yields linearly, NaN where it is not
+    found, and after how many mm it repeats: the texture's period, or a little more than the slide.
     """
-    period = min(texture.period or np.inf, touch.length + BESIDE)
+    period = min(texture.period or np.inf, touch.length + 2.0 * BESIDE)
     steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
-    x = np.linspace(0.0, period, steps, endpoint=False)
+    x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)
     pad = shipped_pad(touch.ridged).at(touch.load, touch.friction)
     return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 

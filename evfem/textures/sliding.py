@@ -31,8 +31,8 @@ from evfem.finger.layers import TABLE_2
 from evfem.textures.parametric import VISCOSITY
 from evfem.textures.pressed import PressedPad
 
-#: mm that nodes may still move when a step is solved, iterations of a step and of its active set
-AT_REST, MOST_ITERATIONS = 1e-5, 40
+#: mm that nodes may still move when a step is solved, and beyond which it is given up; iterations
+AT_REST, LOST, MOST_ITERATIONS = 1e-5, 5.0, 40
 #: Poisson's ratio of the outermost tissue, and what of its viscosity delays a contact
 NU = TABLE_2["stratum_corneum"].nu
 LAG = 1.0 - NU * (1.0 - 2.0 * NU) / (1.0 - NU)
@@ -50,7 +50,7 @@ class Ground(Protocol):
 
 def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, speed: float) -> Floats:
     """The apparent friction (n,) at positions (n,) of the bone (mm), at an even spacing, for a speed
-    (mm/s). `RUN_IN` steps go before.
+    (mm/s), NaN where the pad is not found. `RUN_IN` steps go before.
     """
     step = float(positions[1] - positions[0])
     lag = LAG * VISCOSITY * speed / step
@@ -60,7 +60,8 @@ def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, sp
     compliance = late * pad.compliance
     moved = before = pad.base + pad.compliance @ pad.force
     touching = pad.force[:n] > 0.0
-    found = np.empty(positions.size)
+    found = np.full(positions.size, np.nan)
+    flat, first = moved, touching
     for k, position in enumerate(positions.tolist()):
         start = late * (pad.base + lag * moved)
         moved, before = 2.0 * moved - before, moved
@@ -80,12 +81,16 @@ def slid(pad: PressedPad, ground: Ground, friction: float, positions: Floats, sp
             touching = np.where(was, force[:n] > 0.0, open_gap < 0.0)
             same = np.array_equal(touching, was)
             if same and np.abs(rest).max() < AT_REST:
+                found[k] = -float(force[n:].sum()) / pad.load
+                break
+            if not (touching.any() and np.abs(rest).max() < LOST):
                 break
             change = rest - rest_before
             share = float(rest @ change) / float(change @ change) if same and turn else 0.0
             moved = given - share * (given - given_before)
         moved = given
-        found[k] = -float(force[n:].sum()) / pad.load
+        if np.isnan(found[k]):
+            moved, before, touching = flat, flat, first
     return found[RUN_IN:]
 
 
