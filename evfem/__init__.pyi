@@ -2,6 +2,7 @@
 
 from evfem import electrostatics as electrostatics
 from evfem import export as export
+from evfem import fieldfiles as fieldfiles
 from evfem import plotting as plotting
 from evfem import protocols as protocols
 from evfem import reference as reference
@@ -46,6 +47,7 @@ from evfem.electrostatics.signals import Amplifier as Amplifier
 from evfem.electrostatics.signals import FollowForce as FollowForce
 from evfem.electrostatics.signals import VoltageProfile as VoltageProfile
 from evfem.electrostatics.timesignals import Carrier as Carrier
+from evfem.electrostatics.timesignals import ChargeControl as ChargeControl
 from evfem.electrostatics.timesignals import OpenCircuit as OpenCircuit
 from evfem.electrostatics.timesignals import Sampled as Sampled
 from evfem.electrostatics.timesignals import Sine as Sine

@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             warnings.simplefilter("always", UserWarning)
             # what one package tells another's developers is not for who runs a command
             warnings.simplefilter("ignore", DeprecationWarning)
-            warnings.showwarning = _warn
+            warnings.showwarning = _warner(_file(given))
             with notices.shown():
                 return _status(given)
     finally:
@@ -61,9 +61,9 @@ def _status(given: argparse.Namespace) -> int:
     try:
         return _command(given.command)(given)
     except InputError as error:
-        return _refuse(error)
+        return _refuse(error, _file(given))
     except NotConverged as error:
-        return _say(error, NOT_CONVERGED)
+        return _say(_of(_file(given), error), NOT_CONVERGED)
     except BrokenPipeError:  # the reader of our output has gone
         _silence()
         return DONE
@@ -77,16 +77,20 @@ def _status(given: argparse.Namespace) -> int:
         return _say("interrupted", INTERRUPTED)
 
 
-def _warn(
-    message: Warning | str,
-    category: object,
-    filename: str,
-    lineno: int,
-    file: object = None,
-    line: object = None,
-) -> None:
-    """One line for a person, without the place in the code."""
-    notices.tell(f"warning: {message}")
+def _file(given: argparse.Namespace) -> Path | None:
+    """The scene or sweep file of a command."""
+    return getattr(given, "scene", None) or getattr(given, "sweep", None)
+
+
+def _of(file: Path | None, message: object) -> str:
+    """A message with the file that it comes from, once; an option's comes from no file."""
+    text = str(message)
+    return text if file is None or str(file) in text or text.startswith("--") else f"{file}: {text}"
+
+
+def _warner(file: Path | None) -> Callable[..., None]:
+    """What shows a warning: one line for a person, without the place in the code."""
+    return lambda message, *place, **more: notices.tell(f"warning: {_of(file, message)}")
 
 
 def _silence() -> None:
@@ -97,11 +101,11 @@ def _silence() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _refuse(error: InputError) -> int:
+def _refuse(error: InputError, file: Path | None) -> int:
     """One line for a person, or one for each mistake in a terminal; elsewhere it stays one line."""
     if len(error.mistakes) == 1 or not sys.stderr.isatty():
-        return _say(error, BAD_INPUT)
-    _say(f"{len(error.mistakes)} mistakes", BAD_INPUT)
+        return _say(_of(file, error), BAD_INPUT)
+    _say(_of(file, f"{len(error.mistakes)} mistakes"), BAD_INPUT)
     for mistake in error.mistakes:
         _say(mistake, BAD_INPUT)
     return BAD_INPUT

@@ -16,6 +16,7 @@ NAMES = (
     "section321",
     "laws",
     "fringe",
+    "fingertip",
     "fig05",
     "fig06",
     "fig07",

@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh archive faces solids quality formats vtu msh file",
+        "hexahedron mesh symmetry archive faces solids quality formats vtu msh file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -37,24 +37,24 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds fieldmesh poisson rigid columns dielectrics charges alternating "
-        "roughness forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges relaxation "
+        "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction fullfield signorini follower "
-        "condensed coulomb sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield elimination signorini "
+        "follower condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
         "findings "
-        "equilibrium factorised relaxation stepping",
+        "equilibrium mirrored factorised relaxation path stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "fieldchoice timescales spatial plan",
+        "fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
@@ -63,7 +63,7 @@ ROOMS = {
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file schema folder pools run",
+        "samples file units schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
@@ -82,7 +82,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
+    ("export", "fieldfiles", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones

@@ -111,7 +111,7 @@ def test_a_refused_scene_leaves_one_wrapped_sentence_and_no_bar(place):
     status, text = terminal(place, "run", "square.toml")
     assert status == 2
     last = text.rsplit("\x1b[K", 1)[-1].rsplit("\r" + " " * 60, 1)[-1]
-    assert "evfem: surface.y" in last
+    assert "evfem: square.toml: surface.y" in last
     shown = [line for line in lines(text) if "step" not in line]
     assert max(map(len, shown)) < 80
     assert len(shown) > 1
@@ -124,7 +124,7 @@ def test_several_mistakes_stand_on_lines_of_their_own_in_a_terminal(place):
     status, text = terminal(place, "run", "square.toml")
     assert status == 2
     assert [line for line in lines(text) if line.startswith("evfem: ")] == [
-        "evfem: 2 mistakes",
+        "evfem: square.toml: 2 mistakes",
         "evfem: surface.friction: given -0.2; allowed: a number from 0 to 100, or a",
         "evfem: motion[0].steps: given 0; allowed: a whole number from 1 to 1000000",
     ]

@@ -78,7 +78,7 @@ class Attraction:
 
     @property
     def no_charges(self) -> Floats:
-        """Charges (2, P) of an uncharged pad, (2, 0) where charges do not move."""
+        """Charges (M, P) of an uncharged pad, (2, 0) where charges do not move."""
         return np.zeros((2, 0)) if self.charging is None else self.charging.none
 
     def _seen(self, gap: Any, voltage: float, position: Floats) -> Any:
@@ -90,7 +90,7 @@ class Attraction:
     def charged(
         self, position: Floats, voltage: float, pressing: Floats | None, charges: Floats | None = None
     ) -> Charged:
-        """The electric state at positions (P, dim): with the charges (2, P), or those at the end of
+        """The electric state at positions (P, dim): with the charges (M, P), or those at the end of
         the present step.
         """
         assert self.charging is not None

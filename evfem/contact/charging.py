@@ -2,11 +2,13 @@
 attraction.
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.charges`) on its
-tributary length A. A step goes in two parts: the pad moves with the charges and the voltage that it
-had, the charge of each node r A staying what it is while A changes; then, in its new place, charge
-flows for the seconds of the step while the voltage goes straight to its new value. So the charges
-at the end are a function of gap and voltage, the force law sees their effective voltage, and contact
-and Newton stay as they are. Nothing is committed before a step is accepted.
+tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them
+(`evfem.electrostatics.relaxation`).
+A step goes in two parts: the pad moves with the charges and the voltage that it had, the charge of
+each node r A staying what it is while A changes; then, in its new place, charge flows for the
+seconds of the step while the voltage goes straight to its new value. So the charges at the end are
+a function of gap and voltage, the force law sees their effective voltage, and contact and Newton
+stay as they are. Nothing is committed before a step is accepted.
 
 The balance of a step, each term from its own integral::
 
@@ -25,15 +27,19 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.relaxation import RelaxingSandwich
+from evfem.tensor import STEP
 
 #: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
 #: charge on; Gauss points of each
 LONGER, POINTS = 3.0, 8
+#: places at which the voltage that the law sees is remembered
+REMEMBERED = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Charged:
-    """An electric state of the pad: charges over eps_0 (2, P) in V/mm, voltage (V), gaps (P,) and
+    """An electric state of the pad: charges over eps_0 (M, P) in V/mm, voltage (V), gaps (P,) and
     tributary lengths (P,) in mm.
     """
 
@@ -56,7 +62,7 @@ class Flow:
 class Charging:
     """The charges of a step that begins at `begin` and takes `seconds`."""
 
-    def __init__(self, stack: Sandwich, nodes: int) -> None:
+    def __init__(self, stack: Sandwich | RelaxingSandwich, nodes: int) -> None:
         self.stack = stack
         self.nodes = nodes
         none = np.zeros(nodes)
@@ -64,27 +70,45 @@ class Charging:
 
     @property
     def none(self) -> Floats:
-        """No charge anywhere (2, P)."""
-        return np.zeros((2, self.nodes))
+        """No charge anywhere (M, P)."""
+        return np.zeros((self.stack.states, self.nodes))
 
     def begin(self, old: Charged, seconds: float) -> None:
         """A step begins at the state `old`."""
         self.old, self.seconds = old, seconds
+        self._known: dict[tuple[bytes, float, bytes], tuple[Floats, Floats]] = {}
 
     def carried(self, length: Floats) -> Floats:
-        """The charges (2, P) of the beginning on other tributary lengths (P,)."""
+        """The charges (M, P) of the beginning on other tributary lengths (P,)."""
         return np.asarray(self.old.charges * np.where(length > 0.0, self.old.length / _positive(length), 1.0))
 
     def after(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """The charges (2, P) at the end of the step, in the new place under the new voltage."""
+        """The charges (M, P) at the end of the step, in the new place under the new voltage."""
         before = self.old.voltage if self.seconds > 0.0 else voltage
         return self.stack.after(gap, self.carried(length), before, voltage, self.seconds)
 
     def effective(self, gap: Any, voltage: float, length: Floats) -> Any:
-        """The voltage (P,) that the force law sees at the end of the step."""
+        """The voltage (P,) that the force law sees at the end of the step; gaps (P,) may have a small
+        imaginary part, for derivatives.
+        """
         if self.seconds == 0.0:
-            return self.stack.effective(voltage, self.carried(length))
-        return self.stack.effective(voltage, self.after(gap, voltage, length))
+            return self.stack.effective(gap, voltage, self.carried(length))
+        value, slope = self._at(np.real(gap), voltage, length)
+        return value + 1j * np.imag(gap) * slope if np.iscomplexobj(gap) else value
+
+    def _at(self, gap: Floats, voltage: float, length: Floats) -> tuple[Floats, Floats]:
+        """That voltage (P,) and its derivative by the gap, remembered for the last few places: an
+        iteration asks for forces and their derivative, one after the other.
+        """
+        key = (gap.tobytes(), voltage, length.tobytes())
+        if (known := self._known.get(key)) is not None:
+            return known
+        near = gap + 1j * STEP
+        seen = self.stack.effective(near, voltage, self.after(near, voltage, length))
+        if len(self._known) >= REMEMBERED:
+            del self._known[next(iter(self._known))]
+        self._known[key] = found = (np.asarray(seen.real), np.asarray(seen.imag / STEP))
+        return found
 
     def electrode_charge(self, at: Charged) -> float:
         """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it."""
@@ -106,9 +130,7 @@ class Charging:
         It is also what the field would do as work, with given charges of the nodes and a given
         voltage, per mm that a node's tributary length grows.
         """
-        fields = self.stack.fields(at.gap, at.voltage, at.charges)
-        squares = (s * np.asarray(D) ** 2 for s, D in zip(self._shares(at.gap), fields, strict=True))
-        return np.asarray(0.5 * eps_0 * sum(squares))
+        return np.asarray(eps_0 * self.stack.energy(at.gap, at.voltage, at.charges))
 
     def field_energy(self, at: Charged) -> float:
         """Energy of the field, N mm per mm of depth."""
@@ -123,7 +145,6 @@ class Charging:
             for gap, charges in ((old.gap, old.charges), (new.gap, start))
         )
         source = old.voltage * np.sum(new.length * moved - old.length * before)
-        leaked = 0.0
         if seconds == 0.0:
             jumped = stack.fields(new.gap, new.voltage, start)[0]
             source += 0.5 * (old.voltage + new.voltage) * np.sum(new.length * (jumped - moved))
@@ -131,23 +152,20 @@ class Charging:
         time, weight = self._times()
         volts = old.voltage + (new.voltage - old.voltage) * (time / seconds)
         charges = stack.after(new.gap, start[:, None], old.voltage, volts[:, None], time[:, None])
-        fields = stack.fields(new.gap, volts[:, None], charges)
-        for s, rate, D in zip(self._shares(new.gap), stack.rates, fields, strict=True):
-            leaked += float(np.sum(weight @ (rate * s * D**2 * new.length)))
+        at = (new.gap, volts[:, None], charges)
+        leaked = float(np.sum(weight @ (stack.loss(*at) * new.length)))
         # by parts: the work of the displacement current is U D at the ends less the mean of D while U rises
         last = stack.fields(new.gap, new.voltage, new.charges)[0]
         rise = (new.voltage - old.voltage) / seconds
         source += np.sum(new.length * (new.voltage * last - old.voltage * moved))
-        source += np.sum(weight @ ((stack.rates[0] * volts[:, None] - rise) * fields[0] * new.length))
+        source += np.sum(
+            weight @ ((volts[:, None] * stack.crossing(*at) - rise * stack.fields(*at)[0]) * new.length)
+        )
         return Flow(float(eps_0 * source), float(eps_0 * leaked))
-
-    def _shares(self, gap: Floats) -> tuple[Any, Any, Any]:
-        """Reduced thicknesses (mm) of the three layers."""
-        return self.stack.skin, gap / self.stack.gap_eps_r, self.stack.insulator
 
     def _times(self) -> tuple[Floats, Floats]:
         """Places (s) and weights (s) of the step, dense where the fastest charge moves."""
-        fastest = sum(float(np.max(rate)) for rate in self.stack.rates)
+        fastest = self.stack.fastest
         ends, end = [0.0], min(1.0 / fastest, self.seconds) if fastest > 0.0 else self.seconds
         while end < self.seconds:
             ends.append(end)

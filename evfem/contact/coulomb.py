@@ -10,13 +10,16 @@ the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb's disc ask, 
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
 
 the same for all positive r; taken is the inverse of the node's own compliance. A node is open if
-:math:`p \le 0`, sticks if :math:`|z| \le \mu p`, and slips else. The attraction of an open node
+:math:`p \le 0`, sticks if :math:`|z| \le \mu p`, and slips else. A law of friction other than Coulomb's,
+linearised (`evfem.contact.friction`), makes the disc of a closed node :math:`\mu\lambda_n + c` wide, with
+a `cohesion` c. The attraction of an open node
 weakens with its gap; its drop is a force of its own, as in `evfem.contact.signorini`.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -31,7 +34,7 @@ SLIP = 2
 class DiscProblem:
     """Gaps and slips without contact forces (3 k,), compliance (3 k, 3 k), both per node (n, t1,
     t2), friction coefficients (k,), and optional extra unknowns and attraction as in
-    `evfem.contact.signorini`.
+    `evfem.contact.signorini`; `cohesion` (k,) in N is what friction of closed nodes has at no force.
     """
 
     start: Floats
@@ -39,11 +42,22 @@ class DiscProblem:
     friction: Floats
     extra_unknowns: ExtraUnknowns | None = None
     attraction: AttractionStiffness | None = None
+    cohesion: Floats | None = None
+
+    def limit(self, pressing: Floats) -> Floats:
+        """Largest shear forces (k,) under pressing forces p (k,)."""
+        limit = self.friction * np.maximum(pressing, 0.0)
+        return limit if self.cohesion is None else limit + np.where(pressing > 0.0, self.cohesion, 0.0)
 
     @property
     def size(self) -> int:
         """Number of candidate nodes k."""
         return self.friction.size
+
+    @property
+    def holds(self) -> Any:
+        """Which nodes have friction (k,) bool."""
+        return self.friction > 0.0 if self.cohesion is None else (self.friction > 0.0) | (self.cohesion > 0.0)
 
     @property
     def own(self) -> tuple[Floats, Floats]:
@@ -106,8 +120,8 @@ def projected(problem: DiscProblem, forces: Forces, state: Floats) -> Projected:
     force, v = forces.contact.reshape(-1, 3), state.reshape(-1, 3)
     p = force[:, 0] - v[:, 0] / normal_own
     z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
-    limit, size = problem.friction * np.maximum(p, 0.0), np.hypot(*z.T)
-    status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & (problem.friction > 0.0), STICK, SLIP))
+    limit, size = problem.limit(p), np.hypot(*z.T)
+    status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.holds, STICK, SLIP))
     shear = z * np.where(status == STICK, 1.0, limit / np.maximum(size, 1e-300))[:, None]
     shear[status == OPEN] = 0.0
     wanted = np.column_stack([np.maximum(p, 0.0), shear])

@@ -104,8 +104,8 @@ def _part(problem: DiscProblem, old: Forces, new: Forces, fraction: float) -> tu
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """The unknowns x of a linearisation, forces = B x: of each its node, its two components of the
-    forces, and the weights of normal, t1 and t2.
+    """The unknowns x of a linearisation, forces = B x + `given` (3 k,): of each its node, its two
+    components of the forces, and the weights of normal, t1 and t2.
 
     A row of the equations is v of the node along `row` (m, 3), plus `keep` (m,) times x itself.
     """
@@ -114,21 +114,25 @@ class Unknowns:
     force: Floats
     row: Floats
     keep: Floats
+    given: Floats
 
     @classmethod
     def of(cls, problem: DiscProblem, found: Projected) -> Unknowns:
         """Those of the statuses found: pressing forces, sticking nodes' shear, slipping ones' turn."""
         closed = np.flatnonzero(found.status != OPEN)
         stick = np.flatnonzero(found.status == STICK)
-        slip = np.flatnonzero((found.status == SLIP) & (problem.friction > 0.0))
+        slip = np.flatnonzero((found.status == SLIP) & problem.holds)
         size = np.maximum(np.hypot(*found.z[slip].T), 1e-300)
         along = found.z[slip] / size[:, None]
         aside = np.stack([-along[:, 1], along[:, 0]], axis=1)
-        shear = problem.friction[slip] * found.p[slip]
+        shear = problem.limit(found.p)[slip]
         m = np.minimum(1.0, shear / size)
         normal = np.zeros((problem.size, 3))
         normal[:, 0] = 1.0
         normal[slip, 1:] = problem.friction[slip, None] * along
+        given = np.zeros((problem.size, 3))
+        if problem.cohesion is not None:
+            given[slip, 1:] = problem.cohesion[slip, None] * along
         unit = np.zeros((closed.size, 3))
         unit[:, 0] = 1.0
         held = np.repeat(np.eye(3)[None, 1:], stick.size, axis=0).reshape(-1, 3)
@@ -139,6 +143,7 @@ class Unknowns:
             np.concatenate([normal[closed], held, turned]),
             np.concatenate([unit, held, (m * inverse)[:, None] * turned]),
             np.concatenate([np.zeros(closed.size + 2 * stick.size), 1.0 - m]),
+            given.ravel(),
         )
 
     def columns(self, C: Floats) -> Floats:
@@ -163,7 +168,7 @@ class Unknowns:
         """Forces (3 size,) of the unknowns' values x (m,)."""
         forces = np.zeros((size, 3))
         np.add.at(forces, self.node, x[:, None] * self.force)
-        return forces.ravel()
+        return forces.ravel() + self.given
 
 
 def _linearised(problem: DiscProblem, found: Projected) -> Forces:
@@ -177,7 +182,8 @@ def _linearised(problem: DiscProblem, found: Projected) -> Forces:
         drop[::3] = np.where(closed, -problem.attraction.gain_on_closing, 0.0)
         attracted = 3 * np.flatnonzero(~closed & (problem.attraction.negative_stiffness > 0.0))
     pushed = np.hstack([unknowns.columns(C), C[:, attracted]])
-    known = problem.start + (C @ drop if drop.any() else 0.0)
+    steady = drop + unknowns.given
+    known = problem.start + (C @ steady if steady.any() else 0.0)
     matrix = np.vstack([unknowns.rows(pushed), pushed[attracted]])
     right = -np.concatenate([unknowns.rows(known[:, None])[:, 0], known[attracted]])
     matrix[np.arange(m), np.arange(m)] += unknowns.keep
@@ -190,7 +196,7 @@ def _linearised(problem: DiscProblem, found: Projected) -> Forces:
         moved = np.vstack([unknowns.rows(extra.columns), extra.columns[attracted]])
         balance = np.hstack([unknowns.columns(extra.rows), extra.rows[:, attracted]])
         matrix = np.block([[matrix, moved], [balance, extra.pivot]])
-        right = np.append(right, extra.right - extra.rows @ drop)
+        right = np.append(right, extra.right - extra.rows @ steady)
     x = np.linalg.solve(matrix, right)
     end = m + attracted.size
     drop[attracted] = x[m:end]

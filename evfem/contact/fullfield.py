@@ -30,7 +30,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns
-from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import EvfemError
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
@@ -92,17 +92,18 @@ class Bounds:
         return self.upper / self.lower - 1.0
 
 
-def certificate(x: Floats, gap: Floats, insulator: tuple[float, float], skin: Floats) -> Bounds:
-    """Bounds for an outline without solving: points at `x` (L,) with gaps `gap` (L,) in mm above an
-    insulator of that thickness (mm) and permittivity; `skin` (L,) is the skin's layer, reduced (mm).
+def certificate(x: Floats, gap: Floats, insulator: Layer, skin: Floats, gap_eps_r: float = 1.0) -> Bounds:
+    """Bounds for an outline without solving: points at `x` (L,) with gaps `gap` (L,) in mm, filled
+    with `gap_eps_r`, above an insulator; `skin` (L,) is the skin's layer, reduced (mm).
 
     Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
     are linear along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
+    C is proportional to all permittivities, and the bounds are those of a gap of air.
     """
-    thickness, eps_r = insulator
-    reduced = thickness / eps_r
-    lower = columns_sum(x, gap + reduced + skin)
-    return Bounds(eps_0 * lower, eps_0 * least_upper_sum(x, gap, thickness, eps_r))
+    eps_r = float(insulator.eps_r) / gap_eps_r
+    lower = columns_sum(x, gap + float(insulator.thickness) / eps_r + skin * gap_eps_r)
+    upper = least_upper_sum(x, gap, float(insulator.thickness), eps_r)
+    return Bounds(eps_0 * gap_eps_r * lower, eps_0 * gap_eps_r * upper)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,9 +266,8 @@ class FieldAttraction(Attraction):
 
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""
-        insulator = self.surface.insulator
         skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
-        return certificate(x, levels[2] - levels[1], (insulator.thickness, insulator.eps_r), skin)
+        return certificate(x, levels[2] - levels[1], self.surface.insulator, skin, self._columns.eps_r[1])
 
     def check(self, position: Floats) -> None:
         """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its

@@ -146,7 +146,8 @@ class SpatialContactStep(LinearContactStep):
             row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
             moved, pushed = in_frames(axes, W[:, 1:]), in_frames(axes, row.T).T
             extra = ExtraUnknowns(moved, pushed, self._held(pivot, free), value)
-        problem = DiscProblem(start, compliance, known.friction[near], extra)
+        cohesion = None if known.cohesion is None else known.cohesion[near]
+        problem = DiscProblem(start, compliance, known.friction[near], extra, cohesion=cohesion)
         attraction = AttractionStiffness(
             known.negative_stiffness[near], known.surface.normal_gap[near], known.gain_on_closing[near]
         )

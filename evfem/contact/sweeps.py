@@ -51,6 +51,7 @@ class _Node:
     own: list[list[float]]
     shear: float
     friction: float
+    cohesion: float
     weakening: float
     reference: float
     gain: float
@@ -67,7 +68,8 @@ class _Node:
                 float(a[i]) for a in (known.negative_stiffness, known.reference_gap, known.gain_on_closing)
             ]
         friction = float(problem.friction[i])
-        return cls(place, rows, start[place].tolist(), own.tolist(), shear, friction, *pull)
+        cohesion = 0.0 if problem.cohesion is None else float(problem.cohesion[i])
+        return cls(place, rows, start[place].tolist(), own.tolist(), shear, friction, cohesion, *pull)
 
     def solve(self, moved: list[float], force: list[float], drop: float) -> tuple[list[float], float]:
         """New contact force and drop from the motion by all forces, those of this node included."""
@@ -87,7 +89,7 @@ class _Node:
             pressed = n - self.gain
             z1 = t1 - (s1 + own[1][0] * pressed + own[1][1] * t1 + own[1][2] * t2) / self.shear
             z2 = t2 - (s2 + own[2][0] * pressed + own[2][1] * t1 + own[2][2] * t2) / self.shear
-            size, limit = (z1 * z1 + z2 * z2) ** 0.5, self.friction * n
+            size, limit = (z1 * z1 + z2 * z2) ** 0.5, self.friction * n + (self.cohesion if n > 0.0 else 0.0)
             part = 1.0 if size <= limit else limit / size
             t1, t2 = part * z1, part * z2
         return [n, t1, t2], -self.gain

@@ -91,8 +91,23 @@ class Sandwich:
         rates = (sigma_1 / (eps_0 * eps_1), gap_conductivity / (eps_0 * gap_eps_r), sigma_3 / (eps_0 * eps_3))
         return cls(skin.thickness / eps_1, insulator.thickness / eps_3, rates, gap_eps_r)
 
-    def effective(self, voltage: Values, charges: Any) -> Any:
-        """Voltage (V) that makes the same field in the gap without charges; `charges` (2, ...)."""
+    #: charges of a node
+    states = 2
+
+    @property
+    def reference(self) -> Any:
+        """Reduced thickness (mm) of the solids, as force laws see them."""
+        return self.skin + self.insulator
+
+    @property
+    def fastest(self) -> float:
+        """A rate (1/s) that no charge exceeds."""
+        return sum(float(np.max(rate)) for rate in self.rates)
+
+    def effective(self, gap: Any, voltage: Values, charges: Any) -> Any:
+        """Voltage (V) that makes the same field in the gap without charges, whatever the `gap`;
+        `charges` (2, ...).
+        """
         return voltage + self.skin * charges[0] - self.insulator * charges[1]
 
     def voltage_at(self, gap: Any, charges: Any, displacement: Values) -> Any:
@@ -106,8 +121,26 @@ class Sandwich:
     def fields(self, gap: Any, voltage: Values, charges: Any) -> tuple[Any, Any, Any]:
         """Displacements over eps_0 (V/mm) in skin, gap and insulator."""
         total = self.skin + gap / self.gap_eps_r + self.insulator
-        middle = self.effective(voltage, charges) / total
+        middle = self.effective(gap, voltage, charges) / total
         return middle - charges[0], middle, middle + charges[1]
+
+    def crossing(self, gap: Any, voltage: Values, charges: Any) -> Any:
+        """Current over eps_0 (V/mm/s) that is conducted through the skin."""
+        return self.rates[0] * self.fields(gap, voltage, charges)[0]
+
+    def energy(self, gap: Any, voltage: Values, charges: Any) -> Any:
+        """Energy of the field per area over eps_0, V^2/mm."""
+        return 0.5 * sum(s * D**2 for s, D in self._through(gap, voltage, charges))
+
+    def loss(self, gap: Any, voltage: Values, charges: Any) -> Any:
+        """Power per area over eps_0 that leaks, V^2/mm/s."""
+        layers = zip(self.rates, self._through(gap, voltage, charges), strict=True)
+        return sum(rate * s * D**2 for rate, (s, D) in layers)
+
+    def _through(self, gap: Any, voltage: Values, charges: Any) -> Any:
+        """Reduced thickness (mm) and displacement over eps_0 (V/mm) of each layer."""
+        fields = self.fields(gap, voltage, charges)
+        return zip((self.skin, gap / self.gap_eps_r, self.insulator), fields, strict=True)
 
     def after(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
         """Charges (2, ...) that `charges` become at a fixed `gap` (mm) in so many `seconds`, the

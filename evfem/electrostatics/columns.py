@@ -32,7 +32,7 @@ _AT, _WEIGHT = np.array([0.5 - np.sqrt(1.0 / 12.0), 0.5 + np.sqrt(1.0 / 12.0)]),
 _N, _DN = np.stack([1 - _AT, _AT]), np.outer([-1.0, 1.0], np.ones_like(_AT))
 _UP = np.stack([(1 - _AT) * (1 - 2 * _AT), 4 * _AT * (1 - _AT), _AT * (2 * _AT - 1)])
 _DUP = np.stack([4 * _AT - 3, 4 - 8 * _AT, 4 * _AT - 1])
-#: share of the lowest layer that is taken as columns on electrodes that end
+#: share of the lowest layer that is taken to the second order on electrodes that end
 THIN = 0.2
 #: shape functions of a cell
 _SHAPES = 6
@@ -80,7 +80,7 @@ class Columns:
         raised = levels.copy()
         raised[0] += THIN * (levels[1] - levels[0])
         cells = _Cells(self, x, raised)
-        strips = _Strips(x, electrodes, self.eps_r[0] / (THIN * float(np.mean(levels[1] - levels[0]))))
+        strips = _Strips(x, electrodes, THIN * float(np.mean(levels[1] - levels[0])), self.eps_r[0])
         found = cells.capacitance(cells.potential(strips, floating), strips)
         found.by_level[1] += THIN * found.by_level[0]
         found.by_level[0] *= 1.0 - THIN
@@ -88,28 +88,46 @@ class Columns:
 
 
 class _Strips:
-    """Electrodes that end somewhere. The share `THIN` of the lowest layer's thickness is taken as columns
-    that stand on them: kappa times the integral of (phi - V)^2 joins the energy, exactly as far as they
-    reach into a cell. So plates stay exact, the field at an edge is smoothed over that thickness, and
-    the energy changes smoothly when lines that are as close as that move over an edge.
+    """Electrodes that end somewhere. A share `THIN` of the lowest layer, of thickness d, is taken to the
+    second order in its thickness: where the potential above it is phi, and w is the share of electrode
+    within d to either side, of voltage V, its energy is eps times the integral of
+    w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2. So plates stay exact, the field at an edge is smoothed
+    over that thickness, and the energy changes smoothly when lines move over an edge.
     """
 
-    def __init__(self, x: Floats, electrodes: Floats, kappa: float) -> None:
-        begin, end, voltage = np.asarray(electrodes, dtype=float).T[:, :, None]
-        width = np.diff(x)
-        low, high = (np.clip((place - x[:-1]) / width, 0.0, 1.0) for place in (begin, end))  # (K, E)
-        self.at = low[..., None] + (high - low)[..., None] * _AT  # (K, E, q)
-        self.weight = kappa * (high - low)[..., None] * _WEIGHT
-        self.width, self.voltage = width, voltage[..., None]
-        self.shapes = np.stack([1.0 - self.at, self.at])  # (2, K, E, q)
+    def __init__(self, x: Floats, electrodes: Floats, depth: float, eps_r: float) -> None:
+        self.pieces, self.depth = np.asarray(electrodes, dtype=float), depth
+        begin, end, voltage = self.pieces.T
+        ends = np.sort([begin - depth, begin + depth, end - depth, end + depth], axis=0)
+        self.width = np.diff(x)
+        low, high = (
+            np.clip((place.ravel()[:, None] - x[:-1]) / self.width, 0.0, 1.0)
+            for place in (ends[:-1], ends[1:])
+        )  # (3 K, E)
+        at = low[..., None] + (high - low)[..., None] * _AT  # (3 K, E, q)
+        over = self.over(x[:-1, None] + at * self.width[:, None], np.tile(np.arange(begin.size), 3))
+        share = over * (high - low)[..., None] * _WEIGHT
+        self.weight = eps_r / depth * share
+        self.voltage = np.tile(voltage, 3)[:, None, None]
+        self.shapes = np.stack([1.0 - at, at])  # (2, 3 K, E, q)
+        whole = self.width * (1.0 - 2.0 / 3.0 * share.sum(axis=(0, 2)))
+        self.along = eps_r * depth * whole / self.width**2  # (E,)
+        every = np.arange(begin.size)
+        lines = self.over(np.broadcast_to(x, (begin.size, x.size))[..., None], every).sum(axis=(0, 2))
+        self.at_lines = eps_r * depth * (1.0 - 2.0 / 3.0 * lines)  # (L,)
+
+    def over(self, x: Floats, electrode: Ints) -> Floats:
+        """The share within the depth to either side of places (k, ..., q) that is electrode k."""
+        begin, end, _ = self.pieces[electrode].T[:, :, None, None]
+        up, down = (np.clip((x - place) / (2.0 * self.depth) + 0.5, 0.0, 1.0) for place in (begin, end))
+        return np.asarray(up - down)
 
     def matrix(self) -> tuple[Floats, Floats]:
         """Diagonal (L,) and off-diagonal (L - 1,) of what joins the matrix of the lowest row."""
         weight = self.weight * self.width[:, None]
-        own = [np.sum(weight * shape**2, axis=(0, 2)) for shape in self.shapes]
-        return np.append(own[0], 0.0) + np.append(0.0, own[1]), np.sum(
-            weight * np.prod(self.shapes, 0), axis=(0, 2)
-        )
+        own = [np.sum(weight * shape**2, axis=(0, 2)) + self.along for shape in self.shapes]
+        beside = np.sum(weight * np.prod(self.shapes, 0), axis=(0, 2)) - self.along
+        return np.append(own[0], 0.0) + np.append(0.0, own[1]), beside
 
     def load(self) -> Floats:
         """What joins the right-hand side of the lowest row (L,)."""
@@ -122,10 +140,13 @@ class _Strips:
         electrodes stay where they are when the lines move.
         """
         beyond = phi[:-1, None] * self.shapes[0] + phi[1:, None] * self.shapes[1] - self.voltage
-        value = float(np.sum(self.weight * self.width[:, None] * beyond**2))
         rise = np.diff(phi)
+        value = np.sum(self.weight * self.width[:, None] * beyond**2) + np.sum(self.along * rise**2)
         rate = [-2.0 * rise * np.sum(self.weight * beyond * shape, axis=(0, 2)) for shape in self.shapes]
-        return value, np.append(rate[0], 0.0) + np.append(0.0, rate[1])
+        slope, longer = (rise / self.width) ** 2, 2.0 * self.along * rise**2 / self.width
+        rate[0] += longer - slope * self.at_lines[:-1]
+        rate[1] += slope * self.at_lines[1:] - longer
+        return float(value), np.append(rate[0], 0.0) + np.append(0.0, rate[1])
 
 
 class _Cells:

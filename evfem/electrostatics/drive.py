@@ -8,7 +8,10 @@ add up:
 .. math:: \bar p = \sum_{n = 1, 3, ...} p(g, U_n, z(n \omega)) .
 
 The first harmonics count one by one, those above in groups at their mean frequency, as the
-pressure hardly changes from one to the next.
+pressure hardly changes from one to the next. A signal that repeats (a sine with a bias B, samples)
+is such a sum too, with a direct part: :math:`\bar p = p(g, B, z(0)) + p(g, A/\sqrt2, z(\omega))`. At no
+frequency a gap that leaks over an insulator that does not has no field, and contributes nothing; a
+gap that does not leak has the whole voltage that conductors leave it.
 
 Resolved in time, the voltage of the moment charges the skin, the gap leaks
 (`evfem.electrostatics.charges`), and the attraction swings with it.
@@ -35,7 +38,8 @@ from evfem.common.checks import (
 )
 from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric
 from evfem.electrostatics.laws import Layer, Layers, traction_derivative
-from evfem.electrostatics.timesignals import FASTEST, Sine, Square
+from evfem.electrostatics.relaxation import seen_at
+from evfem.electrostatics.timesignals import FASTEST, Sampled, Sine, Square
 from evfem.protocols import ForceLaw, TimeSignal
 
 WAVEFORMS = ("sine", "square")
@@ -43,6 +47,8 @@ WAVEFORMS = ("sine", "square")
 CREST = {"sine": float(np.sqrt(2.0)), "square": 1.0}
 #: odd harmonics of a square wave that count one by one, groups of those above, and the highest one
 SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
+#: orders of samples that repeat: at least so many, and so many times the samples of a period
+SMOOTH, PERIODS = 4096, 8
 
 _FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
 _CONDUCTIVITY = number("a conductivity in S/m, not negative", Within(0.0))
@@ -132,23 +138,85 @@ def harmonics() -> tuple[Floats, Floats]:
     order = np.arange(1.0, HIGHEST, 2.0)
     weight = 8.0 / (np.pi * order) ** 2
     weight[-1] += 1.0 - weight.sum()
+    return grouped(order, weight)
+
+
+def grouped(order: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """The first `SINGLE` of these orders as they are, those above in at most `GROUPS` groups: orders
+    that grow, from 1 on, and weights, of the same total.
+    """
+    if order.size <= SINGLE:
+        return order, weight
     ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
     begins = np.concatenate([np.arange(SINGLE), ends])
     sums = np.add.reduceat(weight, begins)
-    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / sums)
+    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / np.where(sums > 0.0, sums, 1.0))
     return np.concatenate([order[:SINGLE], mean[SINGLE:]]), sums
 
 
+def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
+    """Effective voltage (V) of a signal that repeats, and the orders of its harmonics, 0 for its
+    bias, with their shares of the squared voltage; None for one that does not repeat.
+
+    >>> effective, order, share = powers(Sine(50.0, 100.0, bias=50.0))
+    >>> round(effective, 3), order.tolist(), share.round(4).tolist()
+    (86.603, [0.0, 1.0], [0.3333, 0.6667])
+    """
+    if isinstance(signal, Square):
+        return signal.amplitude, *harmonics()
+    if isinstance(signal, Sine):
+        order, square = np.array([0.0, 1.0]), np.array([signal.bias**2, 0.5 * signal.amplitude**2])
+    elif isinstance(signal, Sampled) and signal.repeat:
+        # straight lines between the samples: their transform times sinc^2, over and over
+        size = signal.voltage.size
+        above = np.arange(1.0, max(SMOOTH, PERIODS * size))
+        transform = np.abs(np.fft.fft(signal.voltage) / size) ** 2
+        square = 2.0 * transform[above.astype(int) % size] * np.sinc(above / size) ** 4
+        following = np.roll(signal.voltage, -1)
+        total = float(np.mean(signal.voltage**2 + signal.voltage * following + following**2)) / 3.0
+        bias = float(signal.voltage.mean()) ** 2
+        square[-1] += total - bias - float(square.sum())
+        order, square = grouped(above, square)
+        order, square = np.concatenate([[0.0], order]), np.concatenate([[bias], square])
+    else:
+        return None
+    total = float(square.sum())
+    kept = square > 0.0
+    return float(np.sqrt(total)), order[kept], square[kept] / (total if total > 0.0 else 1.0)
+
+
+def steady_layers(solids: tuple[Layer, ...], drive: Drive, gap_eps_r: float) -> Layers | None:
+    """The layers under a direct voltage that has always been there; None where the gap has no field."""
+    found = [(layer.thickness, *seen_at(layer, None)) for layer in solids]
+    thickness = sum(d for d, _, _ in found)
+    if drive.gap_conductivity > 0.0:
+        if any(not np.all(sigma) for d, _, sigma in found if np.any(d)):
+            return None
+        leak = drive.gap_conductivity / gap_eps_r
+        return Layers(sum(leak * d / np.asarray(sigma) for d, _, sigma in found if np.any(d)), thickness)
+    return Layers(sum(np.where(sigma, 0.0, d / np.asarray(eps)) for d, eps, sigma in found), thickness)
+
+
 def mean_law(
-    law: ForceLaw, drive: Drive, frequency: float | None, solids: tuple[Layer, ...]
+    law: ForceLaw, drive: Drive, frequency: float | None, solids: tuple[Layer, ...], signal: Any = None
 ) -> tuple[Any, Layers]:
-    """The law and the layers that give the mean attraction over the cycle at `frequency` (Hz)."""
-    given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": getattr(law, "gap_eps_r", 1.0)}
-    if frequency is None or drive.waveform == "sine":
+    """The law and the layers that give the mean attraction over the cycle at `frequency` (Hz), of the
+    drive's waveform or of a `signal` that repeats with it.
+    """
+    gap_eps_r = getattr(law, "gap_eps_r", 1.0)
+    given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
+    spectrum = powers(signal)
+    if frequency is None or (spectrum is None and drive.waveform == "sine"):
         return law, Layers.of(*solids, frequency=frequency, **given)
-    order, weight = harmonics()
-    found = [Layers.of(*solids, frequency=frequency * n, **given) for n in order]
+    order, weight = harmonics() if spectrum is None else spectrum[1:]
+    steady = steady_layers(solids, drive, gap_eps_r) if 0.0 in order else None
+    if 0.0 in order and steady is None:
+        order, weight = order[1:], weight[1:]
+    if not order.size:
+        order, weight = np.ones(1), np.zeros(1)
+    found = [] if steady is None else [steady]
+    found += [Layers.of(*solids, frequency=frequency * n, **given) for n in order[len(found) :]]
     reduced, loss = (
-        np.stack([np.asarray(getattr(one, name)) for one in found]) for name in ("reduced", "loss")
+        np.stack(np.broadcast_arrays(*(getattr(one, name) for one in found))) for name in ("reduced", "loss")
     )
     return CycleMean(law, weight), Layers(reduced, found[0].thickness, loss)

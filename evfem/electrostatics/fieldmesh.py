@@ -31,8 +31,10 @@ GROWTH = 0.7
 WEDGE = 0.75
 #: distance of the box around a body that ends in the air, in sizes of the body
 BOX = 1000.0
+#: how much slower they grow beside a body that ends, where the field's strength is asked for
+BESIDE = 0.5
 #: largest share of a block that one of its rows takes
-ROW = 0.34
+ROW = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +260,7 @@ class _Grid:
         lid = np.array(self.outline.tops)
         low = self.y[self.tops[1], [0, -1]].copy()
         for end, size in zip((0, -1), ends.sizes, strict=True):
-            away = graded(0.0, top, (size, np.inf), growth, np.inf, 3)[1:]
+            away = graded(0.0, top, (size, np.inf), BESIDE * growth, np.inf, 3)[1:]
             self._beside(end, away, low[end], lid[end], top)
 
     def _beside(self, end: int, away: Floats, low: float, lid: float, top: float) -> None:

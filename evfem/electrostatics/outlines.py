@@ -17,7 +17,7 @@ through the wall). A run that is low at one end and high at the other is split i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
 
@@ -36,6 +36,14 @@ SAME = 1e-12
 CORNER = 1e-7
 #: the same of what a corner close to the slab adds, whose own field ends at the gap
 TIP = 1e-4
+#: size of the smallest cells at a curve, in its radii
+ROUND = 0.25
+#: angle in rad below which a point is on the line between its neighbours
+STRAIGHT = 1e-10
+#: chords between two corners that are steeper than this are walls
+WALL = 20.0
+#: angle in rad below which a point is one of a curve, not a corner
+TURN = np.radians(15.0)
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,8 @@ class Run:
 
 @dataclass(frozen=True)
 class Outline:
-    """A checked outline: points `x`, `height` in mm without repetitions but those of walls.
+    """A checked outline: points `x`, `height` in mm without repetitions but those of walls; those at
+    x = `smooth[0]` are points of a curve with radii `smooth[1]` (M,) in mm, not corners.
 
     >>> Outline.of([0.0, 0.3, 0.3, 0.5], [0.05, 0.05, 2.0, 2.0]).runs()[1].rank
     2
@@ -61,6 +70,7 @@ class Outline:
     x: Floats
     height: Floats
     periodic: bool
+    smooth: Floats = field(default_factory=lambda: np.zeros((2, 0)))
 
     @classmethod
     def of(cls, x: Values, height: Values, periodic: bool = True) -> Outline:
@@ -76,6 +86,7 @@ class Outline:
             raise InputError("height", float(height.min()), "heights in mm above the slab, not negative")
         if periodic:
             x, height = _without_end_walls(x, height)
+        x = _upright(x, height)
         keep = _without_repetitions(x, height)
         outline = cls(x[keep], height[keep], bool(periodic))
         if not periodic and any(top < end for top, end in zip(outline.tops, outline.feet, strict=True)):
@@ -118,7 +129,7 @@ class Outline:
         at = np.flatnonzero(crossing & (np.diff(self.x) > 0.0))
         new = self.x[at] + (lowest - h[at]) / dh[at] * (self.x[at + 1] - self.x[at])
         x, height = np.insert(self.x, at + 1, new), np.insert(self.height, at + 1, lowest)
-        return Outline(x, np.maximum(height, lowest), self.periodic)
+        return Outline(x, np.maximum(height, lowest), self.periodic, self.smooth)
 
     def pieces(self) -> list[Run]:
         """The outline cut at its walls; walls at the two ends belong to no piece."""
@@ -172,6 +183,28 @@ def _without_end_walls(x: Floats, height: Floats) -> tuple[Floats, Floats]:
     return x[first : last + 1], height[first : last + 1]
 
 
+def _upright(x: Floats, height: Floats) -> Floats:
+    """The places, where what is nearly a wall between two corners stands upright on its foot."""
+    x, dx, dh = x.copy(), np.diff(x), np.diff(height)
+    way = np.where(np.abs(dh) > WALL * dx, np.sign(dh), 0.0) * (dx > 0.0)
+    cuts = np.flatnonzero(np.diff(way)) + 1
+    for a, b in pairwise([0, *cuts, way.size]):
+        if way[a] == 0.0:
+            continue
+        beyond = [(dx[k] + 1j * dh[k]) / (dx[own] + 1j * dh[own])
+                  for k, own in ((a - 1, a), (b, b - 1)) if 0 <= k < way.size]  # fmt: skip
+        if all(abs(np.angle(ratio)) >= TURN for ratio in beyond):
+            x[a : b + 1] = x[a if way[a] > 0.0 else b]
+    return x
+
+
+def _straight(x: Floats, height: Floats) -> Any:
+    """Which inner points are on the line between their neighbours."""
+    way = np.diff(x) + 1j * np.diff(height)
+    turned = np.abs((way[1:] * way[:-1].conj()).imag) <= STRAIGHT * np.abs(way[1:] * way[:-1])
+    return turned & ((way[1:] * way[:-1].conj()).real > 0.0)
+
+
 def _without_repetitions(x: Floats, height: Floats) -> Floats:
     """Which points to keep: two of each x at most, and not the same one twice."""
     same = np.diff(x) == 0.0
@@ -180,7 +213,7 @@ def _without_repetitions(x: Floats, height: Floats) -> Floats:
     if np.any(inner & (rises[:-1] * rises[1:] < 0)):
         raise InputError("height", "a wall that goes up and down at one x", ONE_WAY)
     keep = np.ones(x.size, dtype=bool)
-    keep[1:-1] = ~inner
+    keep[1:-1] = ~inner & ~_straight(x, height)
     near = SAME * max(float(x[-1] - x[0]), float(height.max()))
     twice = np.append(same & (np.abs(np.diff(height)) <= near), False)
     return np.asarray(keep & ~twice)
@@ -233,6 +266,9 @@ def corner_sizes(outline: Outline, runs: list[Run], reduced: float) -> list[Floa
     with np.errstate(divide="ignore", over="ignore"):
         wide, close = ((share / (power - 1.0) ** 2) ** (0.5 / power) for share in (CORNER, TIP))
         sizes = np.maximum(np.minimum((h + reduced) * wide, h * close), still)
+    at, radius = outline.smooth
+    known = np.isin(x, at)
+    sizes[known] = ROUND * radius[np.searchsorted(at, x[known])]
     return np.split(sizes, np.cumsum([run.x.size for run in runs])[:-1])
 
 

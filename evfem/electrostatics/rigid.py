@@ -15,6 +15,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, finite, plain, real
 from evfem.electrostatics.bounds import capacitance_bounds
+from evfem.electrostatics.curves import curved
 from evfem.electrostatics.fieldmesh import make_mesh
 from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.outlines import Outline
@@ -88,8 +89,10 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
     """Solve for the field between a grounded outline and an electrode under `slab`.
 
     `x` and `height` (N,) in mm are points of the outline above the slab's upper face, from left to
-    right, straight in between: dense enough that chords are the curve that is meant (their error
-    is the error of the outline). An `x` given twice is a vertical wall. With `periodic` the outline
+    right. Points that turn by less than 15 degrees each, ever the same way, are taken as those of a
+    curve (`evfem.electrostatics.curves`), the others are joined by straight lines. An `x` given
+    twice is a vertical wall, as is a chord steeper than 20 between two corners, which then stands on
+    its foot. With `periodic` the outline
     repeats from its last x on. Without, it ends in the air over an endless slab and electrode: as a
     thin sheet where it is flat, as a bar where it ends in walls, and as the lower half of a
     symmetric body where both ends rise steeply (see `evfem.electrostatics.outlines`). The force
@@ -111,7 +114,7 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
     lowest = float(outline.height.min())
     if reduced == 0.0 and lowest == 0.0:
         raise InputError("height", 0.0, "heights in mm above zero, or a slab: the conductors would touch")
-    above = outline.lifted(SERIES_GAP * reduced)
+    above = curved(outline, reduced).lifted(SERIES_GAP * reduced)
     mesh = make_mesh(above, thickness, reduced)
     solved = Potential.of(Space(mesh, eps_r))
     low, high = capacitance_bounds(above, thickness, eps_r)

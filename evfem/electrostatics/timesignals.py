@@ -34,6 +34,8 @@ from evfem.protocols import TimeSignal
 HEADER = ["time", "voltage"]
 #: largest voltage (V), and frequency and rate (Hz)
 LARGEST, FASTEST = 1e6, 1e9
+#: largest charge (nC per mm of depth)
+MOST_CHARGE = 1e6
 #: share of the fluctuation's power that lies below the highest frequency of samples
 POWER = 0.95
 #: share of half a period that counts as rounding of a time
@@ -47,6 +49,7 @@ _BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-L
 _PHASE = number("a phase in rad", Within())
 _RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
 _START = number("a time in s", Within())
+_CHARGE = "a charge in nC per mm of depth, or a signal in time that is called with times"
 _ENVELOPE = "a voltage in V, or a signal in time that is called with times"
 
 
@@ -127,6 +130,7 @@ class OpenCircuit:
     voltage: float = field(metadata=_BIAS)
     after: float = field(default=0.0, metadata=_START)
     highest_frequency = 0.0
+    kind = "open_circuit"
 
     def __post_init__(self) -> None:
         check_fields(self)
@@ -139,6 +143,45 @@ class OpenCircuit:
     def __call__(self, time: Values) -> Values:
         """Voltage (V) of the source at `time` (s, any shape)."""
         return plain(np.full(np.shape(time), self.voltage))
+
+
+@dataclass(frozen=True)
+class ChargeControl:
+    """The electrode has the `charge`, in nC per mm of depth, and the voltage that this takes: a
+    number, or a signal over time whose values are charges. For a resolved `Drive`.
+
+    A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is.
+
+    >>> ChargeControl(0.02).charge_at(0.5)
+    0.02
+    """
+
+    charge: Any = field(metadata={"allowed": _CHARGE})
+    kind = "charge"
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+        if not isinstance(self.charge, TimeSignal):
+            allowed = f"{_CHARGE}, between -{MOST_CHARGE:g} and {MOST_CHARGE:g} nC/mm"
+            set_frozen(self, charge=real("charge", self.charge, allowed, Within(-MOST_CHARGE, MOST_CHARGE)))
+
+    @property
+    def largest(self) -> float:
+        """The largest voltage (V) that counts: how much a charge takes depends on the gap."""
+        return LARGEST / 2.0
+
+    @property
+    def highest_frequency(self) -> float:
+        """That of the charge (Hz)."""
+        return self.charge.highest_frequency if isinstance(self.charge, TimeSignal) else 0.0
+
+    def charge_at(self, time: float) -> float:
+        """Charge in nC per mm of depth at `time` (s)."""
+        return float(self.charge(time) if isinstance(self.charge, TimeSignal) else self.charge)
+
+    def __call__(self, time: Values) -> Values:
+        """Voltage (V) before the charge is there, at `time` (s, any shape)."""
+        return plain(np.zeros(np.shape(time)))
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from evfem.fast.step import RememberedPad
 from evfem.mesh.mesh import Mesh
 from evfem.scene.plan import largest_voltage
 from evfem.scene.scene import Scene
+from evfem.scene.way import allowed_error
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model, make_attraction, placed
 from evfem.simulation.result import Result, provenance
@@ -81,7 +82,7 @@ class FastRun(Run):
         body: Any = NoTissue()
         self.model = Model(scene, mesh, body, alone, surface, attraction, equilibrium, first_gap)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(equilibrium, scene.coupling)
+        self.stepper = Stepper(equilibrium, scene.coupling, allowed=allowed_error(scene))
         self.rows, self.frames, self.time = [], [], 0.0
         self.state = equilibrium.rest(self.model.bone(0.0, 0.0), self.voltage_at(0.0, 0.0))
         self.states: list[State] = [self.state]

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from evfem.errors import InputError, quoted
-from evfem.simulation.history import COLUMNS, UNITS
+from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import Result
 
 Units = Mapping[str, str]
@@ -102,20 +102,24 @@ def field_label(field: str) -> str:
     return with_unit(FIELD_TEXTS.get(field, field.replace("_", " ")), FIELD_UNITS.get(field, "MPa"))
 
 
-def key_label(key: str) -> str:
-    """A dotted key of a scene file, or an output of a sweep, with its unit.
+def key_label(key: str, units: Units = UNITS) -> str:
+    """A dotted key of a scene file, or an output of a sweep, with its unit; `units` are those that
+    the sweep says.
 
     >>> key_label("motion.0.gap"), key_label("finger.materials.dermis.E")
     ('gap (mm)', 'dermis E (MPa)')
     >>> key_label("electrostatic_force.last"), key_label("surface.friction")
     ('electrostatic force, last (N/mm)', 'friction')
+    >>> key_label("contact_width.max", {"contact_width.max": "mm2"})
+    'contact area, max (mm²)'
     """
     parts = key.split(".")
-    if parts[0] in COLUMNS and parts[0] != "motion":
-        return with_unit(", ".join([column_text(parts[0]), *parts[1:]]), UNITS[parts[0]])
+    if parts[0] in (*COLUMNS, *SPATIAL) and parts[0] != "motion":
+        unit = units.get(key) or UNITS.get(parts[0], "")
+        return with_unit(", ".join([column_text(parts[0], unit), *parts[1:]]), unit)
     short = len(parts) > 1 and len(parts[-1]) <= 2
     text = " ".join(parts[-2:] if short else parts[-1:]).replace("_", " ")
-    return with_unit(text, KEY_UNITS.get(parts[-1].rsplit("_", 1)[-1], ""))
+    return with_unit(text, units.get(key) or KEY_UNITS.get(parts[-1].rsplit("_", 1)[-1], ""))
 
 
 def values_of(result: Result, name: str) -> Any:

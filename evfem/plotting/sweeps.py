@@ -40,11 +40,12 @@ def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | 
         order = np.argsort(across, kind="stable")
         lines = table.provenance.get("samples") is None and len(set(across.tolist())) == len(across)
         line = style if lines and not names else "none"
-        ax.plot(across[order], up[order], linestyle=line, marker="o", color=colour, label=_value(by, value))
+        text = _value(table, by, value)
+        ax.plot(across[order], up[order], linestyle=line, marker="o", color=colour, label=text)
     if names:
         ax.set_xticks(range(len(names)), [str(name) for name in names])
         ax.margins(x=0.15)
-    ax.set(xlabel=key_label(x), ylabel=key_label(y))
+    ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
     ax.grid(alpha=0.3)
     if by is not None:
         ax.legend()
@@ -70,8 +71,8 @@ def sweep_map(table: SweepResult, x: str, y: str, value: str, ax: Axes | None = 
         cells[np.searchsorted(up, row[y]), np.searchsorted(across, row[x])] = row[value]
     ax = axes_or_new(ax)
     mapped = ax.pcolormesh(_sides(across, ax.xaxis), _sides(up, ax.yaxis), cells, cmap=ONE_SIGN)
-    ax.set(xlabel=key_label(x), ylabel=key_label(y))
-    add_colorbar(mapped, ax, key_label(value))
+    ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
+    add_colorbar(mapped, ax, key_label(value, table.units))
     return ax
 
 
@@ -92,11 +93,11 @@ def _names(rows: Sequence[dict[str, Any]], x: str) -> list[Any]:
     return [] if all(type(v) in (int, float) for v in values) else list(dict.fromkeys(values))
 
 
-def _value(by: str | None, value: Any) -> str:
+def _value(table: SweepResult, by: str | None, value: Any) -> str:
     """What a line is called: `voltage 100 V`."""
     if by is None:
         return ""
-    text, _, unit = key_label(by).removesuffix(")").partition(" (")
+    text, _, unit = key_label(by, table.units).removesuffix(")").partition(" (")
     shown = f"{value:g}" if type(value) is float else str(value)
     return f"{text} {shown} {unit}".rstrip()
 

@@ -12,21 +12,27 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
-from evfem.electrostatics.charges import Sandwich, constants
-from evfem.electrostatics.drive import Drive, mean_law
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.drive import Drive, mean_law, powers
 from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, OpenCircuit
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import VoltageRamp
 
+#: voltages that follow from the charge of the electrode
+CHARGED = (OpenCircuit, ChargeControl)
+
 
 def applied(scene: Any) -> Any:
     """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
-    the moment.
+    the moment, or of a signal that repeats the effective one for its mean over the cycle.
     """
     drive = scene.drive
+    if drive is not None and not drive.resolved and (found := powers(scene.voltage)) is not None:
+        return found[0]
     if drive is None or not drive.resolved or not isinstance(scene.voltage, float):
         return scene.voltage
     return drive.signal(scene.voltage)
@@ -41,6 +47,10 @@ def frequency(scene: Any) -> float | None:
         return voltage.frequency
     if drive.resolved and isinstance(voltage, TimeSignal):
         return voltage.highest_frequency or None
+    if isinstance(voltage, Sampled) and voltage.repeat:
+        return voltage.rate / voltage.voltage.size
+    if isinstance(voltage, (Sine, Square)):
+        return voltage.frequency
     return None
 
 
@@ -79,29 +89,28 @@ def attracting(scene: Any, skin: Layer, insulator: Layer) -> tuple[Any, Layers]:
     if drive is None:
         return scene.law, Layers.of(skin, insulator)
     if drive.resolved:
-        stack = sandwich(scene, skin, insulator)
         thickness = np.asarray(skin.thickness) + insulator.thickness
-        return scene.law, Layers(stack.skin + stack.insulator, thickness)
-    return mean_law(scene.law, drive, at, (skin, insulator))
+        return scene.law, Layers(sandwich(scene, skin, insulator).reference, thickness)
+    return mean_law(scene.law, drive, at, (skin, insulator), scene.voltage)
 
 
 def lossless(scene: Any, layer: Layer) -> Layer:
-    """A layer with its real permittivity alone, at the drive's frequency."""
-    return Layer(layer.thickness, constants(layer, frequency(scene))[0])
+    """A layer with its real permittivity alone, at the drive's frequency or static without one."""
+    return Layer(layer.thickness, seen_at(layer, frequency(scene))[0])
 
 
-def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich:
+def sandwich(scene: Any, skin: Layer, insulator: Layer) -> Sandwich | RelaxingSandwich:
     """The layers of a resolved drive as its charges see them."""
     gap = {"gap_conductivity": scene.drive.gap_conductivity}
     gap["gap_eps_r"] = getattr(scene.law, "gap_eps_r", 1.0)
-    return Sandwich.of(skin, insulator, frequency=frequency(scene), **gap)
+    return stack_of(skin, insulator, frequency=frequency(scene), **gap)
 
 
 def check_drive(scene: Any) -> None:
     """Raise InputError where drive, law, voltage and motions do not fit together."""
     drive = scene.drive
-    if isinstance(scene.voltage, OpenCircuit) and (drive is None or not drive.resolved):
-        raise InputError("electrostatics.voltage", "OpenCircuit", "with a resolved drive")
+    if isinstance(scene.voltage, CHARGED) and (drive is None or not drive.resolved):
+        raise InputError("electrostatics.voltage", type(scene.voltage).__name__, "with a resolved drive")
     if drive is None:
         return
     if scene.law is None:
@@ -120,7 +129,10 @@ def _check_mean(scene: Any, drive: Drive) -> None:
         if drive.frequency is not None:
             given = f"{drive.frequency:g} beside a carrier of {voltage.frequency:g} Hz"
             raise InputError("electrostatics.frequency", given, "nothing here")
-    elif drive.frequency is None:
+    elif drive.frequency is not None and powers(voltage) is not None:
+        given = f"{drive.frequency:g} beside a signal over time, which has its own"
+        raise InputError("electrostatics.frequency", given, "nothing here")
+    elif frequency(scene) is None:
         allowed = 'a frequency in Hz, needed for the mean over the cycle; or drive = "resolved"'
         raise InputError("electrostatics.frequency", ABSENT, allowed)
 
@@ -135,8 +147,8 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, TimeSignal) and drive.frequency is not None:
         given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
         raise InputError("electrostatics.frequency", given, "nothing here")
-    if isinstance(voltage, OpenCircuit) and np.any(constants(scene.ground.insulator, frequency(scene))[1]):
-        allowed = "an insulator that does not conduct, with an open circuit"
+    if isinstance(voltage, CHARGED) and np.any(seen_at(scene.ground.insulator, frequency(scene))[1]):
+        allowed = "an insulator that does not conduct, with an open circuit or a given charge"
         raise InputError("surface.insulator", "a conductor", allowed)
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"

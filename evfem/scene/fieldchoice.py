@@ -61,4 +61,5 @@ def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
     insulator = scene.ground.insulator
     assert insulator is not None
     above = (height - height.min() + gap)[line]
-    return certificate(position[line, 0], above, (insulator.thickness, insulator.eps_r), skin[line]), gap
+    gap_eps_r = getattr(scene.law, "gap_eps_r", 1.0)
+    return certificate(position[line, 0], above, insulator, skin[line], gap_eps_r), gap

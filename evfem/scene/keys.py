@@ -150,7 +150,7 @@ class ElectrostaticsTable(Table):
     waveform: Literal[WAVEFORMS] = optional(" | ".join(WAVEFORMS), WAVEFORMS[0])  # type: ignore[valid-type]
     skin: str | None = optional(f"{' | '.join(SKINS)} | the path of a csv file")
     gap_conductivity: float = optional("a conductivity in S/m, not negative", 0.0)
-    drive: Literal["mean", "resolved"] = optional("mean | resolved", "mean")
+    drive: Literal["mean", "resolved"] | None = optional("mean | resolved")
     voltage_file: str | None = optional(
         "the path of a csv file (header: position,voltage or time,voltage) or of a .wav"
     )

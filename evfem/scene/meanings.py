@@ -195,10 +195,12 @@ SIGNAL = {
     "bias": Text("V", "mean voltage"),
     "phase": Text("rad", "at time 0"),
     "envelope": Text("V", "height of the carrier: a number, or a signal that modulates it"),
+    "charge": Text("nC/mm", "of the electrode, per mm of depth: a number, or a signal of charges"),
+    "after": Text("s", "when the electrode is disconnected"),
     "resolved": Text("", "false: the root mean square over its cycles", "true | false"),
     "file": Text("", "the samples"),
     "full_scale": Text("V", "of a .wav"),
-    "voltage": Text("V", "the samples in the scene file"),
+    "voltage": Text("V", "the samples in the scene file; of an open circuit the source's"),
     "rate": Text("Hz", "of the samples in the scene file", "", POSITIVE),
     "start": Text("s", "time of the first sample"),
     "repeat": Text("", "whether it begins anew at its end"),
@@ -210,7 +212,8 @@ SOLVER = {
     "penalty_normal": Text("N/mm3", "with contact = penalty"),
     "penalty_tangential": Text("N/mm3", "with contact = penalty and friction"),
     "tolerance": Text("", "largest free residual over the largest reaction, of every step"),
-    "threads": Text("", "of linear algebra"),
+    "threads": Text("", "of the factorisation"),
+    "symmetry": Text("", "whether a scene that is its own mirror image is computed from its right half"),
     "strategy": Text("", "how hard steps are tried"),
 }
 STRATEGY = {
@@ -221,6 +224,8 @@ STRATEGY = {
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),
     "relaxation": Text("", "whether a finger without an equilibrium near is released"),
+    "steps": Text("", "one part each unless it fails, or parts as the error of the path allows"),
+    "path_error": Text("", "of a part, with steps = auto: a share of the force on the bone"),
 }
 OUTPUT = {
     "every": Text("", "fields of every n-th step, and of the last one; without it as many as fit in 25 MB"),

@@ -27,8 +27,10 @@ from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, skin_of
 from evfem.scene.spatial import check_space, memory
+from evfem.scene.symmetry import half_of
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
+from evfem.scene.way import said
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
@@ -149,6 +151,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
+        *_symmetry(scene, mesh),
         *_hand(scene),
         _forms(scene, mesh),
     )
@@ -273,6 +276,14 @@ def _time(scene: Scene) -> Term:
     return Term("time", True, f"{dynamics}, backward Euler{lost}")
 
 
+def _symmetry(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
+    """Whether half of the mesh will do, where the scene asks for it."""
+    if not scene.solver.symmetry:
+        return ()
+    half, reason = half_of(scene, mesh)
+    return (Term("symmetry", half is not None, reason),)
+
+
 def _hand(scene: Scene) -> tuple[Term, ...]:
     """The hand between drive and bone, if there is one: its own frequency is to be resolved."""
     hand = scene.hand
@@ -334,6 +345,9 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
             f"{' and '.join(unsymmetric)} {'act' if unsymmetric[1:] else 'acts'} on the candidates only, "
             "so the tissue's matrix stays symmetric"
         )
+    steps = said(scene)
+    if steps:
+        lines.append(steps)
     return (
         *lines,
         f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",

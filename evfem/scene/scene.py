@@ -81,7 +81,8 @@ class Solver:
 
     `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
     largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
-    (N/mm3) go with `contact="penalty"` alone. `strategy` says how hard steps are tried.
+    (N/mm3) go with `contact="penalty"` alone. With `symmetry` a scene that is its own mirror image
+    is computed from its right half. `strategy` says how hard steps are tried.
     """
 
     element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
@@ -91,6 +92,7 @@ class Solver:
     penalty_tangential: float | None = field(default=None, metadata=_PENALTY)
     tolerance: float = field(default=1e-8, metadata=_TOLERANCE)
     threads: int = field(default=1, metadata=whole(1024))
+    symmetry: bool = field(default=False, metadata=yes_or_no())
     strategy: Strategy = field(default_factory=Strategy)
 
     def __post_init__(self) -> None:

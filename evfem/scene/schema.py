@@ -18,12 +18,11 @@ from pydantic import Field as Default
 from pydantic import create_model
 
 from evfem.common.checks import Within
-from evfem.electrostatics.timesignals import Carrier, Sine, Square
 from evfem.finger.fingerpad import RANGES, RESOLUTIONS, FingerPad
 from evfem.scene import keys, meanings
 from evfem.scene.keys import Table
 from evfem.scene.meanings import Meanings, Text
-from evfem.scene.voltage import SIGNALS
+from evfem.scene.voltage import MADE, SIGNALS
 from evfem.tissue.laws import LAWS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -31,7 +30,7 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 SPOKEN = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true, false"}
 SPOKEN |= {"object": "table", "array": "list"}
 #: signals whose fields know their limits
-CLASSES: Mapping[str, type | None] = {"sine": Sine, "square": Square, "carrier": Carrier, "sampled": None}
+CLASSES: Mapping[str, type | None] = {**MADE, "sampled": None}
 #: a key of [finger] that belongs to the scene
 DEPTH: Any = (float | None, Default(default=None))
 Schema = dict[str, Any]
@@ -332,10 +331,10 @@ def _without_law(neo_hookean: Section) -> Schema:
 
 
 def _modulated(signal: Section) -> Schema:
-    """The envelope of a carrier is a signal too."""
+    """The envelope of a carrier is a signal too, and so is a charge over time."""
     found = signal.schema()
-    if "envelope" in found["properties"]:
-        text = found["properties"]["envelope"]["description"]
+    for name in {"envelope", "charge"} & {*found["properties"]}:
+        text = found["properties"][name]["description"]
         options = [{"type": "number"}, {"$ref": "#/definitions/signal"}]
-        found["properties"]["envelope"] = {"anyOf": options, "description": text}
+        found["properties"][name] = {"anyOf": options, "description": text}
     return found

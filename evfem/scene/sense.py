@@ -17,6 +17,7 @@ import numpy as np
 
 from evfem.electrostatics.laws import Layers, StrongTroxel
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
@@ -243,7 +244,7 @@ def _small(scene: Scene) -> Iterator[str]:
 
 def _breakdown(scene: Scene) -> Iterator[str]:
     """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
-    if scene.law is None or isinstance(scene.voltage, FollowForce):
+    if scene.law is None or isinstance(scene.voltage, (FollowForce, ChargeControl)):
         return
     voltage, layers = largest_voltage(scene), solids(scene, *skin_of(scene))
     reduced = float(np.min(_layers(scene).reduced))

@@ -6,17 +6,22 @@ solver needs.
 
 from __future__ import annotations
 
-from evfem.contact.friction import Coulomb
+import os
+
+from evfem.contact.friction import AgeingFriction, RateFriction
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
+from evfem.protocols import FrictionLaw
 from evfem.scene.motion import Slide
 from evfem.scene.scene import Scene
 
 SOLID = "with a finger in three dimensions"
 #: factors of a hexahedral finger (bytes) and their growth with the nodes: 98 MB of 11k nodes, n^1.4
 FACTOR_BYTES, FACTOR_NODES, FACTOR_GROWTH = 98e6, 11e3, 1.4
+#: how many times that memory is needed at once while they are made
+MAKING = 2.0
 
 
 def check_space(scene: Scene, mesh: Mesh) -> None:
@@ -41,11 +46,8 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if len(scene.ground.friction_jumps):
         allowed = "a number, or a table without jumps: a short ramp from one coefficient to the next"
         found.append(("surface.friction", f"a jump of the coefficient {SOLID}", allowed))
-    if not isinstance(scene.friction_law, Coulomb):
-        given = f"{type(scene.friction_law).__name__} {SOLID}"
-        found.append(("surface.friction_law", given, "Coulomb's law"))
-    if scene.hand is not None:
-        found.append(("hand", f"a hand {SOLID}", "no hand"))
+    if scene.hand is not None and _goes_across(scene):
+        found.append(("hand", "a hand on a slide across x", "angle 0 or 180: its spring acts along x"))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
     if scene.law is not None and scene.direction != "vertical":
@@ -55,16 +57,26 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if not isinstance(roughness_of(scene.roughness_gap), (ConstantRoughness, type(None))):
         allowed = "a number: separations that depend on the pressure are those of the plane"
         found.append(("electrostatics.roughness_gap", f"a law {SOLID}", allowed))
-    if scene.drive is not None and scene.drive.resolved:
-        found.append(("electrostatics.drive", f"resolved {SOLID}", "mean"))
+    if not _falls(scene.friction_law):
+        allowed = "a law whose force does not grow with the speed: rate with exponent 0 and ratio up to 1"
+        found.append(("surface.friction_law", f"{scene.friction_law} {SOLID}", allowed))
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
-    if isinstance(scene.voltage, FollowForce) and any(
-        isinstance(motion, Slide) and motion.way[1] != 0.0 for motion in scene.motion
-    ):
+    if isinstance(scene.voltage, FollowForce) and _goes_across(scene):
         allowed = "angle 0 or 180: the friction force that is followed is that along x"
         found.append(("electrostatics.voltage", "a friction force to follow on a slide across x", allowed))
     return found
+
+
+def _falls(law: FrictionLaw) -> bool:
+    """Whether a law's force is known not to grow with the speed."""
+    if isinstance(law, RateFriction):
+        return law.exponent == 0.0 and law.ratio <= 1.0
+    return isinstance(law, AgeingFriction) or not getattr(law, "timed", False)
+
+
+def _goes_across(scene: Scene) -> bool:
+    return any(isinstance(motion, Slide) and motion.way[1] != 0.0 for motion in scene.motion)
 
 
 def factor_memory(nodes: int) -> float:
@@ -79,4 +91,23 @@ def factor_memory(nodes: int) -> float:
 def memory(mesh: Mesh) -> str:
     """What the direct solver of a finger in three dimensions needs, in a sentence."""
     factors = factor_memory(len(mesh.points))
-    return f"its factors take about {factors / 1e6:.2g} MB, twice that while they are made"
+    return f"its factors take about {factors / 1e6:.2g} MB, {MAKING:g} times that while they are made"
+
+
+def check_memory(mesh: Mesh) -> None:
+    """Raise InputError where the direct solver of this finger needs more memory than there is."""
+    needed, there = MAKING * factor_memory(len(mesh.points)), physical_memory()
+    if mesh.dim == 3 and needed > there:
+        given = f"{len(mesh.points)} nodes, whose direct solver needs about {needed / 1e9:.2g} GB of memory"
+        allowed = (
+            f"what fits into the {there / 1e9:.2g} GB of this machine: a coarser resolution, or fewer ridges"
+        )
+        raise InputError("finger", given, allowed)
+
+
+def physical_memory() -> float:
+    """Bytes of memory of this machine; no limit where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, OSError, ValueError):
+        return float("inf")

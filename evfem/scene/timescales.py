@@ -11,6 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.dielectrics import Dielectric
+from evfem.electrostatics.drive import powers
+from evfem.electrostatics.laws import Layer, StrongTroxel
+from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.driven import frequency, sandwich, solids
 from evfem.scene.scene import Scene
@@ -27,19 +33,29 @@ def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
     assert drive is not None
     at = frequency(scene)
     what = "direct voltage" if at is None else f"{drive.waveform} of {at:g} Hz"
-    if isinstance(scene.voltage, TimeSignal):
+    if isinstance(scene.voltage, OpenCircuit):
+        what = f"open circuit: {scene.voltage.voltage:g} V, disconnected after {scene.voltage.after:g} s"
+    elif isinstance(scene.voltage, ChargeControl):
+        what = "given charge of the electrode, whatever voltage that takes"
+    elif isinstance(scene.voltage, TimeSignal):
         what = f"{type(scene.voltage).__name__} signal"
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
     charge = _charge(scene, thickness, eps_r)
     parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
+    if drive.resolved and not isinstance(scene.law, StrongTroxel):
+        parts.append("no balance of the source, which only Strong and Troxel's law has")
     if not drive.resolved and at is not None:
-        parts.append(f"left out: the swing of the attraction at {2.0 * at:g} Hz")
+        parts.append(f"left out: the swing of the attraction at {slowest_swing(scene):g} Hz")
     return "; ".join(parts)
 
 
 def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
     """Below which frequencies gap and skin discharge where they touch."""
-    stack = sandwich(scene, *solids(scene, thickness, eps_r))
+    at, layers = frequency(scene), solids(scene, thickness, eps_r)
+    assert scene.drive is not None
+    solid, film = (Layer(one.thickness, Dielectric(*_constants(one, at))) for one in layers)
+    leak, medium = scene.drive.gap_conductivity, getattr(scene.law, "gap_eps_r", 1.0)
+    stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=medium)
     skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
     said = []
     if gap > 0.0:
@@ -47,7 +63,23 @@ def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
     if skin > 0.0:
         corner = skin / (1.0 + float(np.max(stack.skin)) / float(np.max(stack.insulator))) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
-    return said or ["charge: nothing conducts"]
+    relaxing = _relaxing(scene, layers) if scene.drive.resolved else []
+    return [*(said or ["charge: nothing conducts"]), *relaxing]
+
+
+def _constants(layer: Layer, at: float | None) -> tuple[float, tuple[()], float]:
+    """Permittivity, no poles, and conductivity of a layer at a frequency (Hz)."""
+    eps_r, sigma = seen_at(layer, at)
+    return float(np.max(eps_r)), (), float(np.max(sigma))
+
+
+def _relaxing(scene: Scene, layers: tuple[Layer, Layer]) -> list[str]:
+    """How many poles the dielectrics of a resolved drive have, and how slow."""
+    stack = sandwich(scene, *layers)
+    if not isinstance(stack, RelaxingSandwich):
+        return []
+    times = np.concatenate([stack.skin.tau, stack.insulator.tau])
+    return [f"charge: {times.size} Debye poles relax in {times.min():.2g} to {times.max():.2g} s"]
 
 
 def bandwidth(scene: Scene) -> float:
@@ -64,13 +96,23 @@ def _mechanics(scene: Scene) -> str:
     return "at once" if np.isinf(highest) else f"up to {highest:.3g} Hz"
 
 
+def slowest_swing(scene: Scene) -> float:
+    """Lowest frequency (Hz) at which the attraction swings: twice the voltage's, or that itself where
+    it has a bias, or even harmonics.
+    """
+    at, found = frequency(scene) or 0.0, powers(scene.voltage)
+    odd = found is None or not (found[1] % 2.0 == 0.0).any()
+    return 2.0 * at if odd else at
+
+
 def left_out(scene: Scene) -> str | None:
     """A sentence if a mean over the cycle leaves out what moves the tissue, else None."""
     at, highest = frequency(scene), bandwidth(scene)
     if scene.drive is None or scene.drive.resolved or at is None or np.isinf(highest):
         return None
-    if 2.0 * at >= FOLLOWS * highest:
+    swing = slowest_swing(scene)
+    if swing >= FOLLOWS * highest:
         return None
-    much = f"the attraction swings at {2.0 * at:g} Hz, and the tissue follows up to {highest:.3g} Hz"
+    much = f"the attraction swings at {swing:g} Hz, and the tissue follows up to {highest:.3g} Hz"
     other = f'drive = "resolved" with steps of at most {1.0 / (20.0 * at):.2g} s does not'
     return f"{much}: the mean over the cycle leaves that out, {other}"

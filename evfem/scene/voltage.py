@@ -11,7 +11,7 @@ from evfem.electrostatics.dielectrics import SKINS, DielectricTable, dielectric
 from evfem.electrostatics.drive import CREST, Drive
 from evfem.electrostatics.signalfile import read_voltage
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, Sampled, Sine, Square
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.keys import (
@@ -34,6 +34,10 @@ LARGEST = 64 * 2**20
 
 SineTable = derived(Sine)
 SquareTable = derived(Square)
+OpenCircuitTable = derived(OpenCircuit)
+ChargeTable = derived(
+    ChargeControl, charge=(float | dict[str, Any], required("a charge in nC/mm, or a signal of charges"))
+)
 CarrierTable = derived(Carrier, envelope=(float | dict[str, Any], required("a voltage in V, or a signal")))
 
 
@@ -49,11 +53,15 @@ class SampledTable(Table):
     repeat: bool = optional("true | false", False)
 
 
+#: kind of a signal whose keys are its fields -> its class
+MADE: Mapping[str, Any] = {cls.kind: cls for cls in (Sine, Square, Carrier, OpenCircuit, ChargeControl)}
 SIGNALS: Mapping[str, type[Table]] = {
     "sine": SineTable,
     "square": SquareTable,
     "carrier": CarrierTable,
     "sampled": SampledTable,
+    "open_circuit": OpenCircuitTable,
+    "charge": ChargeTable,
 }
 
 
@@ -89,13 +97,14 @@ def voltage_of(table: Any, needed: bool, folder: Path) -> Any:
 
 
 #: keys of [electrostatics] that make a drive of it, with what they are without one
-DRIVE = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": "mean"}
+DRIVE = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": None}
 
 
 def drive_of(table: Any, folder: Path) -> Drive | None:
     """The drive of the table [electrostatics], None where no key asks for one."""
     given = {name: getattr(table, name) for name in DRIVE}
-    if given == DRIVE:
+    alone = {name: value for name, value in given.items() if value != DRIVE[name]}
+    if not alone or (alone == {"drive": "mean"} and table.signal is None):
         return None
     resolved = given.pop("drive") == "resolved"
     with at("electrostatics"):
@@ -114,10 +123,11 @@ def _signal(table: Mapping[str, Any], prefix: str, folder: Path) -> TimeSignal:
     values = {name: getattr(parsed, name) for name in SIGNALS[kind].model_fields if name != "kind"}
     if kind == "sampled":
         return _sampled(values, prefix, folder)
-    if isinstance(values.get("envelope"), dict):
-        values["envelope"] = _signal(values["envelope"], f"{prefix}.envelope", folder)
+    for name in {"envelope", "charge"} & {*values}:
+        if isinstance(values[name], dict):
+            values[name] = _signal(values[name], f"{prefix}.{name}", folder)
     with at(prefix):
-        return {"sine": Sine, "square": Square, "carrier": Carrier}[kind](**values)
+        return MADE[kind](**values)
 
 
 def _sampled(values: dict[str, Any], prefix: str, folder: Path) -> Sampled:

@@ -22,11 +22,10 @@ from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, Sampled, Sine, Square
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.finger.scan import RidgeScan
-from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 from evfem.tissue.laws import LAWS
 
@@ -152,7 +151,7 @@ def _electrostatics_table(scene: Scene) -> dict[str, Any]:
     table: dict[str, Any] = {"law": names[0], **_changed(scene.law)}
     table |= voltage_keys(scene.voltage)
     if scene.drive is not None:
-        table |= _drive_keys(scene.drive)
+        table |= _drive_keys(scene.drive) or {"drive": "mean"}
     insulator = scene.ground.insulator
     if not isinstance(insulator.eps_r, float):
         raise InputError("surface.insulator", "a permittivity that is no number", "a number, for a file")
@@ -185,28 +184,33 @@ def _roughness_key(rough: Any) -> Any:
     return {"law": rough.law, **_changed(rough)}
 
 
+#: signals that a file can have, and their names in a sentence
+WRITTEN = (Sine, Square, Carrier, Sampled, OpenCircuit, ChargeControl)
+_SIGNALS = f"{', '.join(cls.__name__ for cls in WRITTEN[:-1])} or {WRITTEN[-1].__name__}"
+
+
 def voltage_keys(voltage: Any) -> dict[str, Any]:
     """The keys of [electrostatics] that give this voltage, without files."""
     if isinstance(voltage, VoltageProfile):
         rows = zip(voltage.position.tolist(), voltage.voltage.tolist(), strict=True)
         return {"voltage_profile": [list(row) for row in rows]}
-    if isinstance(voltage, (Sine, Square, Carrier, Sampled)):
+    if isinstance(voltage, WRITTEN):
         return {"signal": _signal_table(voltage)}
     if not isinstance(voltage, float):
-        allowed = "a number, a VoltageProfile, Sine, Square, Carrier or Sampled in a scene file"
+        allowed = f"a number, a VoltageProfile, {_SIGNALS} in a scene file"
         raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
     return {"voltage": voltage}
 
 
-def _signal_table(signal: Sine | Square | Carrier | Sampled) -> dict[str, Any]:
+def _signal_table(signal: Any) -> dict[str, Any]:
     table = {"kind": signal.kind, **changed(signal)}
     if isinstance(signal, Sampled):
-        table["voltage"] = signal.voltage.tolist()
-    elif isinstance(signal, Carrier) and isinstance(signal.envelope, TimeSignal):
-        if not isinstance(signal.envelope, (Sine, Square, Carrier, Sampled)):
-            given = f"a carrier with an envelope of the class {type(signal.envelope).__name__}"
-            raise InputError(
-                "electrostatics.voltage", given, "Sine, Square, Carrier or Sampled in a scene file"
-            )
-        table["envelope"] = _signal_table(signal.envelope)
+        return table | {"voltage": signal.voltage.tolist()}
+    for name in ("envelope", "charge"):
+        inner = getattr(signal, name, None)
+        if isinstance(inner, WRITTEN):
+            table[name] = _signal_table(inner)
+        elif inner is not None and not isinstance(inner, float):
+            given = f"a {signal.kind} whose {name} is of the class {type(inner).__name__}"
+            raise InputError("electrostatics.voltage", given, f"{_SIGNALS} in a scene file")
     return table

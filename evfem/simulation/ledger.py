@@ -16,7 +16,7 @@ from evfem.contact.signorini import FORWARD, OPEN
 from evfem.simulation.history import WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import SUMS, Books, Part, unloaded
+from evfem.simulation.works import SUMS, Books, Part, tells_source, unloaded
 from evfem.solver.state import State
 
 
@@ -73,10 +73,12 @@ class Ledger:
         }
 
     def _field_energy(self, state: State) -> float:
-        """Energy of the field under a voltage that is resolved in time, else 0."""
+        """Energy of the field where the source's work is told, else 0."""
         attraction = self.model.attraction
-        if attraction is None or attraction.charging is None:
+        if not tells_source(self.model):
             return 0.0
+        assert attraction is not None
+        assert attraction.charging is not None
         position = self.model.equilibrium.interface.resting(state)
         pressing = state.contact_force[:, 0]
         at = attraction.charged(position, state.voltage, pressing, state.charges)

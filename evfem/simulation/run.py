@@ -16,13 +16,15 @@ from threadpoolctl import threadpool_limits
 
 from evfem.common import notices
 from evfem.common.notices import LOG
+from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import OpenCircuit
+from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import NotConverged, StopRun
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
+from evfem.scene.way import allowed_error
 from evfem.simulation.checkpoint import (
     ledger_arrays,
     ledger_of,
@@ -47,9 +49,16 @@ from evfem.solver.control import (
     VoltageControl,
 )
 from evfem.solver.hand import AT_REST, Grip
+from evfem.solver.mirrored import Mirrored
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
+
+#: coulombs in a nanocoulomb per millimetre, per metre of depth
+NANO = 1e-6
+
+#: coulombs per metre of depth in a nanocoulomb per millimetre
+NANO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -91,8 +100,9 @@ def simulate(
         scene = scene_at(scene)
     import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
 
-    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
-    with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
+    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
+    # scene's threads are those of the factorisation
+    with threadpool_limits(limits=1), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
 
@@ -106,14 +116,16 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         run = Run(scene, resume)
         _tell(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
-        for request in run.requests():
-            frame = run.advance(request)
-            reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
-            bar.update(1)
-            LOG.debug("step %d of %d", len(run.rows), total)
-            if reasons:
-                run.keep_last_frame()
-                break
+        # and of the dense compliance of a skin in three dimensions, which has thousands of rows
+        with threadpool_limits(limits=scene.solver.threads if run.model.mesh.dim == 3 else None):
+            for request in run.requests():
+                frame = run.advance(request)
+                reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+                bar.update(1)
+                LOG.debug("step %d of %d", len(run.rows), total)
+                if reasons:
+                    run.keep_last_frame()
+                    break
     finally:
         bar.close()
     result = run.result()
@@ -130,7 +142,9 @@ class Run:
         self.scene = scene
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
-        self.stepper = Stepper(self.model.equilibrium, scene.coupling, body=self.model.body)
+        self.stepper = Stepper(
+            self.model.equilibrium, scene.coupling, body=self.model.body, allowed=allowed_error(scene)
+        )
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -159,6 +173,17 @@ class Run:
         voltage = self.voltage
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
+    def _kept(self, time: float, begin: float) -> KeptCharge | None:
+        """What prescribes the electrode's charge at `time` (s) in a step that begins at `begin`, if
+        anything does.
+        """
+        voltage = self.voltage
+        if isinstance(voltage, ChargeControl):
+            return KeptCharge(0.0, NANO * voltage.charge_at(time) / eps_0)
+        if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
+            return KeptCharge(voltage.voltage)
+        return None
+
     # -- from motions to targets
 
     def requests(self) -> Iterator[Request]:
@@ -177,10 +202,8 @@ class Run:
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
-                if isinstance(self.voltage, OpenCircuit) and now >= self.voltage.after:
-                    begin, end = (
-                        replace(one, drive=KeptCharge(self.voltage.voltage)) for one in (begin, end)
-                    )
+                if (kept := self._kept(now + seconds, now)) is not None:
+                    begin, end = (replace(one, drive=kept) for one in (begin, end))
                 path = self._path(begin, end, now, seconds)
                 yield Request(first + k, index, motion.kind, path, seconds)
 
@@ -270,7 +293,7 @@ class Run:
         def drive(x: float, fraction: float) -> VoltageControl:
             wanted = self.voltage
             if isinstance(end.drive, KeptCharge):
-                return end.drive
+                return self._kept(begin + fraction * seconds, begin) or end.drive
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
             if self._follows(seconds):
@@ -326,6 +349,10 @@ class Run:
             "backend": record.backend,
             "cell_loops": "numpy" if loops() is None else "compiled",
         }
+        if self.stepper.allowed is not None:
+            solver["path_error"] = self.stepper.path_error
+        if isinstance(self.model.equilibrium, Mirrored):
+            solver["halved"] = not self.model.equilibrium.broken
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
         )

@@ -62,6 +62,14 @@ the tributary lengths A, :math:`\int w\,dA` with its energy w per area, which a 
 leaves out. This holds for Strong and Troxel's law, which is the pressure of that field, and lacks the
 work on a roughness gap that changes with the load.
 
+Under another law these four columns are 0, for there is no balance to tell. A pressure
+:math:`p = \varepsilon_0 V^2 f(g)/2` is the work of a source whose charge per area is
+:math:`-\partial\Pi/\partial V = \varepsilon_0 V L(g)`, L' = -f. Kaczmarek's law has
+:math:`L = \ln[(g + D)/(g + s)]/(D - s)` instead of 1/(g + s), with which the balance closes as long as
+no charge crosses a layer. But then skin and insulator hold the voltage s L V, and a closed gap keeps
+the rest, (1 - s L) V, across no thickness: the field there, and with it the current of a leak, is
+infinite. So no displacement is both that of the law and that of layers that conduct.
+
 The first part begins without any load: voltage and user's forms count as raised within it.
 """
 
@@ -77,6 +85,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.electrostatics.laws import StrongTroxel
 from evfem.simulation.model import Model
 from evfem.solver.spatial import SkinInterface, slipped
 from evfem.solver.state import State
@@ -146,6 +155,14 @@ class Books:
         return cls(none, none, 0.0, 0.0, 0.0)
 
 
+def tells_source(model: Model) -> bool:
+    """Whether the source's work is told: under a voltage resolved in time and Strong and Troxel's law."""
+    attraction = model.attraction
+    if attraction is None or attraction.charging is None:
+        return False
+    return isinstance(attraction.law, StrongTroxel)
+
+
 def unloaded(state: State) -> State:
     """The state before the first part, without its voltage and what follows from it."""
     attraction, reaction = np.zeros_like(state.attraction), np.zeros_like(state.reaction)
@@ -190,8 +207,10 @@ class Part:
         lost -= drag
         snap = body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost)
         snapped = (0.0, drag + lost) if snap else (lost, 0.0)
-        flow = self._flow()
-        source = (flow.source_work, flow.leakage, self._stretching())
+        flow, stretched = Flow(0.0, 0.0), 0.0
+        if tells_source(self.model):
+            flow, stretched = self._flow(), self._stretching()
+        source = (flow.source_work, flow.leakage, stretched)
         added = (given, pulled, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
 
@@ -237,8 +256,8 @@ class Part:
     def _flow(self) -> Flow:
         """What the source gave, and what leaked; the first voltage is raised before anything moves."""
         attraction, new = self.model.attraction, self.new
-        if attraction is None or attraction.charging is None:
-            return Flow(0.0, 0.0)
+        assert attraction is not None
+        assert attraction.charging is not None
         charging = attraction.charging
         position = self.model.equilibrium.interface.resting(new)
         flow = charging.flow(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges))
@@ -249,8 +268,8 @@ class Part:
     def _stretching(self) -> float:
         """Work of the field on the tributary lengths on the way of `_work_of_charged`."""
         attraction = self.model.attraction
-        if attraction is None or attraction.charging is None:
-            return 0.0
+        assert attraction is not None
+        assert attraction.charging is not None
         charging = attraction.charging
         begin, end = (self.model.equilibrium.interface.resting(state) for state in (self.old, self.new))
         grown = attraction.pad.tributary(end) - attraction.pad.tributary(begin)

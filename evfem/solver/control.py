@@ -11,7 +11,7 @@ control             known                        unknown                       e
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
 `GivenVoltage`      voltage                                                    none
-`KeptCharge`        charge of the electrode                                    found by the stepper
+`KeptCharge`        charge of the electrode      voltage                       found by the stepper
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
@@ -102,7 +102,7 @@ class Force:
 
 
 @dataclass(frozen=True)
-class Drive:
+class VoltageProblem:
     """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a
     solved contact problem, and what one kV^2 more does: the state for the backward solve and the
     condensed forces.
@@ -150,7 +150,7 @@ class VoltageControl(Protocol):
         (2,).
         """
 
-    def solve(self, step: LinearContactStep, drive: Drive) -> DrivenStep:
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         """Contact, together with the voltage where it is an unknown."""
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
@@ -176,7 +176,7 @@ class GivenVoltage:
     def missing(self, reaction: Floats) -> float:
         return 0.0
 
-    def solve(self, step: LinearContactStep, drive: Drive) -> DrivenStep:
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         return DrivenStep(drive.solve(step))
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
@@ -188,9 +188,11 @@ class GivenVoltage:
 
 @dataclass(frozen=True)
 class KeptCharge(GivenVoltage):
-    """The electrode keeps the charge that it had; `voltage` (V) is that of its source, long ago. The
-    stepper finds the voltage (`evfem.solver.stepping`).
+    """The electrode has the `charge` over eps_0 (V), or None keeps the one that it had; `voltage` (V)
+    is that of its source, long ago. The stepper finds the voltage (`evfem.solver.stepping`).
     """
+
+    charge: float | None = None
 
 
 @dataclass
@@ -220,7 +222,7 @@ class FollowFriction:
     def missing(self, reaction: Floats) -> float:
         return float(self.force - reaction[0]) if self.free else 0.0
 
-    def solve(self, step: LinearContactStep, drive: Drive) -> DrivenStep:
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         if not self.free:
             return DrivenStep(drive.solve(step))
         unit, push = drive.unit()

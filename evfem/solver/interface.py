@@ -182,12 +182,20 @@ class Interface:
     def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:
         """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        length = self.lengths(self.positions(state.u)[:, 0])[nodes]
+        length = self.shares(state)[nodes]
         return Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
 
     def lengths(self, x: Floats) -> Floats:
         """Tributary lengths of the pad nodes (P,) at x (P,), nowhere quite nothing, in mm."""
         return np.maximum(self.pad.length(x), SHORTEST_LENGTH * self.length)
+
+    def shares(self, state: State) -> Floats:
+        """What of the pad its nodes stand for (P,): lengths in the plane, mm."""
+        return self.lengths(self.positions(state.u)[:, 0])
+
+    def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
+        """The same where the nodes are at x (P,), on a part of a run between two states."""
+        return self.lengths(x)
 
     def age(self, old: State) -> Floats:
         """How long every pad node has touched at the end of the step from `old` (P,) in s."""
@@ -208,7 +216,7 @@ class Interface:
         if self.law is None:
             return np.asarray(mu * normal)
         seen = self._slipping(old, new, np.arange(x.size), mu, slip)
-        return replace(seen, normal=normal, length=self.lengths(x)).bound(self.law)
+        return replace(seen, normal=normal, length=self.shares_at(part, x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
         """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds

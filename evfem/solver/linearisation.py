@@ -48,10 +48,11 @@ class Linearisation:
         interface: Interface,
         attraction: Attraction | None,
         limits: Limits,
+        record: Record | None = None,
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
-        self.record = Record()
+        self.record = record or Record()
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
         self.steep = STEEP * min(law.shear_modulus for law, _ in body.tissue.groups) / depth

@@ -8,17 +8,19 @@ is against its slip. Coefficients of friction may change over x, but not jump.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import SMALLEST_FORCE
+from evfem.common.constants import SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.coulomb import SLIP
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import STICK
 from evfem.contact.skin import Skin
 from evfem.contact.spatial import SpatialCandidates, SpatialContactStep
+from evfem.protocols import FrictionLaw
 from evfem.solver.interface import Interface, Pins
 from evfem.solver.state import State
 
@@ -34,7 +36,8 @@ class SkinInterface(Interface):
         self.length = pad.spacing(self.points)
         self._facing = pad.facing(self.points)
         self.pins = Pins(np.zeros((0, 3)), pad.nodes.size)
-        self.law, self.duration = None, 0.0
+        self.law: FrictionLaw | None = None
+        self.duration = 0.0
         self.neighbourhood = 0.0  # a dense compliance of three unknowns each: only what is needed, and spare
 
     def contact_forces(self, state: State) -> Floats:
@@ -51,7 +54,7 @@ class SkinInterface(Interface):
         """What the contact problem has to know of the candidates c (numbers of pad nodes)."""
         position = self.positions(state.u)[c]
         friction = self.friction(old, c, position[:, 0])
-        return SpatialCandidates(
+        known = SpatialCandidates(
             surface=surface_state(self.surface, position),
             slip=self.slip(old, state)[c],
             force=state.contact_force[c],
@@ -62,6 +65,34 @@ class SkinInterface(Interface):
             negative_stiffness=negative_stiffness[c],
             gain_on_closing=gain_on_closing[c],
         )
+        return known if self.law is None else self._under(self.law, known, old, state, c)
+
+    def _under(
+        self, law: FrictionLaw, known: SpatialCandidates, old: State, state: State, c: Ints
+    ) -> SpatialCandidates:
+        """The candidates c under a law of friction other than Coulomb's: linear in the contact force,
+        by the speed of the iterate.
+        """
+        seen = self._slipping(old, state, c, known.friction, self._ways(known.slip, known.status))
+        found = seen.linearised(law)
+        normal = np.maximum(known.force[:, 0], 0.0)
+        by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        slope = known.friction_slope * by_place
+        return replace(known, friction=found.slope, cohesion=found.offset, friction_slope=slope)
+
+    @staticmethod
+    def _ways(slip: Floats, status: Ints) -> Floats:
+        """How far nodes (k,) slip in a step, of slips (k, 2)."""
+        return np.where(status == SLIP, np.hypot(*slip.T), 0.0)
+
+    def shares(self, state: State) -> Floats:
+        """Tributary areas of the pad nodes (P,), nowhere quite nothing, in mm2."""
+        return np.maximum(self.pad.tributary(self.positions(state.u)), (SHORTEST_LENGTH * self.length) ** 2)
+
+    def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
+        """Their mean over a part of a run."""
+        old, new = part
+        return 0.5 * (self.shares(old) + self.shares(new))
 
     def slip(self, old: State, state: State) -> Floats:
         """Slips of the pad nodes along the profile and along z (P, 2) in mm since the last accepted
@@ -86,7 +117,10 @@ class SkinInterface(Interface):
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
         normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         slip, status = self.slip(old, state)[active], state.status[active]
-        limit = self.friction(old, np.flatnonzero(active), position[active, 0]) * normal
+        nodes = np.flatnonzero(active)
+        limit = (mu := self.friction(old, nodes, position[active, 0])) * normal
+        if self.law is not None:
+            limit = self._slipping(old, state, nodes, mu, self._ways(slip, status)).bound(self.law)
         way, size = np.hypot(*slip.T), np.hypot(*shear.T)
         sticks = (way <= short) & (size <= limit + weak)
         # a slip is known to `short`, and its direction accordingly

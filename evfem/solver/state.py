@@ -51,7 +51,7 @@ class State:
     too (`evfem.solver.pressure`). With a law of friction other than Coulomb's: how long the pad
     nodes have touched, `age` (P,) in s. With a hand: x of the drive, velocity of the bone and force
     of the drive, `hand` (3,) in mm, mm/s and N/mm. Under a voltage resolved in time each pad node
-    has two charges over eps_0 (2, P) in V/mm (`evfem.contact.charging`).
+    has charges over eps_0 (M, P) in V/mm, two where nothing relaxes (`evfem.contact.charging`).
     """
 
     u: Floats

@@ -9,6 +9,9 @@ Algorithm (`Stepper.follow`)::
             at another equilibrium (`evfem.solver.relaxation`), or give up where it does not
         else: accept; if it took few iterations, let the next substep grow
 
+Where the error of the path is limited, a part is solved as two halves and accepted where one whole
+part ends close enough to them; its length follows that error (`evfem.solver.path`).
+
 Nothing that has not converged is kept. After a release the way goes on with the substep that worked
 before; within the same step the next release comes at a part `COARSER` times as long, so that a
 step in which the finger snaps again and again comes to its end.
@@ -25,17 +28,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.constants import COARSER, SMALLEST_FORCE, STAGGERED_LIMIT
+from evfem.common.constants import COARSER, PATH_FIRST, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
+from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import Folded, State, StepFailed
 from evfem.tissue.body import Body
 
 #: a change of the voltage that is rounding (relative), and a voltage that is none (V)
 ROUNDING, TINY = 1e-14, 1e-300
+#: a change that is more than this share of the one before is slow
+SLOWLY = 0.1
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
@@ -45,7 +51,8 @@ Path = Callable[[float, float], Target]
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
     that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `unsettled` counts the parts whose staggered rounds did not settle.
+    step fails. `unsettled` counts the parts whose staggered rounds did not settle. Where the error
+    of the path of a part is limited it is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: StepSolver
@@ -55,6 +62,12 @@ class Stepper:
     body: Body | None = None
     relaxations: int = 0
     unsettled: int = 0
+    allowed: float | None = None
+    path_error: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.allowed is not None:
+            self.substep = PATH_FIRST
 
     def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
         """From `state` to the end of `path`; `accept(old, new)` sees every converged substep.
@@ -69,7 +82,7 @@ class Stepper:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
-                new = self.solve(state, path(done, fraction))
+                parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
                 self.cuts += 1
                 self.substep = 0.5 * (fraction - done)
@@ -79,12 +92,47 @@ class Stepper:
                 done, substeps = fraction, substeps + 1
                 self.substep, least = min(1.0, max(trusted, least)), COARSER * least
                 continue
+            if not self._keeps(error, fraction - done):
+                continue
             trusted = self.substep
-            accept(state, new)
-            state, done, substeps = new, fraction, substeps + 1
-            if self.equilibrium.record.iterations - before <= strategy.easy:
+            for new in parts:
+                accept(state, new)
+                state, substeps = new, substeps + 1
+            if self.allowed is not None:
+                self._set_length(error, fraction - done)
+            elif self.equilibrium.record.iterations - before <= strategy.easy:
                 self.substep = min(1.0, strategy.growth * self.substep)
+            done = fraction
         return state, substeps
+
+    def _keeps(self, error: float, part: float) -> bool:
+        """Whether a part with this error of its path is accepted; if not, the next one is shorter."""
+        least = self.equilibrium.strategy.smallest_part
+        if self.allowed is None or error <= self.allowed or part <= least:
+            self.path_error = max(self.path_error, error)
+            return True
+        self.substep = max(longer(error / self.allowed) * part, least)
+        return False
+
+    def _set_length(self, error: float, part: float) -> None:
+        """The next part's length after an accepted one; a rest that was shorter than it could have
+        been says nothing against longer ones.
+        """
+        assert self.allowed is not None
+        cut = part < (1.0 - 1e-9) * self.substep
+        wanted = max(longer(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
+        self.substep = min(1.0, max(wanted, self.substep) if cut else wanted)
+
+    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[list[State], float]:
+        """The equilibria of a part to accept, and the error of its path: two halves where that is
+        limited.
+        """
+        if self.allowed is None:
+            return [self.solve(state, path(done, fraction))], 0.0
+        middle = 0.5 * (done + fraction)
+        half = self.solve(state, path(done, middle))
+        end = self.solve(half, path(middle, fraction))
+        return [half, end], apart(self.solve(state, path(done, fraction), start=end), end)
 
     def _released(
         self, state: State, target: Target, accept: Callable[[State, State], None], failed: StepFailed
@@ -108,29 +156,36 @@ class Stepper:
         self.relaxations += 1
         return rest
 
-    def solve(self, state: State, target: Target) -> State:
-        """One equilibrium with the coupling asked for; where charges move, they follow."""
+    def solve(self, state: State, target: Target, start: State | None = None) -> State:
+        """One equilibrium with the coupling asked for; where charges move, they follow. Iterations
+        begin at `start` (default `state`).
+        """
         attraction = self.equilibrium.attraction
         if attraction is None or attraction.charging is None:
-            return self._coupled(state, target)
+            return self._coupled(state, target, start)
         interface = self.equilibrium.interface
         pressing = state.contact_force[:, 0]
         old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
         attraction.charging.begin(old, target.duration)
         if isinstance(target.drive, KeptCharge):
             return self._disconnected(state, target, attraction, attraction.charging)
-        new = self._coupled(state, target)
+        new = self._coupled(state, target, start)
         end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
         return replace(new, charges=end.charges)
 
     def _disconnected(
         self, state: State, target: Target, attraction: Attraction, charging: Charging
     ) -> State:
-        """Equilibria under voltages that bring the electrode's charge to what it was, until the
-        voltage no longer changes.
+        """Equilibria under voltages that bring the electrode's charge to what is prescribed or was,
+        until the voltage no longer changes. Where it settles slowly, or not, by the secant of what
+        the last two lacked.
         """
         equilibrium, voltage, change = self.equilibrium, state.voltage, np.inf
-        charge = charging.electrode_charge(charging.old)
+        assert isinstance(target.drive, KeptCharge)
+        charge = target.drive.charge
+        if charge is None:
+            charge = charging.electrode_charge(charging.old)
+        tried: tuple[float, float] | None = None
         for _ in range(STAGGERED_LIMIT):
             new = self._coupled(state, replace(target, drive=GivenVoltage(voltage)))
             place, pressing = equilibrium.interface.resting(new), new.contact_force[:, 0]
@@ -140,14 +195,17 @@ class Stepper:
             # as far as the equilibria are exact: to rounding where nothing deforms
             if change <= ROUNDING or (change <= equilibrium.tolerance and change > 0.1 * before):
                 return replace(new, charges=end.charges)
-            voltage = found
-        raise StepFailed("the voltage of the open circuit does not settle", equilibrium.record.residuals)
+            lacking, following = found - voltage, found
+            if tried is not None and change > SLOWLY * before and lacking != tried[1]:
+                following = voltage - lacking * (voltage - tried[0]) / (lacking - tried[1])
+            tried, voltage = (voltage, lacking), following
+        raise StepFailed("the voltage of a given charge does not settle", equilibrium.record.residuals)
 
-    def _coupled(self, state: State, target: Target) -> State:
+    def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
         if self.coupling == "monolithic" or equilibrium.attraction is None:
-            return equilibrium.step(state, target)
+            return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
             frozen = equilibrium.attraction_at(state, state, target.drive.voltage)
             return equilibrium.step(state, target, frozen)

@@ -8,17 +8,20 @@ and under a force the bone moves by limited strides. Where the smallest part fai
 is lost: the finger is released and comes to rest at another equilibrium, if there is one
 (`evfem.solver.relaxation`). What happens on the way needs physics instead: `dynamics` "viscous" or
 "inertial" with a speed.
+
+With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from evfem.common.checks import Within, check_fields, number, switch, whole
+from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
 _GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
+_ERROR = number("a share of a force, above 0, at most 1", Within(0.0, 1.0, above=True))
 _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
 
@@ -32,7 +35,9 @@ class Strategy:
     so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
     most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
     where even the smallest part fails, and takes no time, the finger is released and comes to rest
-    at another equilibrium.
+    at another equilibrium; `steps`: "given", each requested step is one part unless that fails,
+    or "auto", where friction or time remember the way each is cut into parts whose error of the
+    path is at most `path_error` of the force.
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)
@@ -48,6 +53,8 @@ class Strategy:
     growth: float = field(default=1.25, metadata=_GROWTH)
     reach: float = field(default=1.5, metadata=_REACH)
     relaxation: bool = field(default=True, metadata=switch())
+    steps: str = field(default="given", metadata=one_of("given", "auto"))
+    path_error: float = field(default=1e-3, metadata=_ERROR)
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -26,7 +26,7 @@ from evfem.scene.file import read_text, tables_of
 from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
 from evfem.scene.written import VERSION, dump
-from evfem.simulation.result import COLUMNS
+from evfem.simulation.result import COLUMNS, SPATIAL
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
 
 #: most points of a sweep
@@ -63,7 +63,7 @@ class Sweep:
     relative to `folder`. An entry of `grid` is a dotted key with a list of its values, or a name
     of your own with rows {row: {key: value, ...}} of keys that change together. `outputs` are
     `COLUMN.STATISTIC`: a column of the history and last, mean, min or max over its steps,
-    `COLUMN.STATISTIC.N` over those of motion N alone.
+    `COLUMN.STATISTIC.N` over those of motion N alone; over the depth where the scene has one.
 
     >>> from evfem.scene.scene import default_scene
     >>> sweep = Sweep(default_scene(), grid={"surface.friction": [0.2, 0.3], "motion.0.force": [0.1, 0.2]})
@@ -215,7 +215,7 @@ def check_output(output: Any, motions: int) -> None:
     motions.
     """
     words = output.split(".") if isinstance(output, str) else []
-    columns = [name for name in COLUMNS if name != "motion"]
+    columns = [name for name in (*COLUMNS, *SPATIAL) if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"
     if not 2 <= len(words) <= 3 or words[1] not in STATISTICS:
         raise InputError("outputs", shown(output), allowed)

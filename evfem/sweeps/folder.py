@@ -24,7 +24,7 @@ from evfem.errors import InputError
 
 POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sweep.json"
 MANIFEST = ".evfem-sweep"
-FORMAT = "evfem-sweep-point-1"
+FORMAT = "evfem-sweep-point-2"
 POINT_FILE = re.compile(r"[0-9a-f]{64}\.json")
 #: what a killed sweep was writing
 LEFT = re.compile(r"\.([0-9a-f]{64}\.json|sweep\.(csv|json|parquet)|\.evfem-sweep)\.\d+\.tmp")

@@ -11,7 +11,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
 from evfem.sweeps.pools import Open, Pool, open_pool, processes
+from evfem.sweeps.units import Units, table_units, units_of
 
 #: the table is written anew after so many seconds
 EVERY = 5.0
@@ -39,12 +40,13 @@ Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, ou
 @dataclass(frozen=True, eq=False)
 class SweepResult:
     """The table of a sweep: `rows` in the order of the points, with the keys `columns`, and
-    provenance.
+    provenance. `units` has those of the outputs: over the depth where the scenes have one.
     """
 
     columns: tuple[str, ...]
     rows: list[dict[str, Any]]
     provenance: dict[str, Any]
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def __getitem__(self, column: str) -> Any:
         """A column (points,): numbers as an array, NaN where there is none, else a list."""
@@ -132,6 +134,7 @@ class _Run:
         self.plan, self.folder, self.began = plan, folder, clock.perf_counter()
         self.points = plan.points()
         self.answers: dict[str, Answer] = {}
+        self.found: list[Units] = []
         quiet = not (progress and sys.stderr.isatty())
         reading = tqdm(self.points, "reading", unit="point", leave=False, delay=2.0, disable=quiet)
         self.keys = [self._key(point.text) for point in reading]
@@ -139,6 +142,7 @@ class _Run:
         if len(refused) == len(set(self.keys)):
             first = self.answers[self.keys[0]].message
             raise InputError("sweep", f"no valid point: {first}", "at least one valid scene")
+        self.units = table_units(plan.outputs, plan.parameters, self.found)
         self.digest = digest(sorted(set(self.keys)))
         if folder is not None:
             folder.open(set(self.keys), self.digest)
@@ -159,12 +163,14 @@ class _Run:
     def _key(self, text: str) -> str:
         """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""
         try:
-            scene = loads(text, self.plan.folder).digest()
+            scene = loads(text, self.plan.folder)
         except InputError as error:
             key = digest((text, "refused"))
             self.answers[key] = Answer("refused", 0.0, str(error), {})
             return key
-        return digest((scene, self.plan.outputs, evfem.__version__))
+        if (units := units_of(scene)) not in self.found:
+            self.found.append(units)
+        return digest((scene.digest(), self.plan.outputs, evfem.__version__))
 
     def waiting(self) -> dict[str, Job]:
         """What is still to be computed; equal points are computed once."""
@@ -205,7 +211,7 @@ class _Run:
                 found = {name: answer.outputs.get(name) for name in plan.outputs}
                 state = {"status": answer.status, "seconds": answer.seconds, "message": answer.message}
                 rows.append({"point": point.index, **point.labels, **point.parameters, **found, **state})
-        return SweepResult(columns, rows, self._provenance(rows))
+        return SweepResult(columns, rows, self._provenance(rows), self.units)
 
     def _provenance(self, rows: list[dict[str, Any]]) -> dict[str, Any]:
         plan, samples = self.plan, self.plan.samples
@@ -226,14 +232,26 @@ class _Run:
             "grid": plan.grid,
             "samples": drawn,
             "outputs": list(plan.outputs),
-            "units": {"length": "mm", "force": "N/mm", "voltage": "V", "energy": "N", "time": "s"},
+            "units": {
+                "length": "mm",
+                "force": self.found[0]["normal_force"],
+                "voltage": "V",
+                "energy": self.found[0]["stored_energy"],
+                "time": "s",
+                "outputs": self.units,
+            },
         }
 
 
 def evaluate(job: Job) -> Answer:
     """Run one point; whatever happens to it is in the answer."""
     text, folder, names = job
-    return answered(text, folder, lambda result: {name: output(result, name) for name in names})
+
+    def ask(result: Result) -> dict[str, float | None]:
+        result = result if result.depth is None else result.total
+        return {name: output(result, name) for name in names}
+
+    return answered(text, folder, ask)
 
 
 def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | None]]) -> Answer:

@@ -21,6 +21,9 @@ from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
 
+#: no nodes
+NOWHERE: Ints = np.zeros(0, dtype=np.int64)
+
 
 class Body:
     """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
@@ -31,7 +34,9 @@ class Body:
         laws: Mapping[str, Any],
         terms: Sequence[Any] = (),
         dynamics: Dynamics | None = None,
+        middle: Ints = NOWHERE,
     ) -> None:
+        """Of the right half of a symmetric body, the nodes `middle` (k,) and the bone keep their x."""
         self.space = space
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics
@@ -45,7 +50,16 @@ class Body:
         self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)
         self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
         self.unknowns[bone] = self.bone
-        self.pattern = Pattern(self.unknowns[space.nodes, 0] // dim, dim)
+        self.held: Ints = self.unknowns[middle, 0] if middle.size else middle
+        if middle.size:
+            self.held = np.union1d(self.held, self.bone[:1])
+        self._uncoupled = self.pattern.beside(self.held) if middle.size else middle
+
+    @cached_property
+    def pattern(self) -> Pattern:
+        """Where the entries of the reduced tangent are."""
+        dim = self.space.mesh.dim
+        return Pattern(self.unknowns[self.space.nodes, 0] // dim, dim)
 
     @cached_property
     def drag(self) -> Drag:
@@ -64,7 +78,9 @@ class Body:
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
-        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
+        forces = np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
+        forces[self.held] = 0.0  # what a support carries
+        return forces
 
     def expand(self, reduced: Floats) -> Floats:
         """Reduced displacements (n,) to nodal ones (N, dim)."""
@@ -98,7 +114,9 @@ class Body:
         self.tissue.add_tangent(u, self.pattern, data, pressure)
         for term in self._acting:
             term.add_tangent(u, self.pattern, data)
-        return self.pattern.finish(data)
+        upper = self.pattern.finish(data)
+        upper[self._uncoupled] = 0.0
+        return upper
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""

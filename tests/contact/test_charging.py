@@ -7,6 +7,7 @@ import evfem as ev
 from evfem.contact.charging import Charged, Charging
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.relaxation import stack_of
 
 SKIN = ev.Layer(0.30, ev.Dielectric(1136.0, (), 2e-4))
 STACK = Sandwich.of(SKIN, ev.TOUCHSCREEN, frequency=None, gap_conductivity=1e-8)
@@ -15,8 +16,8 @@ LENGTH = np.array([0.05, 0.06, 0.04, 0.05])
 CHARGES = np.array([[4e3, 1e3, -50.0, 10.0], [-9e2, 2e4, 30.0, -5.0]])
 
 
-def begun(seconds, voltage=80.0, charges=CHARGES, gap=GAPS):
-    charging = Charging(STACK, GAPS.size)
+def begun(seconds, voltage=80.0, charges=CHARGES, gap=GAPS, stack=STACK):
+    charging = Charging(stack, GAPS.size)
     charging.begin(Charged(charges, voltage, gap, LENGTH), seconds)
     return charging
 
@@ -46,28 +47,38 @@ def test_open_circuit_force_does_not_depend_on_the_gap():
     displacement, charges = 3e4, np.array([2e3, -5e2])[:, None]
     # the electrode's own displacement fixes the field behind the second charge
     volts = STACK.voltage_at(gaps, charges, displacement)
-    seen = STACK.effective(volts, charges)
+    seen = STACK.effective(gaps, volts, charges)
     pressure = ev.StrongTroxel().traction(gaps, seen, ev.Layers(STACK.skin + STACK.insulator, 0.301))
     expected = 0.5 * eps_0 * (displacement + 5e2) ** 2
     np.testing.assert_allclose(pressure, expected, rtol=1e-12)
     assert np.ptp(volts) > 0.5 * np.max(volts)
 
 
+#: a skin and an insulator with Debye poles, and their polarisations beside the charges
+RELAXING = stack_of(
+    ev.Layer(0.30, ev.Dielectric(80.0, [(900.0, 2e-3, 0.0), (300.0, 2e-5, 0.0)], 2e-4)),
+    ev.Layer(0.001, ev.Dielectric(3.0, [(0.9, 5e-4, 0.0)], 1e-10)),
+    frequency=None, gap_conductivity=1e-8, gap_eps_r=1.0,
+)  # fmt: skip
+POLARISED = np.concatenate(
+    [CHARGES, [[2e4, -3e3, 9e2, 10.0], [-1e3, 4e3, 80.0, 5.0], [500.0, 200.0, 9.0, 1.0]]]
+)
+
+
 @pytest.mark.parametrize("seconds", [1e-5, 1e-3, 0.1])
 @pytest.mark.parametrize("volts", [80.0, -30.0])
-def test_source_work_is_field_energy_leakage_and_work_while_the_pad_moves(seconds, volts):
+@pytest.mark.parametrize(("stack", "charges"), [(STACK, CHARGES), (RELAXING, POLARISED)])
+def test_source_work_is_field_energy_leakage_and_work_while_the_pad_moves(seconds, volts, stack, charges):
     """Every term from its own integral; the work by quadrature of the pressure."""
     from scipy.integrate import quad
 
     gaps = GAPS + np.array([2e-4, -5e-4, 0.01, -0.1])
-    charging = begun(seconds)
+    charging = begun(seconds, charges=charges, stack=stack)
     new = Charged(charging.after(gaps, volts, LENGTH), volts, gaps, LENGTH)
     flow = charging.flow(new)
     work = 0.0
     for i in range(GAPS.size):
-        seen = 80.0 + STACK.skin * CHARGES[0, i] - STACK.insulator * CHARGES[1, i]
-        solids = STACK.skin + STACK.insulator
-        pressure = lambda g, V=seen, s=solids: 0.5 * eps_0 * (V / (g + s)) ** 2  # noqa: E731
+        pressure = lambda g, x=charges[:, i]: 0.5 * eps_0 * stack.fields(g, 80.0, x)[1] ** 2  # noqa: E731
         work += LENGTH[i] * quad(pressure, gaps[i], GAPS[i], epsrel=1e-12)[0]
     stored = charging.field_energy(new) - charging.field_energy(charging.old)
     scale = max(abs(flow.source_work), flow.leakage, abs(stored))

@@ -1,5 +1,7 @@
 """Coulomb's disc in three dimensions: the laws themselves, closed forms, sweeps, and turned frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -59,6 +61,32 @@ def test_one_node_sticks_below_the_cone_and_slips_against_its_motion_beyond():
         found = solve_disc(DiscProblem(np.array([-1.0, *slip]), np.eye(3), np.array([0.3])), np.zeros(3))
         assert found.status.tolist() == [status]
         assert_allclose(found.force, [1.0, *force], atol=1e-12)
+
+
+def test_cohesion_widens_the_disc_of_what_touches():
+    """Unit compliance: pressed with 1, mu = 0.3 and c = 0.2 hold slips up to 0.5; an open node has
+    neither.
+    """
+    cohesion, start = np.full(3, 0.2), np.array([-1.0, 0.0, 0.49, -1.0, 3.0, 4.0, 1.0, 3.0, 4.0])
+    for friction, held in ((0.3, 0.5), (0.0, 0.2)):
+        start[2] = held - 0.01
+        problem = DiscProblem(start, np.eye(9), np.full(3, friction), cohesion=cohesion)
+        found = solve_disc(problem, np.zeros(9))
+        assert found.status.tolist() == [STICK, SLIP, OPEN]
+        expected = [1.0, 0.0, 0.01 - held, 1.0, -0.6 * held, -0.8 * held, 0.0, 0.0, 0.0]
+        assert_allclose(found.force, expected, atol=1e-12)
+
+
+def test_cohesion_of_nodes_that_feel_each_other():
+    problem, _ = half_space(10, 0.2, (0.03, -0.02), 0.2)
+    problem = replace(problem, cohesion=np.full(problem.size, 2e-3))
+    found = solve_disc(problem, np.zeros(3 * problem.size))
+    force, slips = found.force.reshape(-1, 3), found.status == SLIP
+    assert slips.sum() > 5
+    assert_allclose(np.hypot(*force[slips, 1:].T), 0.2 * force[slips, 0] + 2e-3, rtol=1e-9)
+    way = found.state.reshape(-1, 3)[slips, 1:]
+    along = (force[slips, 1:] * way).sum(axis=1)
+    assert_allclose(along, -np.hypot(*way.T) * np.hypot(*force[slips, 1:].T), rtol=1e-9)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3, 1.0])

@@ -6,7 +6,7 @@ import pytest
 import evfem as ev
 from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
-from evfem.contact.fullfield import FieldAttraction, facing, in_line
+from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
 from evfem.contact.pad import Pad
 from evfem.simulation.model import make_model
 
@@ -114,8 +114,8 @@ SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
 
 
 def test_a_hovering_pad_feels_the_field_of_its_outline():
-    """The same polyline in `rigid_field`, where its ends are planes of symmetry."""
-    pad, points = arc(40, 3.0, 1.0, quadratic=False)
+    """The same points in `rigid_field`, which takes the curve; its ends are planes of symmetry."""
+    pad, points = arc(80, 3.0, 1.0, quadratic=False)
     points[:, 1] += 0.04 * (1.0 - np.cos(8.0 * np.pi * points[:, 0])) + 0.02
     local, full = (a.forces(points, 100.0, None) for a in attractions(pad, points, ev.Display(y=0.0), 0.0))
     x = np.append(points[:, 0], 1.0 + points[1:, 0])
@@ -125,6 +125,7 @@ def test_a_hovering_pad_feels_the_field_of_its_outline():
     assert -2.0 * local[:, 1].sum() < 0.95 * rigid.force
 
 
+@pytest.mark.slow
 def test_the_energy_of_a_moving_run_is_balanced():
     """What the steps lose falls with their square, as it does with the law."""
     lost = []
@@ -223,6 +224,17 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     assert across[0] == pytest.approx(-plate, rel=0.2)
 
 
+def test_the_force_does_not_waver_when_nodes_pass_an_edge():
+    """A flat pad: all the same wherever the edge is between two columns 0.025 mm apart."""
+    pad, points = arc(40, 40.0, 4.0)
+    points[:, 1] = 0.1
+    forces = []
+    for end in np.linspace(0.0, 0.025, 6):
+        _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, end, 1.0]]))
+        forces.append(full.forces(points, 300.0, None).sum(axis=0)[0])
+    assert np.ptp(forces) < 0.01 * abs(np.mean(forces))
+
+
 def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
     finger = ev.FingerPad(resolution="coarse", ridges=False)
 
@@ -238,5 +250,25 @@ def test_rough_faces_keep_the_field_as_far_apart_as_a_higher_finger():
         )
         return ev.simulate(scene).electrostatic_force[-1]
 
-    assert pulled(0.1, 0.002) == pytest.approx(pulled(0.102, 0.0), rel=1e-3)
-    assert pulled(0.1, 0.002) < 0.99 * pulled(0.1, 0.0)
+    rough = pulled(0.1, 0.002)
+    assert rough == pytest.approx(pulled(0.102, 0.0), rel=1e-3)
+    assert rough < 0.99 * pulled(0.1, 0.0)
+
+
+@pytest.mark.parametrize("filling", [1.0, 3.8])
+def test_bounds_know_what_fills_the_gap(filling):
+    """Above a flat outline both are the capacitance of a plate; above a curved one the field's is
+    between them.
+    """
+    film = ev.Layer(0.001, 3.9)
+    x = np.linspace(0.0, 2.0, 5)
+    flat = certificate(x, np.full(5, 0.009), film, np.zeros(5), filling)
+    plate = ev.eps_0 * 2.0 / (0.009 / filling + 0.001 / 3.9)
+    assert [flat.lower, flat.upper] == pytest.approx([plate, plate], rel=1e-12)
+    pad, points = arc(30, 8.0, 2.0)
+    points[:, 1] += 0.009
+    surface, law = ev.Display(insulator=film, y=0.0), ev.StrongTroxel(filling)
+    skin = ev.Layer(np.full(len(points), 0.38), 1650.0)
+    layers = ev.Layers.of(skin, film)
+    full = FieldAttraction(law, layers, pad, surface, "normal", edges=facing(pad, points), skin=skin)
+    full.check(points)

@@ -179,7 +179,7 @@ def test_time_domain_against_the_phasor():
     effective = []
     for before, after in pairwise(volts):
         charges = stack.after(gap, charges, before * driven, after * driven, time[1])
-        effective.append(stack.effective(after * driven, charges))
+        effective.append(stack.effective(gap, after * driven, charges))
     for i in range(3):
         start = np.linalg.solve(np.eye(2) - charges[:, 1:, i], charges[:, 0, i])
         periodic = np.array(effective)[:, :, i] @ [1.0, *start]

@@ -102,16 +102,18 @@ def test_strips_of_two_voltages(gap, printed):
     """A quarter of a strip of either sign, the seam on a line."""
     exact = strips_pressure(4.0, (0.05, 3.0), gap, 1000.0)
     assert 1e6 * exact == pytest.approx(printed, rel=1e-6)
-    x = np.unique(
-        np.concatenate([1.0 - np.geomspace(4e-3, 1.0, 30), [1.0], 1.0 + np.geomspace(4e-3, 1.0, 30)])
-    )
-    level = 0.0 * x
-    rows = np.linspace(0.0, 1.0, 9)
-    found = Columns((3.0, 1.0), (rows, rows)).solve(
-        x, np.stack([level - 0.05, level, level + gap]), np.array([[-1.0, 1.0, 1.0], [1.0, 3.0, -1.0]])
-    )
-    mean = -0.5 * found.by_level[2].sum() * 1e6 / np.ptp(x)
-    assert mean == pytest.approx(exact, rel=1.5e-3)  # a fifth of the slab is columns on them
+    errors = []
+    for number in (60, 120):
+        away = np.geomspace(1e-3, 1.0, number)
+        x = np.unique(np.concatenate([1.0 - away, [1.0], 1.0 + away]))
+        level, rows = 0.0 * x, np.linspace(0.0, 1.0, 9)
+        levels = np.stack([level - 0.05, level, level + gap])
+        voltages = np.array([[-1.0, 1.0, 1.0], [1.0, 3.0, -1.0]])
+        found = Columns((3.0, 1.0), (rows, rows)).solve(x, levels, voltages)
+        mean = -0.5 * found.by_level[2].sum() * 1e6 / np.ptp(x)
+        errors.append(mean / exact - 1.0)
+    assert abs(errors[1]) < 4e-5
+    assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
 
 
 def halves(right):

@@ -36,6 +36,19 @@ def test_lines_of_numbers_say_their_unit():
     assert [line.get_label() for line in ax.get_lines()] == ["voltage 100 V", "voltage 200 V"]
 
 
+def test_axes_have_the_units_of_the_sweep():
+    names = ("motion.0.force", "contact_width.max", OUT)
+    rows = [(x, w, x * w) for x in (0.1, 0.2) for w in (1.0, 2.0)]
+    plain = table(rows, names)
+    units = {names[0]: "N", names[1]: "mm2", OUT: "N"}
+    whole = SweepResult(plain.columns, plain.rows, plain.provenance, units)
+    ax = sweep_map(whole, *names)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("force (N)", "contact area, max (mm²)")
+    assert ax.figure.axes[-1].get_ylabel() == "electrostatic force, last (N)"
+    lines = sweep(whole, names[1], OUT, by=names[0]).get_lines()
+    assert [line.get_label() for line in lines] == ["force 0.1 N", "force 0.2 N"]
+
+
 def test_what_is_varied_beside_is_points_without_a_line():
     (line,) = sweep(table(GRID), GAP, OUT).get_lines()
     assert line.get_linestyle() == "None"

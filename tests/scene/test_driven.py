@@ -7,7 +7,7 @@ import pytest
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.scene.driven import applied, attracting, solids
+from evfem.scene.driven import applied, attracting, frequency, solids
 from evfem.scene.file import dump, loads
 from evfem.scene.sense import largest_voltage
 
@@ -71,7 +71,6 @@ def test_skin_from_a_table_stands_beside_the_scene(tmp_path):
         ('voltage = 70.0\nfrequency = 5.0\ndrive = "resolved"\n', HOVER, "no motion that takes any"),
         ("amplitude = -1.0\nfrequency = 5.0\n", HOVER, r"electrostatics\.amplitude"),
         ("voltage = 70.0\nfrequency = 5.0\ngap_conductivity = -1.0\n", HOVER, "gap_conductivity"),
-        ('voltage = 70.0\nskin = "raicu"\ndrive = "resolved"\n', HOVER + WAIT, "without poles"),
         (
             'voltage_profile = [[0.0, 1.0]]\nfrequency = 5.0\ndrive = "resolved"\n',
             HOVER + WAIT,
@@ -98,7 +97,8 @@ def test_what_does_not_go_together_in_python():
         (ev.Carrier(10_000.0, 100.0), ev.Drive(), "a resolved carrier in a mean"),
         (slow, ev.Drive(resolved=True), "the mean of a carrier"),
         (ev.Sine(50.0, 100.0), ev.Drive(50.0, resolved=True), "resolved itself"),
-        (ev.Sine(50.0, 100.0), ev.Drive(), "frequency: missing"),
+        (ev.Sampled([0.0, 100.0], 50.0), ev.Drive(), "frequency: missing"),
+        (ev.Sine(50.0, 100.0), ev.Drive(50.0), "which has its own"),
         (70.0, "mean", "a Drive, or None"),
     ):
         with pytest.raises(InputError, match=message):
@@ -127,6 +127,7 @@ def test_the_plan_names_the_time_scales_and_what_is_left_out():
     resolved = loads(HEAD + MEAN.replace("250.0", "20.0") + 'drive = "resolved"\n' + HOVER + WAIT)
     said = next(term.reason for term in ev.plan(resolved).terms if term.name == "drive")
     assert "resolved in time with its charges" in said
+    assert "3 Debye poles relax in 2.8e-07 to " in said
     assert "left out" not in said
 
 
@@ -144,3 +145,21 @@ def test_the_plan_warns_of_a_mean_that_the_tissue_would_follow():
 def test_a_resolved_drive_is_told_to_take_short_steps():
     scene = loads(HEAD + MEAN + 'drive = "resolved"\n' + HOVER + WAIT)
     assert "8 steps in a period of the voltage (250 Hz)" in str(ev.plan(scene).warning)
+
+
+def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
+    """A sine with a bias: no steps in time, the fundamental for the dielectrics, and both swings."""
+    text = HEAD + 'signal = {kind = "sine", frequency = 75.0, amplitude = 100.0, bias = 60.0}\n'
+    scene = loads(text + 'drive = "mean"\nskin = "gabriel_dry"\n' + HOVER)
+    assert applied(scene) == pytest.approx(np.sqrt(60.0**2 + 5000.0))
+    said = next(term.reason for term in ev.plan(scene).terms if term.name == "drive")
+    assert "left out: the swing of the attraction at 75 Hz" in said
+    plain = loads(text + 'drive = "mean"\n' + HOVER)
+    assert plain.drive == ev.Drive()
+    for one in (scene, plain):
+        assert loads(dump(one)).digest() == one.digest()
+    number = replace(plain, voltage=applied(plain), drive=None)
+    forces = [ev.simulate(one).electrostatic_force[-1] for one in (plain, number)]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-9)
+    samples = ev.Sampled([60.0, 160.0, 60.0, -40.0], 300.0, repeat=True)
+    assert frequency(replace(plain, voltage=samples)) == 75.0

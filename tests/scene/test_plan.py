@@ -2,6 +2,8 @@
 mesh.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.builders import finger
@@ -9,6 +11,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.scene.plan import largest_voltage, plan, plan_on, rigid_share, scene_mesh
+from evfem.scene.way import remembers
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver
@@ -90,3 +93,28 @@ def test_the_plan_names_what_hardly_changes_its_volume(nu, said):
     line = "pressure an unknown of the iterations, as tissue hardly changes volume"
     assert (line in plan(scene).solver) == said
     assert make_model(scene).body.tissue.nearly_incompressible == said
+
+
+@pytest.mark.parametrize(
+    ("friction", "said"),
+    [
+        (0.0, "nothing remembers the way, each step is one part"),
+        (0.3, "friction remembers the way, a part errs by at most 0.5 % of the force"),
+    ],
+)
+def test_the_plan_says_what_automatic_steps_are(friction, said):
+    solver = ev.Solver(strategy=ev.Strategy(steps="auto", path_error=5e-3))
+    scene = ev.Scene(finger(BLOCK), ev.Flat(friction=friction), motion=[ev.Press(indentation=0.1)])
+    assert not any("steps auto" in line for line in plan(scene).solver)
+    assert f"steps auto: {said}" in plan(replace(scene, solver=solver)).solver
+
+
+def test_time_charges_and_the_air_layer_are_remembered_too():
+    scene = replace(hovering(voltage=100.0), surface=ev.Display(friction=0.0))
+    assert remembers(scene) == ()
+    assert remembers(replace(scene, air_layer=False)) == ("who touches",)
+    motion = [ev.Press(indentation=0.1, speed=1.0)]
+    slow = replace(scene, motion=motion, finger=finger(BLOCK, viscosity=1e-3))
+    assert remembers(replace(slow, solver=ev.Solver(dynamics="viscous"))) == ("time",)
+    alternating = {"drive": ev.Drive(resolved=True), "voltage": ev.Sine(100.0, 50.0)}
+    assert remembers(replace(scene, motion=motion, **alternating)) == ("charges",)

@@ -8,8 +8,10 @@ from tools.domes import Dome, dome, dome_scene
 import evfem as ev
 from evfem.contact.edge import outline_nodes
 from evfem.errors import InputError
+from evfem.scene import spatial
 from evfem.scene.plan import plan
 from evfem.scene.spatial import factor_memory
+from evfem.simulation.model import make_model
 
 PRESS = ev.Press(indentation=0.1)
 
@@ -27,7 +29,12 @@ def refusals():
     across = [PRESS, ev.Slide(1.0, angle=90.0)]
     follow = ev.FollowForce([0.0, 1.0], [0.01, 0.01])
     penalty = ev.Solver(element="hex8", contact="penalty", penalty_normal=1.0, penalty_tangential=1.0)
+    rough = ev.PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    fast = ev.RateFriction(speed=5.0, exponent=0.5)
     return {
+        "electrostatics.roughness_gap": dome_scene(PRESS, roughness_gap=rough),
+        "surface.friction_law": dome_scene(ev.Press(indentation=0.1, speed=1.0), friction_law=fast),
+        "hand": dome_scene(*across, hand=ev.Hand(0.1)),
         "surface.friction": dome_scene(PRESS, surface=jump, law=None, voltage=0.0),
         "solver.contact": dome_scene(PRESS, solver=penalty),
         "electrostatics.direction": dome_scene(PRESS, direction="normal"),
@@ -65,3 +72,15 @@ def test_the_plan_says_what_a_whole_finger_needs():
     assert "its factors take about" in text
     assert factor_memory(107_000) == pytest.approx(2552e6, rel=0.1)
     assert factor_memory(46_000) == pytest.approx(784e6, rel=0.1)
+
+
+def test_a_finger_that_no_memory_holds_is_refused_before_it_is_solved(monkeypatch):
+    """Twice the factors of 405 nodes: 1.9 MB, on a machine with one."""
+    scene = dome_scene(PRESS, finger=Dome(shape=dome((8, 4, 8))))
+    monkeypatch.setattr(spatial, "physical_memory", lambda: 1e6)
+    with pytest.raises(InputError, match=r"405 nodes, whose direct solver needs about 0.00\d+ GB") as refused:
+        make_model(scene)
+    assert "fits into the 0.001 GB of this machine" in str(refused.value)
+    monkeypatch.undo()
+    assert spatial.physical_memory() > 1e8
+    make_model(scene)

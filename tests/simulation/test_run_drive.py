@@ -8,6 +8,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics import alternating_pressure, step_pressure
+from evfem.electrostatics.laws import eps_0
+from evfem.scene.file import dump, loads
 
 SKIN = ev.Dielectric(1136.0, (), 2e-4)
 SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
@@ -91,6 +93,20 @@ def test_the_balance_of_a_soft_hovering_pad_closes_with_the_source():
     assert closed(found).max() < 1e-9
     assert found.leakage_dissipation[-1] > 0.5 * found.source_work[-1] > 0.0
     assert np.abs(found.electrostatic_work).max() > 0.0
+
+
+def test_a_skin_with_debye_poles_closes_its_balance_and_has_the_mean_of_the_phasor():
+    """The balance of a soft pad, the mean of one that is far enough off to be rigid."""
+    wet = ev.electrostatics.SKINS["gabriel_wet"].debye(1.0, 1e5)
+    drive = ev.Drive(frequency=FREQUENCY, skin=wet, gap_conductivity=1e-4, resolved=True)
+    soft = ev.simulate(scene(drive, [ev.Hover(0.02), ev.Wait(0.25 / FREQUENCY, steps=5)]))
+    assert closed(soft).max() < 1e-9
+    assert soft.leakage_dissipation[-1] > 0.0
+    steps = 24
+    found = ev.simulate(scene(drive, [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]))
+    mean = ev.simulate(scene(replace(drive, resolved=False), [ev.Hover(2.0)]))
+    last = found.electrostatic_force[-steps:].mean()
+    assert last == pytest.approx(mean.electrostatic_force[-1], rel=(2.0 * np.pi / steps) ** 2 / 3.0)
 
 
 @pytest.mark.slow
@@ -193,3 +209,100 @@ def test_a_soft_pad_over_an_open_circuit_finds_its_voltage():
     # without leak the field's energy is Q U / 2
     charge = 2.0 * found.field_energy / found.voltage
     np.testing.assert_allclose(charge, charge[1], rtol=1e-7)
+
+
+def test_a_prescribed_charge_pulls_a_flat_pad_alike_at_every_gap():
+    """F = Q^2 / (2 eps_0 A), U = Q (g + s) / (eps_0 A); A shrinks by 4e-7 under the pull."""
+    mesh = block(8, 3)
+    flat = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(10.0, 0.3)}, ELECTRICAL)
+    motion = [ev.Hover(0.2, steps=1), ev.Hover(0.4, steps=1), ev.Wait(0.1, steps=2), ev.Hover(1.7, steps=1)]
+    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
+    held = ev.Scene(flat, SCREEN, ev.StrongTroxel(), ev.ChargeControl(0.05), motion, drive=drive)
+    found = ev.simulate(held)
+    width = float(np.ptp(mesh.points[mesh.node_sets["pad"], 0]))
+    charge = 0.05e-6  # C per m of depth, N/V
+    expected = charge**2 / (2.0 * eps_0 * width)
+    np.testing.assert_allclose(found.electrostatic_force, expected, rtol=1e-6)
+    np.testing.assert_allclose(found.electrostatic_force, found.electrostatic_force[0], rtol=1e-12)
+    gaps = np.array([0.2, 0.4, 0.4, 0.4, 1.7]) + 0.30 / 1136.0 + 0.001 / 3.9
+    np.testing.assert_allclose(found.voltage, charge * gaps / (eps_0 * width), rtol=1e-5)
+    np.testing.assert_allclose(found.field_energy, 0.5 * charge * found.voltage, rtol=1e-12)
+    with pytest.raises(ev.InputError, match="with a resolved drive"):
+        replace(held, drive=None)
+
+
+def test_a_charge_over_time_is_followed_by_a_soft_pad():
+    """Charges of the nodes add up to what was asked."""
+    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
+    asked = ev.ChargeControl(ev.Sine(2.5, 0.03))
+    found = ev.simulate(scene(drive, [ev.Hover(0.02, steps=1), ev.Wait(0.1, steps=5)], asked))
+    charge = 1e6 * 2.0 * found.field_energy[1:] / found.voltage[1:]
+    np.testing.assert_allclose(charge, 0.03 * np.sin(2.5 * 2.0 * np.pi * found.time[1:]), rtol=1e-7)
+    assert found.voltage[0] == 0.0
+
+
+def test_a_charge_and_an_open_circuit_have_keys_of_a_scene_file():
+    text = """
+version = 1
+[finger]
+ridges = false
+resolution = "coarse"
+[surface]
+kind = "flat"
+[electrostatics]
+law = "strong_troxel"
+insulator = "touchscreen"
+drive = "resolved"
+signal = {SIGNAL}
+[[motion]]
+kind = "hover"
+gap = 0.5
+[[motion]]
+kind = "wait"
+duration = 0.1
+steps = 4
+"""
+    for signal, voltage in (
+        ('{kind = "charge", charge = 0.02}', ev.ChargeControl(0.02)),
+        ('{kind = "open_circuit", voltage = 80.0, after = 0.05}', ev.OpenCircuit(80.0, 0.05)),
+        (
+            '{kind = "charge", charge = {kind = "sine", frequency = 0.5, amplitude = 0.02}}',
+            ev.ChargeControl(ev.Sine(0.5, 0.02)),
+        ),
+    ):
+        made = loads(text.replace("{SIGNAL}", signal))
+        assert made.voltage == voltage
+        assert loads(dump(made)) == made
+        said = next(term.reason for term in ev.plan(made).terms if term.name == "drive")
+        assert ("given charge" if "charge" in voltage.kind else "disconnected") in said
+
+
+def test_another_law_tells_no_balance_of_the_source():
+    drive = ev.Drive(skin=SKIN, gap_conductivity=1e-7, resolved=True)
+    waits = [ev.Hover(2.0), ev.Wait(1e-3, steps=2)]
+    found = ev.simulate(replace(scene(drive, waits, 100.0), law=ev.Kaczmarek()))
+    for name in ("source_work", "leakage_dissipation", "stretch_work", "field_energy"):
+        np.testing.assert_array_equal(found[name], 0.0)
+    said = next(
+        term.reason
+        for term in ev.plan(replace(scene(drive, waits), law=ev.Kaczmarek())).terms
+        if term.name == "drive"
+    )
+    assert "no balance of the source" in said
+
+
+def test_what_charge_kaczmareks_law_implies_and_why_no_leak_goes_with_it():
+    """Its work on a moving plate is that of a source with the charge -dPi/dU, as long as nothing
+    leaks; but with that charge a closed gap keeps most of the voltage.
+    """
+    law, layers = ev.Kaczmarek(), ev.Layers(0.5e-3, 0.301)
+    g, U = np.linspace(0.0, 0.01, 20001), 70.0
+    charge = lambda gap, volts: -2.0 * law.potential(gap, volts, layers) / volts  # noqa: E731
+    source = U * (charge(0.0, U) - charge(0.01, U))
+    stored = 0.5 * U * (charge(0.0, U) - charge(0.01, U))
+    work = np.trapezoid(law.traction(g, U, layers), g)
+    assert source - stored == pytest.approx(work, rel=1e-6)
+    across_solids = charge(0.0, U) / eps_0 * layers.reduced
+    assert across_solids < 0.05 * U
+    rigid = ev.StrongTroxel()
+    assert -2.0 * rigid.potential(0.0, U, layers) / U / eps_0 * layers.reduced == pytest.approx(U, rel=1e-12)

@@ -7,7 +7,7 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.control import Drive, FollowFriction, Force, GivenVoltage, Indentation, Target
+from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target, VoltageProblem
 
 REACTION = np.array([0.2, -3.0])
 
@@ -62,7 +62,7 @@ class Friction:
 
     def drive(self):
         push = np.array([3.0])
-        return Drive(self.squared, self.solve, lambda: (np.array([7.0]), push))
+        return VoltageProblem(self.squared, self.solve, lambda: (np.array([7.0]), push))
 
     def solve(self, step):
         self.residuals.append(step.residual.copy())

@@ -26,6 +26,8 @@ WRONG = {
     "growth": (0.99, 10.1, np.inf),
     "reach": (-0.1, 10.1, np.nan),
     "relaxation": (None, 1, "yes"),
+    "steps": ("automatic", 3, None),
+    "path_error": (0.0, 1.5, np.nan),
 }
 ENDS = {
     "iterations": (1, 10_000),
@@ -35,6 +37,8 @@ ENDS = {
     "growth": (1.0, 10.0),
     "reach": (0.0, 10.0),
     "relaxation": (False, True),
+    "steps": ("given", "auto"),
+    "path_error": (1e-12, 1.0),
 }
 
 
@@ -64,7 +68,7 @@ class Steps:
     record: Record = field(default_factory=Record)
     ways: list = field(default_factory=list)
 
-    def step(self, old, target):
+    def step(self, old, target, frozen=None, start=None):
         self.record.iterations += self.takes
         if target - old > self.longest:
             raise StepFailed("too far", [1.0])
@@ -100,7 +104,7 @@ class Snapping(Steps):
 
     lost = 0.3
 
-    def step(self, old, target):
+    def step(self, old, target, frozen=None, start=None):
         self.record.iterations += self.takes
         raise StepFailed("no equilibrium near", [1.0])
 
@@ -205,3 +209,76 @@ def test_one_round_is_all_there_is_where_one_was_asked_for():
     with pytest.raises(StepFailed, match="rounds fail"):
         stepper.solve(rest, target)
     assert stepper.unsettled == 0
+
+
+class Decaying(Steps):
+    """y' = -y by backward Euler: what a step of length h leaves of a state is 1 / (1 + h)."""
+
+    def step(self, old, target, frozen=None, start=None):
+        self.ways.append((target, start is not None))
+        return SimpleNamespace(reaction=old.reaction / (1.0 + target), bone=np.zeros(2))
+
+
+def decayed(allowed):
+    """How far the end is off, in parts of the exact one; the parts' lengths; the stepper."""
+    steps, ends = Decaying(Strategy(), 1.0), [0.0]
+    stepper = Stepper(steps, allowed=allowed)
+    start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
+    path = lambda done, fraction: fraction - done  # noqa: E731
+    new, count = stepper.follow(start, path, lambda old, new: ends.append(float(new.reaction[0])))
+    assert count == len(ends) - 1
+    whole = [way for way, checked in steps.ways if checked]
+    return new.reaction[0] / np.exp(-1.0) - 1.0, whole, stepper
+
+
+def test_the_error_of_the_path_sets_the_length_of_its_parts():
+    """Two halves of a part of length h are off by h^2 / 4 of the force, so 0.9 of h = 2 sqrt(e) is
+    tried; over the unit of time they add up to h / 4. A quarter of the error takes twice the parts.
+    """
+    off, parts, stepper = decayed(1e-4)
+    assert parts[-2] == pytest.approx(0.9 * 2.0 * np.sqrt(1e-4), rel=0.02)
+    assert off == pytest.approx(parts[-2] / 4.0, rel=0.05)
+    assert 0.7e-4 < stepper.path_error <= 1e-4
+    finer, twice, _ = decayed(0.25e-4)
+    assert len(twice) == pytest.approx(2 * len(parts), abs=4)
+    assert finer == pytest.approx(off / 2.0, rel=0.1)
+    # the last part was cut by the end of the step, which says nothing against the next one
+    assert stepper.substep == pytest.approx(parts[-2], rel=1e-6)
+
+
+def test_parts_that_err_too_much_are_done_again_shorter():
+    _, parts, stepper = decayed(1e-6)
+    assert parts[:3] == pytest.approx([1 / 16, 1 / 64, 1 / 256])
+    assert stepper.path_error <= 1e-6
+
+
+def test_few_automatic_steps_agree_with_many_given_ones():
+    """A curved block pressed and slid with friction: the force on the way is that of very many
+    steps, where single ones are off by percents.
+    """
+
+    def pressed(presses, slides, **numbers):
+        motion = [Press(indentation=0.4, steps=presses), Slide(0.1, steps=slides)]
+        solver, body = Solver(strategy=Strategy(**numbers)), finger(block(16, 3, sag=0.4))
+        result = simulate(Scene(body, Flat(friction=0.5), motion=motion, solver=solver))
+        forces = result.normal_force[presses - 1], result.normal_force[-1], result.tangential_force[-1]
+        return np.array(forces), result
+
+    many, _ = pressed(25, 25)
+    coarse, _ = pressed(1, 1)
+    few, result = pressed(1, 1, steps="auto", path_error=1e-3)
+    assert 0.0 < result.provenance["solver"]["path_error"] <= 1e-3
+    assert np.abs(few / many - 1.0).max() < 0.2 * np.abs(coarse / many - 1.0).max()
+
+
+def test_where_nothing_remembers_the_way_automatic_steps_are_the_given_ones():
+    motion, body = [Press(indentation=0.4, steps=2), Slide(0.2, steps=1)], finger(block(8, 3, sag=0.4))
+    results = [
+        simulate(
+            Scene(body, Flat(friction=0.0), motion=motion, solver=Solver(strategy=Strategy(steps=steps)))
+        )
+        for steps in ("given", "auto")
+    ]
+    np.testing.assert_array_equal(results[0].normal_force, results[1].normal_force)
+    assert results[1].substeps.tolist() == [1, 1, 1]
+    assert "path_error" not in results[1].provenance["solver"]

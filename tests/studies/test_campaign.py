@@ -13,6 +13,7 @@ import pytest
 
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
+from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.keys import (
@@ -61,7 +62,8 @@ def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
             continue
         scene = tables.scene_of(one)
         thickness = float(scene.ground.insulator.thickness)
-        assert largest_voltage(scene) <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
+        if not isinstance(scene.voltage, ChargeControl):  # whose voltage is what comes out
+            assert largest_voltage(scene) <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
         assert 1e-3 <= thickness <= 0.5
     for one in drawn:
         friction = np.atleast_2d(one["surface"]["friction"])[:, -1]

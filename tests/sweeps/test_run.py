@@ -12,6 +12,7 @@ import time
 
 import numpy as np
 import pytest
+import tomli_w
 from tools.meshes import block
 from tools.workers import work_or_die
 
@@ -24,6 +25,7 @@ from evfem.sweeps import file as sweepfile
 from evfem.sweeps import folder as sweepfolder
 from evfem.sweeps import pools
 from evfem.sweeps.run import compute
+from evfem.sweeps.units import table_units, units_of
 
 SWEEP = """
 version = 1
@@ -133,7 +135,7 @@ def test_a_finished_point_is_never_computed_again(plan, tmp_path, monkeypatch):
     lost, damaged, foreign, kept = sorted((out / "points").iterdir())
     lost.unlink()
     damaged.write_text(damaged.read_text()[:-9])
-    foreign.write_text(foreign.read_text().replace("point-1", "point-0"))
+    foreign.write_text(foreign.read_text().replace("point-2", "point-1"))
     stamp = kept.stat().st_mtime_ns
     plan.write_text(SWEEP.replace("[0.1, 0.2]\n", "[0.05, 0.1, 0.2]\n"))
     third = ev.sweep(plan, out, workers=1)  # it grew, so that nothing of it belongs to another
@@ -369,6 +371,37 @@ def test_a_dask_cluster_gives_the_same_numbers(plan):
 def test_pools_that_cannot_be(plan, tmp_path, options, sentence):
     with pytest.raises(InputError, match=sentence):
         ev.sweep(plan, tmp_path / "out", **options)
+
+
+# -- units ------------------------------------------------------------------------------------------------
+
+
+def test_outputs_are_over_the_depth_of_the_scenes(plan):
+    outputs = '["normal_force.last", "contact_area.max", "peak_contact_pressure.last"]'
+    text = SWEEP.replace('"block.vtu"', '"block.vtu"\ndepth = 10.0').replace(", -1.0]", "]")
+    old = SWEEP.splitlines()[2]
+    plan.write_text(text.replace(old, f"outputs = {outputs}"))
+    result = ev.sweep(plan, workers=1)
+    run = ev.simulate(scenefile.loads(sweepfile.load(plan).points()[0].text, plan.parent))
+    row = result.rows[0]
+    assert row["normal_force.last"] == run.total.normal_force[-1] == 10.0 * run.normal_force[-1]
+    assert row["contact_area.max"] == run.contact_area.max() == 10.0 * run.contact_width.max()
+    assert row["peak_contact_pressure.last"] == run.peak_contact_pressure[-1]
+    assert list(result.units.values()) == ["N", "mm2", "MPa"]
+    assert result.provenance["units"]["energy"] == "mJ"
+
+
+def test_a_column_has_one_unit():
+    hover = {"version": 1, "surface": {"kind": "flat"}, "motion": [{"kind": "hover", "gap": 0.5}]}
+    kinds = {"finger.kind": ["pad", "fingertip"]}
+    with pytest.raises(InputError, match=r"finger\.depth: given normal_force\.last in N and N/mm"):
+        ev.sweep(ev.Sweep(hover, grid=kinds, outputs=["normal_force.last"]), workers=1)
+    with pytest.raises(InputError, match=r'given "contact_area\.last" of a finger without it'):
+        ev.sweep(ev.Sweep(hover, grid={"motion.0.gap": [0.1]}, outputs=["contact_area.last"]), workers=1)
+    force = {**hover, "finger": {"kind": "fingertip"}, "motion": [{"kind": "press", "force": 0.5}]}
+    spatial = units_of(scenefile.loads(tomli_w.dumps(force)))
+    units = table_units(["contact_area.last"], ["motion.0.force"], [spatial])
+    assert units == {"contact_area.last": "mm2", "motion.0.force": "N"}
 
 
 # -- the command -----------------------------------------------------------------------------------------

@@ -1,0 +1,141 @@
+"""Layers that relax: charges and polarisations against a matrix exponential and the phasor."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.electrostatics import alternating_pressure, complex_length
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.relaxation import Relaxing, RelaxingSandwich, debye_layer, seen_at, stack_of
+
+#: two poles in the skin, one slower and one faster than a cycle, and one in the film
+SKIN = ev.Layer(0.30, ev.Dielectric(80.0, [(900.0, 2e-3, 0.0), (300.0, 2e-5, 0.0)], 2e-4))
+FILM = ev.Layer(0.001, ev.Dielectric(3.0, [(0.9, 5e-4, 0.0)], 1e-10))
+LEAK = 1e-8
+STACK = stack_of(SKIN, FILM, frequency=None, gap_conductivity=LEAK, gap_eps_r=1.0)
+GAPS = np.array([0.0, 1e-3, 5e-3])
+
+
+def system(gap):
+    """The equations of motion of (x_1, x_2, p, p, p) as they stand in the head of the file."""
+    thickness, low = np.array([0.30, gap, 0.001]), np.array([80.0, 1.0, 3.0])
+    kappa = np.array([2e-4, LEAK, 1e-10]) / eps_0
+    owner, strength, tau = np.array([0, 0, 2]), np.array([900.0, 300.0, 0.9]), np.array([2e-3, 2e-5, 5e-4])
+
+    def rate(x, volts):
+        # D_1 = D - x_1, D_3 = D + x_2, E = (D - p) / eps_inf, and their voltages add up
+        offset = np.array([-x[0], 0.0, x[1]])
+        np.subtract.at(offset, owner, x[2:])
+        D = (volts - np.sum(thickness / low * offset)) / np.sum(thickness / low)
+        E = (D + offset) / low
+        J = kappa * E
+        return np.concatenate([[J[0] - J[1], J[1] - J[2]], (strength * E[owner] - x[2:]) / tau])
+
+    matrix = np.stack([rate(e, 0.0) for e in np.eye(5)], axis=1)
+    return matrix, rate(np.zeros(5), 1.0)
+
+
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("seconds", [1e-6, 3e-4, 2e-2])
+def test_the_state_after_a_ramp_is_that_of_a_matrix_exponential(gap, seconds):
+    from scipy.linalg import expm
+
+    matrix, push = system(gap)
+    whole = np.zeros((7, 7))
+    whole[:5, :5], whole[:5, 5], whole[5, 6] = matrix, push, 1.0 / seconds
+    start = np.array([4e3, -9e2, 2e4, -1e3, 5e2])
+    expected = (expm(seconds * whole) @ [*start, 20.0, 80.0])[:5]
+    found = STACK.after(gap, start, 20.0, 100.0, seconds)
+    np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+
+
+def test_without_poles_and_without_seconds_it_is_the_sandwich():
+    skin = ev.Layer(0.30, ev.Dielectric(1136.0, (), 2e-4))
+    plain = stack_of(skin, ev.TOUCHSCREEN, frequency=75.0, gap_conductivity=LEAK, gap_eps_r=1.2)
+    assert isinstance(plain, Sandwich)
+    layers = Relaxing.of(skin), Relaxing.of(ev.TOUCHSCREEN)
+    same = RelaxingSandwich(*layers, LEAK / eps_0, plain.reference, 1.2)
+    start = np.array([[4e3, 1e3, -50.0], [-9e2, 2e4, 30.0]])
+    np.testing.assert_array_equal(same.after(GAPS, start, 5.0, 9.0, 0.0), start)
+    ends = [one.after(GAPS, start, 20.0, 100.0, 1e-3) for one in (plain, same)]
+    np.testing.assert_allclose(ends[1], ends[0], atol=1e-11 * np.abs(ends[0]).max())
+    for name in ("effective", "energy", "loss", "crossing"):
+        one, other = (getattr(stack, name)(GAPS, 70.0, start) for stack in (plain, same))
+        np.testing.assert_allclose(other, one, rtol=1e-11)
+    np.testing.assert_allclose(same.fields(GAPS, 70.0, start), plain.fields(GAPS, 70.0, start), rtol=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [75.0, 1000.0])
+@pytest.mark.parametrize("name", ["gabriel_dry", "gabriel_wet", "raicu"])
+def test_time_domain_against_the_phasor(name, frequency):
+    """The periodic state under a sine in 4000 straight parts, whose mean pressure is the phasor's."""
+    parts = 4000
+    skin = ev.electrostatics.SKINS[name].debye(1.0, 1e5)
+    layer = ev.Layer(0.30, skin)
+    given = {"frequency": frequency, "gap_conductivity": LEAK, "gap_eps_r": 1.0}
+    stack = stack_of(layer, ev.TOUCHSCREEN, **given)
+    size, step = stack.states, 1.0 / (parts * frequency)
+    volts = 100.0 * np.sin(2.0 * np.pi * np.arange(parts + 1) / parts)
+    # one part is linear in its start and in the voltages of its two ends
+    units = np.eye(size)[:, :, None] * np.ones(3)
+    onward = stack.after(GAPS, units, 0.0, 0.0, step).transpose(2, 0, 1)
+    none = np.zeros((size, 3))
+    pushes = [stack.after(GAPS, none, *ends, step).T for ends in ((1.0, 0.0), (0.0, 1.0))]
+    free, driven = np.broadcast_to(np.eye(size), onward.shape), np.zeros((3, size))
+    states = []
+    for before, after in pairwise(volts):
+        free = onward @ free
+        driven = (onward @ driven[..., None])[..., 0] + before * pushes[0] + after * pushes[1]
+        states.append((free, driven))
+    start = np.linalg.solve(np.eye(size) - free, driven[..., None])
+    charges = np.array([(free @ start)[..., 0] + driven for free, driven in states]).transpose(2, 0, 1)
+    field = stack.fields(GAPS, volts[1:, None], charges)[1]
+    mean = alternating_pressure(
+        GAPS, 100.0 / np.sqrt(2.0), frequency, skin=skin, skin_thickness=0.30,
+        insulator=ev.TOUCHSCREEN, gap_conductivity=LEAK,
+    )  # fmt: skip
+    np.testing.assert_allclose(np.mean(0.5 * eps_0 * field**2, axis=0), mean, rtol=1e-6)
+    # and what a force law sees has the same field
+    law = ev.StrongTroxel().traction(
+        GAPS, stack.effective(GAPS, volts[1:, None], charges), ev.Layers(stack.reference, 0.301)
+    )
+    np.testing.assert_allclose(law, 0.5 * eps_0 * field**2, rtol=1e-10)
+
+
+def test_derivatives_by_the_gap_follow_charges_and_poles():
+    start = np.array([[4e3], [-9e2], [2e4], [-1e3], [5e2]]) * np.ones(2)
+    gaps = np.array([1e-3, 0.02])
+    seen = lambda g: STACK.effective(g, 60.0, STACK.after(g, start, 80.0, 60.0, 2e-4))  # noqa: E731
+    slope = seen(gaps + 1e-30j).imag / 1e-30
+    d = 1e-4 * gaps
+    np.testing.assert_allclose(slope, (seen(gaps + d) - seen(gaps - d)) / (2.0 * d), rtol=1e-6)
+
+
+def test_what_becomes_a_sum_of_debye_poles():
+    dry = ev.Layer(0.30, ev.electrostatics.SKINS["gabriel_dry"])
+    assert debye_layer(SKIN, 75.0) is SKIN
+    assert debye_layer(ev.TOUCHSCREEN, 75.0) is ev.TOUCHSCREEN
+    fitted = debye_layer(dry, 1e6)  # the band is widened to ten times the frequency
+    f = np.geomspace(1.0, 1e7, 50)
+    found = np.asarray(fitted.eps_r.permittivity(f))
+    np.testing.assert_allclose(found, dry.eps_r.permittivity(f), rtol=3e-3)
+    assert seen_at(SKIN, None) == (1280.0, 2e-4)
+    assert seen_at(dry, 1000.0)[0] == pytest.approx(1135.62, abs=5e-3)
+
+    class Own:
+        def permittivity(self, frequency):
+            return 5.0 + 0.0 * frequency
+
+    with pytest.raises(ev.InputError, match="a Dielectric or a DielectricTable"):
+        debye_layer(ev.Layer(0.1, Own()), 75.0)
+
+
+def test_the_transform_on_the_imaginary_axis_is_the_complex_length():
+    """z_1 + z_3 of the contour at s = i w, times the gap's own permittivity."""
+    s = 2j * np.pi * 75.0
+    reduced = 0.30 / STACK.skin.admittance(s) + 0.001 / STACK.insulator.admittance(s)
+    expected = complex_length(75.0, skin=SKIN.eps_r, skin_thickness=0.30, insulator=FILM)
+    assert reduced == pytest.approx(expected, rel=1e-12)

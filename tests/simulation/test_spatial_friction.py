@@ -1,0 +1,70 @@
+"""In three dimensions: laws of friction, a hand behind the finger, and a drive resolved in time."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from tools.domes import dome_scene
+
+import evfem as ev
+from evfem.contact.coulomb import SLIP
+from evfem.simulation.run import simulate
+
+PRESS = ev.Press(indentation=0.3, steps=2, speed=1.0)
+SLIDE = ev.Slide(0.5, steps=4, angle=30.0, speed=10.0)
+LAWS = [
+    ev.LoadIndexFriction(pressure=0.01, index=0.7),
+    ev.LoadIndexFriction(pressure=0.01, index=1.3),
+    ev.AdhesiveFriction(strength=0.004),
+    ev.AgeingFriction(fresh=0.2, time=0.1),
+    ev.RateFriction(speed=5.0, ratio=0.5),
+]
+
+
+def balance(result):
+    given = result.external_work + result.electrostatic_work
+    kept = result.stored_energy + result.friction_dissipation
+    lost = result.viscous_dissipation + result.integrator_dissipation + result.snap_dissipation
+    return np.abs(given - kept - lost).max() / result.stored_energy.max()
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.kind)
+def test_every_slipping_node_has_the_shear_of_its_law(law):
+    """The traction of the accepted state is the law's bound of its pressure, speed and age; the age
+    of the dome's first nodes is the whole run's.
+    """
+    result = simulate(dome_scene(PRESS, SLIDE, friction_law=law))
+    assert balance(result) < 1e-6
+    frame, before = result.frames[-1], result.frames[-2]
+    slips = (frame.contact_status == SLIP) & (before.contact_status > 0)
+    assert slips.sum() > 8
+    moved = np.linalg.norm((frame.displacement - before.displacement)[slips][:, ::2], axis=1)
+    first = (result.frames[0].contact_status > 0)[slips]
+    seconds = result.time[-1] - result.time[-2]
+    age = result.time[-1] - result.time[0]  # of nodes that touch from the first step on, after it
+    bound = law.bound(frame.contact_pressure[slips], 0.3, moved / seconds, age)
+    shown = first if isinstance(law, ev.AgeingFriction) else slice(None)
+    assert_allclose(frame.shear_traction[slips][shown], bound[shown], rtol=1e-5)
+
+
+def test_a_hand_lags_behind_by_its_stretch():
+    """Along x: the drive goes 0.5 mm, the bone that less the force over the stiffness."""
+    slide = ev.Slide(0.5, steps=4)
+    result = simulate(dome_scene(PRESS, slide, hand=ev.Hand(0.1)))
+    drive = np.array([0.0, 0.0, 0.125, 0.25, 0.375, 0.5])
+    assert_allclose(0.1 * (drive - result.position), result.applied_tangential_force, atol=1e-9)
+    assert result.position[-1] < 0.3
+    assert balance(result) < 1e-6
+
+
+def test_a_resolved_drive_has_the_mean_of_its_cycle_and_closed_books():
+    """A leaking gap under a square wave of 250 Hz, settled, beside the closed form of its mean."""
+    drive = {"frequency": 250.0, "waveform": "square", "gap_conductivity": 1e-8}
+    surface = ev.Display(insulator=ev.Layer(0.001, 3.9), friction=0.3)
+    given = {"surface": surface, "voltage": 100.0, "law": ev.StrongTroxel(), "roughness_gap": 0.001}
+    press = ev.Press(indentation=0.3, steps=1)
+    mean = simulate(dome_scene(press, drive=ev.Drive(**drive), **given)).electrostatic_force[-1]
+    motion = [press, ev.Wait(duration=0.016, steps=80)]
+    result = simulate(dome_scene(*motion, drive=ev.Drive(**drive, resolved=True), **given))
+    assert_allclose(result.electrostatic_force[-20:].mean(), mean, rtol=0.01)
+    went = result.leakage_dissipation + result.electrostatic_work + result.stretch_work
+    assert_allclose(result.source_work, result.field_energy + went, atol=1e-6 * result.source_work[-1])

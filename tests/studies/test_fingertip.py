@@ -1,0 +1,48 @@
+"""The study of the whole finger pad."""
+
+import numpy as np
+import pytest
+from evfem.studies import fingertip
+
+import evfem as ev
+from evfem import studies
+from evfem.contact.skin import make_skin
+from evfem.electrostatics.laws import Layers
+
+SKIN = ev.Layer(0.38, 1650.0)
+
+
+@pytest.mark.parametrize("name", ["i", "ii", "viii"])
+def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid(name):
+    """Kaczmarek's pressure over the ellipse of the lower half, by Gauss's rule in polar coordinates:
+    within 0.1 %. The stratum corneum is as thick as below the lowest point.
+    """
+    finger = ev.Fingertip.participant(name, "coarse", ridges=False)
+    a, b, c = 0.5 * finger.width, 0.5 * finger.height, 0.5 * finger.length
+    x, w = np.polynomial.legendre.leggauss(400)
+    radius, weight = 0.5 * (1.0 + x), 0.5 * w  # sin of the polar angle
+    layers = Layers.of(SKIN, ev.FILM)
+    for voltage, gap in ((2000.0, 0.5), (2000.0, 0.25)):
+        pressure = ev.Kaczmarek().traction(gap + b * (1.0 - np.sqrt(1.0 - radius**2)), voltage, layers)
+        exact = 1e3 * 2.0 * np.pi * a * c * float(weight @ (radius * pressure))
+        mesh = finger.mesh()
+        own = fingertip.force_on(finger, mesh, make_skin(mesh), ev.Kaczmarek(), voltage, gap)
+        assert own == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_areas_and_widths_and_what_would_bring_them_to_adams(tmp_path):
+    """The quick study: Adams' area is 1.6 times the pad's at 0.5 N, half the moduli give 1.4, and a
+    cross-section needs a wider pad under more load; ridges and laws order the hovering forces.
+    """
+    numbers = studies.run("fingertip", quick=True, out=tmp_path)["numbers"]
+    assert (tmp_path / "fingertip.png").stat().st_size > 10_000
+    wanted = numbers["variant.wanted_over_unchanged"]
+    assert 1.0 / numbers["verdict.smooth.gross_over_adams.0.5N"] == pytest.approx(wanted)
+    assert 1.2 < numbers["variant.all moduli x 0.5.area_over_unchanged"] < wanted < 1.8
+    assert 4.5 < numbers["width_mm.smooth.0.1N"] < numbers["width_mm.smooth.0.5N"] < 8.0
+    for law in ("kaczmarek", "strong_troxel"):
+        for case in ("HVHD", "HVLD", "LVLD"):
+            smooth, ridged = (numbers[f"{kind}.{law}.median_mN.{case}"] for kind in ("smooth", "ridged"))
+            assert 0.9 * smooth < ridged < smooth
+            assert 0.92 < numbers[f"verdict.smooth.{law}.over_closed_form.{case}"] < 1.0
