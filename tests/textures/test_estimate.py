@@ -109,6 +109,14 @@ def test_half_of_the_points_left_out_are_met_within_a_twentieth_of_their_range(r
 
 
 @pytest.mark.parametrize("ridged", [False, True])
+def test_a_reference_texture_that_is_estimated_badly_has_a_note(ridged):
+    bad = [name for name in ("eq-25", "paper", "grating-1mm", "stone") if known_error(name, ridged) > 0.15]
+    assert {"eq-25", "paper"} <= set(bad)
+    for name in bad:
+        assert estimate(reference(name), Touch(ridged)).notes, name
+
+
+@pytest.mark.parametrize("ridged", [False, True])
 def test_corrections_are_worth_having(ridged):
     database = shipped(ridged)
     alone = database.errors_of(np.tile([0.0, 1.0, 0.0], (len(database.textures), 1)))
