@@ -10,8 +10,10 @@ the drive's :math:`X_0` and the bone's :math:`x_0` with the velocity :math:`v_0`
 by backward Euler, as the tissue's viscosity and inertia. Where no time passes the spring alone acts
 and the bone comes to rest. Across the slide, the bone's height stays what the motion says.
 
-Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162 (stiffness and moving mass grow
-with the speed of the slide). In the plane all three are per mm of depth.
+Values for a finger: Balasubramanian, Pool, Vardar, arXiv:2505.11162, ten fingers that slid with 20 to
+100 mm/s under 0.2 to 0.6 N. For every mm/s the stiffness grew by 4.04 N/m, the moving mass by 3.23e-5
+kg, and the cut-off frequency of the friction, that of a first-order system, by 13.8 Hz
+(`Hand.of_finger`). In the plane all three are per mm of depth.
 """
 
 from __future__ import annotations
@@ -21,9 +23,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, check_fields, number
+from evfem.common.checks import Within, above, check_fields, number
 from evfem.contact.condensed import CondensedTangent, ExtraUnknown
 from evfem.solver.state import State
+
+#: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
+STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
 
 
 @dataclass(frozen=True)
@@ -44,6 +49,24 @@ class Hand:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @classmethod
+    def of_finger(cls, speed: float, depth: float = 10.0) -> Hand:
+        """That of a finger that slides with `speed` (mm/s) and is `depth` mm deep: what grows with the
+        speed, times the speed, as what is left at none is not in the source's summary.
+
+        The damper is our reading: a spring k and a damper c are a first-order system whose cut-off
+        frequency is k / (2 pi c), so it is the same at every speed. InputError for a speed or a depth
+        that is not above 0.
+
+        >>> hand = Hand.of_finger(20.0)
+        >>> round(hand.stiffness, 9), round(hand.mass, 12), round(hand.damping, 9)
+        (0.00808, 6.46e-08, 4.659e-06)
+        """
+        above("speed", speed, 0.0, "a speed in mm/s above 0")
+        above("depth", depth, 0.0, "a depth in mm above 0")
+        stiffness = STIFFER * speed / depth
+        return cls(stiffness, stiffness / (2.0 * np.pi * FASTER * speed), HEAVIER * speed / depth)
 
     @property
     def timed(self) -> bool:

@@ -194,3 +194,13 @@ def test_a_scene_file_says_it_and_what_cannot_be_is_refused():
         )  # fmt: skip
     with pytest.raises(InputError, match="hand"):
         slab(0.1, slid(1.0, 5))
+
+
+def test_the_hand_of_a_finger_has_the_published_slopes():
+    """4.04 N/m, 3.23e-5 kg and 13.8 Hz for every mm/s, arXiv:2505.11162; over a depth of 8 mm."""
+    hand = ev.Hand.of_finger(50.0, depth=8.0)
+    assert hand.stiffness * 8.0 == pytest.approx(4.04e-3 * 50.0)  # N/mm
+    assert hand.mass * 8.0 == pytest.approx(3.23e-5 * 1e-3 * 50.0)  # t
+    assert hand.stiffness / (2.0 * np.pi * hand.damping) == pytest.approx(13.8 * 50.0)
+    with pytest.raises(ev.InputError, match="speed"):
+        ev.Hand.of_finger(0.0)
