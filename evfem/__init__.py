@@ -75,6 +75,7 @@ _MODULES = {
     "electrostatics": "electrostatics",
     "encoding": "electrostatics.encoding",
     "export": "export",
+    "fieldfiles": "fieldfiles",
     "forces": "electrostatics.forces",
     "materials": "tissue.laws",
     "meshfile": "mesh.file",

@@ -2,6 +2,7 @@
 
 from evfem import electrostatics as electrostatics
 from evfem import export as export
+from evfem import fieldfiles as fieldfiles
 from evfem import plotting as plotting
 from evfem import protocols as protocols
 from evfem import reference as reference

@@ -12,8 +12,13 @@ contact, smooth and with gaps of 1 and 5 um between rough faces. Expected: far m
 columns' pull where the faces are smooth, a few per cent where they are rough.
 
 Fingers. The hovering finger of Table 1 and the pressed one of Fig. 11, with and without ridges.
-Expected: the ridged finger gains more than the smooth one, so the share of its ridges rises, and
-Strong and Troxel's law moves further away from the measured forces, which lie below it.
+Expected: the ridged finger gains more than the smooth one, so the share of its ridges rises, and so
+does the share of the attraction that acts through the air beside the contact.
+
+Participants. The closed force (8a) of the eleven hovering fingers, times what the full field below
+their rigid, ridged cross-section has over the column law below the smooth one, beside the measured
+forces. Expected: next to nothing at 0.25 and 0.5 mm, where ridges weaken the pull and their
+fringes give part of it back, so the factor of two between (8a) and the measurement remains.
 
 Electrodes. A smooth rigid finger hovers over the edge of an electrode, and over stripes of either
 sign with gaps of a tenth of their pitch. Expected: half of the pull at the edge, and a force back
@@ -24,6 +29,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,9 +39,10 @@ import evfem as ev
 from evfem.electrostatics.columns import Columns
 from evfem.electrostatics.grading import graded
 from evfem.electrostatics.rigid import rigid_field
-from evfem.simulation.model import make_model
+from evfem.simulation.model import Model, make_model
 
-from .common import CASES, Series, Study, new_figure, panel_letter
+from .common import CASES, Series, Study, new_figure, panel_letter, participants
+from .measured import participant_forces
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -51,6 +58,9 @@ LOAD = 0.05
 ASSUMPTIONS = {
     "ridges": "conducting, rigid, endless; the law is Strong and Troxel's, the columns' exact limit",
     "skin": "a layer of constant thickness over living tissue at ground, walls of slope 5",
+    "participants": "rigid; cross-section held horizontally, the ridges of Table 2 on every finger",
+    "air share": "of the nodes that do not touch, in the total attraction; Strong and Troxel's law, whose "
+    "share is smaller than that of Kaczmarek's in Fig. 11",
     "fingers": "plane strain, Strong and Troxel's law, direction normal, deformable, flanks by the law",
 }
 
@@ -68,8 +78,8 @@ def ridge_error(shape: str, insulator: str, gap: float, number: int) -> dict[str
     slab = INSULATORS[insulator]
     full = rigid_field(x, gap + height, slab=slab)
     layers = ev.Layers.of(slab)
-    fine = np.linspace(0.0, PITCH, 20001)
-    columns = PITCH * np.mean(ev.StrongTroxel().traction(gap + np.interp(fine, x, height), 1.0, layers)[1:])
+    _, fine = ridge(shape, 20001)
+    columns = PITCH * np.mean(ev.StrongTroxel().traction(gap + fine, 1.0, layers)[1:])
     low, high = (100.0 * (bound / full.capacitance - 1.0) for bound in full.bounds)
     error = 100.0 * (columns / full.force - 1.0)
     return {"force_N_per_mm": full.force, "columns_percent": error, "low_percent": low, "high_percent": high}
@@ -125,6 +135,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
                 series.append(Series(name, gaps, [one[key] for one in found], "% over mm"))
     numbers |= {f"spreading.{name}": spreading(rough) for name, rough in ROUGH.items()}
     numbers |= finger_numbers(quick)
+    numbers |= participant_numbers(quick)
     on_electrodes, over_edge = electrode_numbers(quick)
     numbers |= on_electrodes
     series += over_edge
@@ -134,23 +145,75 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 
 def finger_numbers(quick: bool) -> dict[str, float]:
-    """Forces of whole fingers in mN/mm, column by column and by the full field, and their ratios."""
+    """Forces of whole fingers in mN/mm, column by column and by the full field, and their ratios; of
+    the pressed ones the share that acts on open nodes.
+    """
     numbers: dict[str, float] = {}
     for name, scene in finger_scenes(quick).items():
-        force = {
-            kind: 1e3 * float(ev.simulate(replace(scene, field=kind)).electrostatic_force[-1])
-            for kind in ("local", "full")
-        }
+        force = {}
+        for kind in ("local", "full"):
+            one = replace(scene, field=kind)
+            result = ev.simulate(one)
+            force[kind] = 1e3 * float(result.electrostatic_force[-1])
+            if name.endswith("pressed"):
+                numbers[f"finger.{name}.{kind}_air_share"] = air_share(one, result)
         numbers |= {f"finger.{name}.{kind}_mN_per_mm": value for kind, value in force.items()}
         numbers[f"finger.{name}.full_over_local"] = force["full"] / force["local"]
     return numbers
 
 
+def air_share(scene: ev.Scene, result: ev.Result) -> float:
+    """Share of the attraction in a run's last state that acts on nodes that do not touch."""
+    model, frame = make_model(scene), result.frames[-1]
+    pad = model.pad.nodes
+    position = model.mesh.points[pad] + frame.displacement[pad]
+    touching = frame.contact_status[pad] > 0
+    assert model.attraction is not None
+    pull = model.attraction.forces(position, float(result.voltage[-1]), touching)[:, 1]
+    return float(pull[~touching].sum() / pull.sum())
+
+
+def participant_numbers(quick: bool) -> dict[str, float]:
+    """Medians in mN of the measured forces, of (8a) and of (8a) with ridges and full field."""
+    table, closed = participants(), participant_forces()
+    names = table["participant"][: 3 if quick else None]
+    numbers = {}
+    for case, (_, gap) in CASES.items():
+        measured = table[case][: len(names)]
+        law = closed["strong_troxel", case][: len(names)]
+        gain = np.array([full_over_columns(str(name), gap) for name in names])
+        numbers |= {
+            f"participants.{key}_median_mN.{case}": float(np.median(values))
+            for key, values in (("measured", measured), ("law", law), ("full", law * gain))
+        }
+        numbers[f"participants.gain_median.{case}"] = float(np.median(gain))
+        numbers[f"participants.full_over_measured.{case}"] = float(np.median(law * gain / measured))
+    return numbers
+
+
+@cache
+def full_over_columns(participant: str, gap: float) -> float:
+    """Pull of the full field below the ridged finger over that of the column law below the smooth one."""
+    pull = {}
+    for ridges in (True, False):
+        finger = replace(ev.FingerPad.participant(participant, resolution="coarse"), ridges=ridges)
+        model, position = rigid_pad(finger, gap)
+        attraction = model.attraction
+        forces = attraction.forces if ridges else attraction.column_forces
+        pull[ridges] = forces(position, 1.0, None)[:, 1].sum()
+    return float(pull[True] / pull[False])
+
+
+def rigid_pad(finger: ev.FingerPad, gap: float) -> tuple[Model, Any]:
+    """A finger under the full field, and its undeformed pad (P, 2) at `gap` mm above the display."""
+    model = make_model(_scene(finger, 1000.0, ev.Hover(gap=gap)))
+    return model, model.mesh.points[model.pad.nodes] + model.bone(0.0, -gap)
+
+
 def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
     """A hovering outline over an electrode's edge and over stripes, relative to one without end."""
     finger = ev.FingerPad(ridges=False, resolution="coarse" if quick else "medium")
-    model = make_model(_scene(finger, 1000.0, ev.Hover(gap=0.1)))
-    points = model.mesh.points[model.pad.nodes] + model.bone(0.0, -0.1)
+    model, points = rigid_pad(finger, 0.1)
 
     def force(rows: Any, floating: bool = False) -> Any:
         surface = replace(model.surface, electrodes=rows)
@@ -176,8 +239,8 @@ def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
 
 
 def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
-    figure = new_figure(3.6, 9.5)
-    axes = figure.subplots(1, 4, width_ratios=(1.0, 1.0, 1.2, 1.0))
+    figure = new_figure(3.6, 12.0)
+    axes = figure.subplots(1, 5, width_ratios=(1.0, 1.0, 1.2, 1.0, 1.0))
     for axis, insulator, letter in zip(axes, INSULATORS, "ab", strict=False):
         for shape, colour in (("t7", "C0"), ("sinus", "C1")):
             own = {s.name.split()[-1]: s for s in series if s.name.startswith(f"{shape} {insulator} ")}
@@ -206,4 +269,11 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
     axes[3].legend(fontsize=7, loc="upper left")
     panel_letter(axes[3], "d")
+    for k, (key, label) in enumerate((("measured", "measured"), ("law", "(8a)"), ("full", "full field"))):
+        heights = [numbers[f"participants.{key}_median_mN.{case}"] for case in CASES]
+        axes[4].bar(np.arange(len(CASES)) + 0.27 * (k - 1), heights, 0.25, label=label)
+    axes[4].set_xticks(range(len(CASES)), list(CASES))
+    axes[4].set_ylabel("participants' median (mN)")
+    axes[4].legend(fontsize=7)
+    panel_letter(axes[4], "e")
     return figure

@@ -42,8 +42,8 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction fullfield signorini follower "
-        "condensed coulomb sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield elimination signorini "
+        "follower condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -82,7 +82,7 @@ ROOMS = {
 GROUND, MIDDLE, EDGES = (
     ("errors", "protocols", "tensor"),
     ("reference",),
-    ("export", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
+    ("export", "fieldfiles", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
 #: rooms that do not know each other although both stand above the same ones

@@ -48,6 +48,8 @@ SHORTER, LONGER         and so does a time step outside these multiples of the o
                         made for
 ALIKE                   below this residual iterations with a new tangent each are combined too   thin
                                                                                                   insulators
+STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
+                        the last ones, have no residual below those before
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
@@ -59,6 +61,8 @@ DISC_FALL               where they come again, a step after which the forces mis
                         more than this fraction of before is shortened
 DISC_ROUNDS             so often before the contact problem is given up                           discs
 DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
+FEW_SOLVES              solves of an active set after which the drops of the attraction are       attraction
+                        eliminated from it
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
@@ -121,9 +125,11 @@ WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
+STUCK = 12
 MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
+FEW_SOLVES = 8
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 STABLE = 0.9

@@ -36,6 +36,10 @@ Algorithm (`solve_contact`), a primal-dual active set::
             give up where that goes round too
     start again from all nodes sticking, then from all open, before giving up
 
+After a few solves the drops of the attraction are taken out of the equations
+(`evfem.contact.elimination`), and the closed nodes are what is left to solve for; the solution that
+is returned is always one of the whole equations.
+
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
 slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
 other slip) when it moves along its own friction. It passes through slip between open and stick:
@@ -59,12 +63,14 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
+from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, ROUNDING, STABLE
+from evfem.contact.elimination import Elimination, Motions
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
@@ -155,6 +161,23 @@ class ContactProblem:
         """
         return _solve_statuses(self, status)
 
+    @cached_property
+    def elimination(self) -> Elimination | None:
+        """The problem without the drops of the attraction; None where it has none, or rough faces
+        make them depend on the contact forces.
+        """
+        attraction, extra, none = self.attraction, self.extra_unknowns, np.zeros((2 * self.size, 0))
+        if attraction is None or attraction.roughness is not None or not attraction.negative_stiffness.any():
+            return None
+        bone = (none, none.T, np.zeros((0, 0)), np.zeros(0))
+        if extra is not None:
+            bone = (extra.columns, extra.rows, extra.pivot, extra.right)
+        whole = Motions(self.start, self.compliance, *bone)
+        try:
+            return Elimination.of(whole, attraction.negative_stiffness, attraction.reference_gap)
+        except np.linalg.LinAlgError:
+            return None
+
 
 @dataclass(frozen=True)
 class ContactSolution:
@@ -200,14 +223,19 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
     many = ACTIVE_SET_LIMIT // 3
     seen: set[bytes] = set()
-    first = False
+    first = whole = False
     for solves in range(1, most + 1):
-        force, attraction_drop, extra = problem.solved(status)
+        fewer = not whole and solves > FEW_SOLVES and problem.elimination is not None
+        solved = _solve_closed if fewer else _solve_statuses
+        force, attraction_drop, extra = solved(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
         if problem.extra_unknowns is not None:
             state = state + problem.extra_unknowns.columns @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
         changes = np.flatnonzero(wanted != status)
+        if fewer and not changes.size:
+            whole = True
+            continue
         if not changes.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
         again = status.tobytes() in seen
@@ -350,6 +378,40 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     force[k:] += ratio * force[:k]
     if problem.cohesion is not None:
         force[k:] += problem.cohesion * against
+    return force, drop, x[rows.size :]
+
+
+def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
+    """The same as `_solve_statuses`, with the drops of the attraction eliminated."""
+    elimination, attraction, k = problem.elimination, problem.attraction, problem.size
+    assert elimination is not None
+    assert attraction is not None
+    left, is_open = elimination.left, status == OPEN
+    active, stick = np.flatnonzero(~is_open), np.flatnonzero(status == STICK)
+    against = (status == BACKWARD).astype(float) - (status == FORWARD)
+    ratio = problem.friction * against
+    # what a contact force is above the force that pushes beside the drops
+    above = attraction.gain_on_closing - attraction.negative_stiffness * attraction.reference_gap
+    push = np.concatenate([np.zeros(k), ratio * above])
+    if problem.cohesion is not None:
+        push[k:] += problem.cohesion * against
+    rows = np.concatenate([active, k + stick])
+    matrix, row = left.compliance[np.ix_(rows, rows)], left.rows[:, rows]
+    matrix[:, : active.size] += left.compliance[np.ix_(rows, k + active)] * ratio[active]
+    row[:, : active.size] += left.rows[:, k + active] * ratio[active]
+    matrix = np.block([[matrix, left.columns[rows]], [row, left.pivot]])
+    right = np.append(-left.start[rows] - left.compliance[rows] @ push, left.right - left.rows @ push)
+    try:
+        x = np.linalg.solve(matrix, right)
+    except np.linalg.LinAlgError as error:
+        raise ContactNotSolved(str(error)) from error
+    push[rows] += x[: rows.size]
+    push[k + active] += ratio[active] * x[: active.size]
+    drop = np.zeros(2 * k)
+    drop[elimination.attracted] = elimination.drops(push, x[rows.size :])
+    drop[active] = -attraction.gain_on_closing[active]
+    force = push
+    force[active] += above[active]
     return force, drop, x[rows.size :]
 
 

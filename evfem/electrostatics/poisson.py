@@ -79,15 +79,25 @@ class Potential:
         """Gradient (2, ...) at places (...) in mm; above the air's upper end, at that end."""
         return self._sampled(x, y, 1)
 
+    def in_cells(self) -> Floats:
+        """Gradient (2, m) in the middle of each cell."""
+        cells = np.arange(self.space.mesh.cells.shape[1])
+        return self._shaped(cells, np.full((2, cells.size), 0.5), 1)
+
     def _sampled(self, x: Floats, y: Floats, order: int) -> Floats:
         cells, local = self.space.mesh.located(x.ravel(), y.ravel())
+        found = self._shaped(cells, local, order)
+        return found.reshape(((2,) if order else ()) + x.shape)
+
+    def _shaped(self, cells: Ints, local: Floats, order: int) -> Floats:
+        """Values (n,) or gradients (2, n) in cells (n,) at coordinates (2, n) in them."""
         basis = self.space.basis
         total = 0.0
         for k in range(basis.Nbfun):
             shape = basis.elem.gbasis(basis.mapping, local[:, :, None], k, tind=cells)[0]
             part = shape.grad if order else np.asarray(shape)
             total = total + self.phi[basis.element_dofs[k, cells]] * part[..., 0]
-        return np.asarray(total).reshape(((2,) if order else ()) + x.shape)
+        return np.asarray(total)
 
 
 class Space:

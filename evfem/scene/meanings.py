@@ -212,7 +212,7 @@ SOLVER = {
     "penalty_normal": Text("N/mm3", "with contact = penalty"),
     "penalty_tangential": Text("N/mm3", "with contact = penalty and friction"),
     "tolerance": Text("", "largest free residual over the largest reaction, of every step"),
-    "threads": Text("", "of linear algebra"),
+    "threads": Text("", "of the factorisation"),
     "symmetry": Text("", "whether a scene that is its own mirror image is computed from its right half"),
     "strategy": Text("", "how hard steps are tried"),
 }

@@ -100,8 +100,9 @@ def simulate(
         scene = scene_at(scene)
     import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
 
-    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin
-    with threadpool_limits(limits=scene.solver.threads), notices.shown(progress):
+    # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
+    # scene's threads are those of the factorisation
+    with threadpool_limits(limits=1), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
 
@@ -115,14 +116,16 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         run = Run(scene, resume)
         _tell(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
-        for request in run.requests():
-            frame = run.advance(request)
-            reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
-            bar.update(1)
-            LOG.debug("step %d of %d", len(run.rows), total)
-            if reasons:
-                run.keep_last_frame()
-                break
+        # and of the dense compliance of a skin in three dimensions, which has thousands of rows
+        with threadpool_limits(limits=scene.solver.threads if run.model.mesh.dim == 3 else None):
+            for request in run.requests():
+                frame = run.advance(request)
+                reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)
+                bar.update(1)
+                LOG.debug("step %d of %d", len(run.rows), total)
+                if reasons:
+                    run.keep_last_frame()
+                    break
     finally:
         bar.close()
     result = run.result()

@@ -11,8 +11,8 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself
-        give up if the residual grows or is not finite, or after the strategy's iterations, unless
-            their fall promises the end soon
+        give up if the residual grows or is not finite, or goes to and fro, or after the strategy's
+            iterations, unless their fall promises the end soon
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
@@ -30,7 +30,7 @@ from typing import Protocol
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, MORE, SMALLEST_FORCE
+from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, MORE, SMALLEST_FORCE, STUCK
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
@@ -265,6 +265,8 @@ class Equilibrium(Statics):
                 return self._settled(old, self.body.accepted(old, state), target)
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
+            if self._stuck(history):
+                break
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
@@ -284,6 +286,13 @@ class Equilibrium(Statics):
             return False
         rate = (history[-1] / history[-1 - window]) ** (1.0 / window)
         return history[-1] * rate ** (most - len(history)) < self.tolerance
+
+    @staticmethod
+    def _stuck(history: list[float]) -> bool:
+        """Whether the last residuals (i,) are none below those before: iterations that go to and
+        fro, of which more are in vain where a shorter part ends soon.
+        """
+        return len(history) > 2 * STUCK and min(history[-STUCK:]) >= min(history[:-STUCK])
 
     def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)

@@ -23,6 +23,7 @@ Where contact has no solution under an older tangent, the iteration is done agai
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -54,6 +55,9 @@ from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
 from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Record, Reusable, State, StepFailed
 from evfem.tissue.body import Body
+
+#: whether a travel of the bone is searched for that the contact problem does not settle
+Search = Literal["never", "if needed", "only"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,12 +192,13 @@ class FactorisedBody:
             after = self._linear_step(old, state, target, balance)
         except ContactNotSolved:
             # an older tangent may ask for what no contact can give
-            if not self.linearisation.made_at(state):
+            older = not self.linearisation.made_at(state)
+            if older:
                 self.linearisation.factorise(state)
             elif not target.height.free:
                 raise
             self._anderson.reset()
-            after = self._linear_step(old, state, target, balance, search=True)
+            after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         bone = after.bone.copy()
@@ -204,20 +209,22 @@ class FactorisedBody:
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _linear_step(
-        self, old: State, state: State, target: Target, balance: Balance, search: bool = False
+        self, old: State, state: State, target: Target, balance: Balance, search: Search = "never"
     ) -> State:
         """Solve the contact problem of the linearised body, move, shorten where cells would
-        collapse; with `search`, a travel of the bone that the problem cannot settle is searched
-        for.
+        collapse; `search` says whether a travel of the bone that the problem cannot settle is
+        searched for, or whether it is known that it cannot.
         """
         factor = self.linearisation.factor
         saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
         try:
+            if search == "only":
+                raise ContactNotSolved("known from the same linear step")
             driven = self._driven(step, state, target)
             found, bone = self._limited(step, driven.solution, state, target)
         except ContactNotSolved:
-            if not (search and step.unknowns):
+            if search == "never" or not step.unknowns:
                 raise
             found, bone = self._searched(step)
             driven = DrivenStep(found)

@@ -26,7 +26,8 @@ from evfem.scene.file import read_text, tables_of
 from evfem.scene.keys import SceneTable, Table, at, parse, shown
 from evfem.scene.scene import Scene
 from evfem.scene.written import VERSION, dump
-from evfem.simulation.result import COLUMNS, SPATIAL
+from evfem.simulation.history import SPATIAL
+from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
 
 #: most points of a sweep

@@ -83,7 +83,10 @@ def reduced(texture: Texture) -> Reduced:
         found = [length / (1 + int(np.argmax(power + second)))]
     else:
         found = list(np.geomspace(length / 1.5, 8.0 * length / x.size, TRIED))
-    return max((_harmonics(x, height, wavelength) for wavelength in found), key=lambda one: one.explain)
+    tried = [_harmonics(x, height, wavelength) for wavelength in found]
+    # of twice the wavelength the second harmonic is the wave itself
+    first = [one for one in tried if np.hypot(one.in_phase, one.in_quadrature) <= 1.0]
+    return max(first or tried, key=lambda one: one.explain)
 
 
 def _even(texture: Texture) -> tuple[Floats, Floats]:

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from ..common import Series
-from .problem import errors, quantities
+from .problem import GIVEN, Way, errors, quantities
+from .run import HALF
 
 #: with whom evfem is compared
 PEERS = ("felupe", "fenicsx", "getfem")
@@ -21,6 +22,8 @@ ELEMENTS = {"q1": "q1", "q2p1": "q2"}
 CONTENDERS = tuple(
     who for own, its in ELEMENTS.items() for who in (("evfem", own), *((peer, its) for peer in PEERS))
 )
+#: evfem from half of a symmetric scene, and the scenes that are
+HALVES, SYMMETRIC = (("evfem", f"q1{HALF}"), ("evfem", f"q2p1{HALF}")), "AC"
 #: what is measured of a run
 MEASURED = (
     "cpu_s",
@@ -47,16 +50,18 @@ class Run:
     scene: str
     level: int
     measured: Mapping[str, Any]
+    way: Way = GIVEN
 
     @property
     def key(self) -> str:
         """Begin of its names among the numbers."""
-        return f"{self.scene}.L{self.level}.{self.package}_{self.element}"
+        steps = "" if self.way == GIVEN else f"_{self.way}_steps"
+        return f"{self.scene}.L{self.level}.{self.package}_{self.element}{steps}"
 
     @property
     def forces(self) -> dict[str, float]:
         """What is compared, N/mm."""
-        return quantities(self.scene, self.measured["history"])
+        return quantities(self.scene, self.measured["history"], self.way)
 
     def error(self, of: str = "") -> float:
         """The largest deviation of forces whose names begin so from the reference, in per cent."""
@@ -76,7 +81,8 @@ def numbers(runs: list[Run], cold: Mapping[str, Mapping[str, float]]) -> dict[st
         deviations = errors(run.scene, run.forces)
         found |= {f"{run.key}.error_percent.{name}": value for name, value in deviations.items()}
     found |= {f"{key}.{name}": value for key, costs in cold.items() for name, value in costs.items()}
-    return found | on_the_same_nodes(runs) | agreement(runs) | at_equal_error(runs)
+    given = [run for run in runs if run.way == GIVEN]
+    return found | on_the_same_nodes(given) | agreement(given) | at_equal_error(given)
 
 
 def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
@@ -87,7 +93,8 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
     for own in (run for run in runs if run.package == "evfem"):
         place, fastest = f"{own.scene}.L{own.level}", []
         for run in runs:
-            same = (run.scene, run.level, run.element) == (own.scene, own.level, ELEMENTS[own.element])
+            element = ELEMENTS[own.element.removesuffix(HALF)]
+            same = (run.scene, run.level, run.element) == (own.scene, own.level, element)
             if run.package == "evfem" or not same:
                 continue
             for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):
@@ -154,7 +161,11 @@ def series(runs: list[Run]) -> list[Series]:
     found = []
     for scene in JUDGED:
         for package, element in CONTENDERS:
-            mine = [r for r in runs if (r.package, r.element, r.scene) == (package, element, scene)]
+            mine = [
+                r
+                for r in runs
+                if r.way == GIVEN and (r.package, r.element, r.scene) == (package, element, scene)
+            ]
             if mine:
                 x, y = [r.measured["cpu_s"] for r in mine], [r.error() for r in mine]
                 found.append(Series(f"{scene} {package} {element}", x, y, "% over CPU s"))

@@ -19,7 +19,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from .problem import write
+from .problem import GIVEN, Way, write
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ def missing() -> list[str]:
 
 
 def run_once(
-    package: str, element: str, scene: str, level: int, compiled: Path | None = None
+    package: str, element: str, scene: str, level: int, compiled: Path | None = None, way: Way = GIVEN
 ) -> dict[str, Any]:
     """One measured run in a new process; {"failed": its last words} if it fails.
 
@@ -92,11 +92,11 @@ def run_once(
     with TemporaryDirectory() as folder:
         if PACKAGES[package].script:
             problem = Path(folder) / "problem.npz"
-            write(problem, scene, element, level)
+            write(problem, scene, element, level, way)
             words = [python, str(Path(__file__).with_name(PACKAGES[package].script)), str(problem)]
         else:
             module = f"{__package__}.run"
-            words = [python, "-P", "-m", module, package, element, scene, str(level)]
+            words = [python, "-P", "-m", module, package, element, scene, str(level), way.words]
         done = subprocess.run(words, env=variables, capture_output=True, text=True)
     if done.returncode:
         return {"failed": (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]}

@@ -8,6 +8,7 @@ Scene A: frictionless, indentation 0.1 ... 1.5 mm; B: friction 0.3, then 3 mm of
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,36 @@ STRATUM_CORNEUM, INSULATOR = Layer(0.38, 1650.0), Layer(0.09, 3.35)
 LAYERS = Layers.of(STRATUM_CORNEUM, INSULATOR)
 TOLERANCE = 1e-8  # largest free residual over the largest force on the bone
 
+
+@dataclass(frozen=True)
+class Way:
+    """How the motion is followed: steps of the press and of the slide, and the tolerance.
+
+    >>> str(Way()), str(Way(3, 6, 1e-6))
+    ('15+30', '3+6')
+    """
+
+    press: int = 15
+    slide: int = 30
+    tolerance: float = TOLERANCE
+
+    def __str__(self) -> str:
+        return f"{self.press}+{self.slide}"
+
+    @classmethod
+    def of(cls, words: str) -> Way:
+        """From `words`."""
+        press, slide, tolerance = words.split(",")
+        return cls(int(press), int(slide), float(tolerance))
+
+    @property
+    def words(self) -> str:
+        """As an argument of a command."""
+        return f"{self.press},{self.slide},{self.tolerance:g}"
+
+
+#: as the comparison on the same nodes has it
+GIVEN = Way()
 #: what was converged with exact contact and quadratic elements of two packages that agree, N/mm
 REFERENCE: Mapping[str, Mapping[str, float]] = {
     "A": {"Fn_at_0.5": 0.07098, "Fn_at_1.0": 0.24112, "Fn_at_1.5": 0.54337},
@@ -55,7 +86,7 @@ def scene_mesh(element: str, level: int) -> Mesh:
     return benchmark_mesh(level, 1 if element == "q1" else 2, same_nodes=element != "q1")
 
 
-def write(target: Path, scene: str, element: str, level: int) -> None:
+def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) -> None:
     """The scene as a file of arrays for programs without evfem; `apart.Problem` says what is in
     it.
     """
@@ -71,35 +102,52 @@ def write(target: Path, scene: str, element: str, level: int) -> None:
         lmbda=lame[1],
         pad=mesh.node_sets["pad"],
         bone=mesh.node_sets["bone"],
-        path=path(scene),
+        path=path(scene, way),
         plane=PLANE,
         friction=FRICTION[scene],
         pull=0.5 * eps_0 * VOLTAGE[scene] ** 2,
         layers=np.array([LAYERS.reduced, LAYERS.thickness]),
-        tolerance=TOLERANCE,
+        tolerance=way.tolerance,
     )
 
 
-def path(scene: str) -> Floats:
+def path(scene: str, way: Way = GIVEN) -> Floats:
     """Position and indentation of the bone (steps, 2) in mm after every step."""
-    press = [[0.0, 0.1 * k] for k in range(1, 16)]
-    slide = [[0.1 * k, 1.5] for k in range(1, 31)] if scene == "B" else []
+    press = [[0.0, 1.5 * k / way.press] for k in range(1, way.press + 1)]
+    slide = [[3.0 * k / way.slide, 1.5] for k in range(1, way.slide + 1)] if scene == "B" else []
     return np.array(press + slide)
 
 
-def quantities(scene: str, history: Any) -> dict[str, float]:
-    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm."""
+def quantities(scene: str, history: Any, way: Way = GIVEN) -> dict[str, float]:
+    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm; where
+    the steps of the `way` end there.
+    """
     normal, tangential, electrostatic = np.asarray(history, dtype=float).T
-    found = {f"Fn_at_{d}": normal[round(10 * d) - 1] for d in (0.5, 1.0, 1.5)}
+    pressed = {d: place for d in (0.5, 1.0, 1.5) if (place := _end(way.press, d / 1.5)) is not None}
+    found = {f"Fn_at_{d}": normal[place] for d, place in pressed.items()}
     if scene == "B":
-        slide = np.abs(tangential[15:])
-        found |= {f"Ft_after_{s}": slide[round(10 * s) - 1] for s in (0.1, 0.5, 3.0)}
-        found |= {"Fn_after_3.0": normal[-1], "Ft_mean_2_to_3": np.mean(slide[19:])}
+        slide = np.abs(tangential[way.press :])
+        slid = {s: place for s in (0.1, 0.5, 3.0) if (place := _end(way.slide, s / 3.0)) is not None}
+        found |= {f"Ft_after_{s}": slide[place] for s, place in slid.items()}
+        found |= {"Fn_after_3.0": normal[-1]}
+        if way.slide == GIVEN.slide:
+            found |= {"Ft_mean_2_to_3": np.mean(slide[19:])}
     if scene == "C":
-        found |= {f"Fe_at_{d}": electrostatic[round(10 * d) - 1] for d in (0.5, 1.0, 1.5)}
+        found |= {f"Fe_at_{d}": electrostatic[place] for d, place in pressed.items()}
     return {key: float(value) for key, value in found.items()}
+
+
+def _end(steps: int, share: float) -> int | None:
+    """Which of the steps of a motion ends at this share of it; None where none does.
+
+    >>> _end(15, 0.5 / 1.5), _end(6, 0.1 / 3.0)
+    (4, None)
+    """
+    place = share * steps
+    return round(place) - 1 if abs(place - round(place)) < 1e-9 else None
 
 
 def errors(scene: str, found: Mapping[str, float]) -> dict[str, float]:
     """Deviation from the reference in per cent."""
-    return {key: 100.0 * (found[key] / value - 1.0) for key, value in REFERENCE[scene].items()}
+    reference = REFERENCE[scene]
+    return {key: 100.0 * (found[key] / reference[key] - 1.0) for key in reference if key in found}

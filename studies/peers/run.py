@@ -1,5 +1,5 @@
 """One measured run of the press-and-slide benchmark:
-`python -m evfem.studies.peers.run evfem q1 A 1`.
+`python -m evfem.studies.peers.run evfem q1 A 1 15,30,1e-8`.
 
 Prints a line of JSON: forces after every step, iterations, CPU and wall seconds from the mesh to
 the last step without the imports, CPU seconds of the whole process, resident memory (MB) after the
@@ -23,35 +23,41 @@ from evfem.scene.scene import Output, Scene, Solver
 from .apart import measured
 from .problem import (
     FRICTION,
+    GIVEN,
     INSULATOR,
     MATERIALS,
     PLANE,
     STRATUM_CORNEUM,
-    TOLERANCE,
     VOLTAGE,
+    Way,
     scene_mesh,
 )
+
+#: ending of an element's name where evfem may use the symmetry of a scene
+HALF = "-half"
 
 #: what evfem would import while it runs
 LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "scipy.sparse.linalg")
 
 
-def evfem_scene(scene: str, element: str, level: int) -> Scene:
-    """The scene for evfem."""
+def evfem_scene(scene: str, element: str, level: int, way: Way = GIVEN) -> Scene:
+    """The scene for evfem; of an element like q1-half from half of the mesh."""
     from evfem.electrostatics.laws import Kaczmarek
 
     electrical = Electrical(STRATUM_CORNEUM.thickness, STRATUM_CORNEUM.eps_r)
-    finger = MeshedFinger(scene_mesh(element, level), MATERIALS, electrical)
+    name = element.removesuffix(HALF)
+    finger = MeshedFinger(scene_mesh(name, level), MATERIALS, electrical)
     surface = Display(insulator=INSULATOR, friction=FRICTION[scene], y=PLANE)
-    motion: list[Any] = [Press(indentation=1.5, steps=15)]
+    motion: list[Any] = [Press(indentation=1.5, steps=way.press)]
     if scene == "B":
-        motion.append(Slide(distance=3.0, steps=30))
+        motion.append(Slide(distance=3.0, steps=way.slide))
     law = Kaczmarek() if VOLTAGE[scene] else None
-    solver, output = Solver(element=element, tolerance=TOLERANCE), Output(every=1000)
-    return Scene(finger, surface, law, VOLTAGE[scene], motion, solver=solver, output=output)
+    solver = Solver(element=name, tolerance=way.tolerance, symmetry=name != element)
+    how: dict[str, Any] = {"solver": solver, "output": Output(every=1000)}
+    return Scene(finger, surface, law, VOLTAGE[scene], motion, **how)
 
 
-def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
+def _evfem() -> Callable[..., dict[str, Any]]:
     for name in LATE:
         import_module(name)
     from evfem.simulation.run import simulate
@@ -60,8 +66,8 @@ def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
     if find_spec("pypardiso"):
         pardiso_library()
 
-    def solve(scene: str, element: str, level: int) -> dict[str, Any]:
-        result = simulate(evfem_scene(scene, element, level))
+    def solve(scene: str, element: str, level: int, way: Way) -> dict[str, Any]:
+        result = simulate(evfem_scene(scene, element, level, way))
         columns = (result.normal_force, result.tangential_force, result.electrostatic_force)
         record = result.provenance["solver"]
         history = [list(map(float, row)) for row in zip(*columns, strict=True)]
@@ -70,7 +76,10 @@ def _evfem() -> Callable[[str, str, int], dict[str, Any]]:
     return solve
 
 
-def _felupe() -> Callable[[str, str, int], dict[str, Any]]:
+def _felupe() -> Callable[..., dict[str, Any]]:
+    from evfem.solver.condensation import pardiso_library
+
+    pardiso_library()  # tells pypardiso where the library is
     from .with_felupe import solve
 
     return solve
@@ -79,11 +88,11 @@ def _felupe() -> Callable[[str, str, int], dict[str, Any]]:
 PACKAGES = {"evfem": _evfem, "felupe": _felupe}
 
 
-def run(package: str, element: str, scene: str, level: int) -> dict[str, Any]:
+def run(package: str, element: str, scene: str, level: int, way: Way = GIVEN) -> dict[str, Any]:
     """Import what is needed, then run and measure."""
     solve = PACKAGES[package]()
-    return measured(lambda: solve(scene, element, level))
+    return measured(lambda: solve(scene, element, level, way))
 
 
 if __name__ == "__main__":
-    print(json.dumps(run(*sys.argv[1:4], int(sys.argv[4]))))
+    print(json.dumps(run(*sys.argv[1:4], int(sys.argv[4]), Way.of(sys.argv[5]))))

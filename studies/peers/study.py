@@ -21,9 +21,11 @@ from typing import Any
 from evfem.common.storage import write_text
 
 from ..common import Study, make_folder
-from .evaluation import CONTENDERS, Run, histories, numbers, series
+from .evaluation import CONTENDERS, HALVES, SYMMETRIC, Run, histories, numbers, series
 from .hosts import PACKAGES, missing, run_once
-from .problem import TOLERANCE
+from .problem import GIVEN, TOLERANCE, Way
+from .race import FEWER, LEVELS
+from .race import numbers as race
 from .shown import draw, page, table
 
 #: level -> scenes and rounds
@@ -58,6 +60,9 @@ ASSUMPTIONS = {
     "-0.6 %) it is the one that quadratic cells on L2 reproduce (-0.02 %): its error is no independent check",
     "equal_error": "CPU seconds between the levels of a curve, straight in the logarithms; a goal that the "
     "coarsest level already meets costs that level; no extrapolation to finer ones",
+    "race": "F_n of A and F_t after 3 mm of B to 0.1 %: each package with the fastest of 15+30 steps (press "
+    "and slide) at a tolerance of 1e-8 and of 5+10 and 3+6 at 1e-6, interpolated between the levels",
+    "half": "evfem from half of the mesh (symmetry), which the others could do too",
     "tolerance": TOLERANCE,
     "finest": f"no runs above these levels, where they take several times as long as others: {dict(FINEST)}",
     "threads": 1,
@@ -65,24 +70,30 @@ ASSUMPTIONS = {
 
 
 def compete(
-    plan: Mapping[int, tuple[str, int]], present: Iterable[tuple[str, str]], compiled: Path | None = None
+    plan: Mapping[int, tuple[str, int]],
+    present: Iterable[tuple[str, str]],
+    compiled: Path | None = None,
+    way: Way = GIVEN,
 ) -> tuple[list[Run], dict[str, str]]:
     """Every contender in turn, round after round: the best runs, and why others failed."""
     present = list(present)
     runs, failed = [], {}
     for level, (scenes, rounds) in plan.items():
-        contenders = [who for who in present if level <= FINEST.get(who[0], level)]
+        able = [who for who in present if level <= FINEST.get(who[0], level)]
         for scene in scenes:
-            tries = [[run_once(*who, scene, level, compiled) for who in contenders] for _ in range(rounds)]
+            contenders = [who for who in able if who not in HALVES or scene in SYMMETRIC]
+            tries = [
+                [run_once(*who, scene, level, compiled, way) for who in contenders] for _ in range(rounds)
+            ]
             for who, found in zip(contenders, zip(*tries, strict=True), strict=True):
                 good = [one for one in found if "failed" not in one]
                 if len(good) < rounds:
-                    name = f"{scene}.L{level}.{who[0]}_{who[1]}"
+                    name = Run(*who, scene, level, {}, way).key
                     failed[name] = next(one["failed"] for one in found if "failed" in one)
                 if good:
                     best = min(good, key=lambda one: one["cpu_s"])
                     worst = max(one["cpu_s"] for one in good)
-                    runs.append(Run(*who, scene, level, best | {"slowest_cpu_s": worst}))
+                    runs.append(Run(*who, scene, level, best | {"slowest_cpu_s": worst}, way))
     return runs, failed
 
 
@@ -121,10 +132,15 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         compiled = Path(folder)
         cold = {} if quick else warm_up("BAC", min(FULL), present, compiled)
-        runs, failed = compete(QUICK if quick else FULL, present, compiled)
+        halves = [] if quick else list(HALVES)
+        runs, failed = compete(QUICK if quick else FULL, [*present, *halves], compiled)
+        for way in () if quick else FEWER:
+            more, lost = compete(LEVELS, [*present, *halves], compiled, way)
+            runs, failed = runs + more, failed | lost
     said = {"missing": absent, "failed": failed, "peers": versions(runs), "table": table(runs, failed)}
     curves = series(runs) + histories(runs)
-    study = Study("peers", numbers(runs, cold), {}, ASSUMPTIONS | said, curves, lambda: draw(runs))
+    found = numbers(runs, cold) | ({} if quick else race(runs))
+    study = Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs))
     result = study.finish(out, quick)
     if out is not None:
         write_text(make_folder(out) / "peers.md", page(result))

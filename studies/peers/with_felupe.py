@@ -28,11 +28,12 @@ from evfem.mesh.mesh import Mesh
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
 from .problem import (
     FRICTION,
+    GIVEN,
     LAYERS,
     MATERIALS,
     PLANE,
-    TOLERANCE,
     VOLTAGE,
+    Way,
     path,
     scene_mesh,
 )
@@ -117,7 +118,8 @@ class Pull:
 class Peer:
     """One scene in FElupe's objects."""
 
-    def __init__(self, scene: str, element: str, level: int) -> None:
+    def __init__(self, scene: str, element: str, level: int, tolerance: float) -> None:
+        self.tolerance = tolerance
         mesh = scene_mesh(element, level)
         self.bone = mesh.node_sets["bone"]
         displacement = plane_strain(mesh.points, mesh.cells)
@@ -154,7 +156,7 @@ class Peer:
             ext0=fem.dof.apply(self.field, self.bounds, self.dof0),
             solver=self.solver,
             check=self.check,
-            tol=TOLERANCE,
+            tol=self.tolerance,
             maxiter=MOST_ITERATIONS,
             verbose=0,
         )
@@ -188,13 +190,13 @@ def _mask(points: Floats, nodes: Ints, axis: int) -> Any:
     return mask
 
 
-def solve(scene: str, element: str, level: int) -> dict[str, Any]:
+def solve(scene: str, element: str, level: int, way: Way = GIVEN) -> dict[str, Any]:
     """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations they
     took.
     """
-    peer = Peer(scene, element, level)
+    peer = Peer(scene, element, level, way.tolerance)
     history, iterations = [], 0
-    for position, indentation in path(scene):
+    for position, indentation in path(scene, way):
         iterations += peer.step(position, indentation)
         history.append(peer.forces)
     return {"history": history, "iterations": iterations, "factorisations": iterations}

@@ -1,5 +1,6 @@
 """The dense contact solver against enumeration, non-negative least squares and its own conditions."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -457,3 +458,38 @@ def test_extra_unknowns_feel_the_cohesion():
     assert found.status.tolist() == [BACKWARD]
     assert found.force[1] == pytest.approx(1.1, rel=1e-12)
     assert found.extra[0] == pytest.approx((1.1 - 3.0) / 2.0, rel=1e-12)
+
+
+def test_the_equations_without_the_drops_are_the_whole_ones():
+    rng = np.random.default_rng(3)
+    for trial in range(24):
+        k = 7
+        problem = random_problem(trial, k, 0.0)
+        stiffness = np.where(rng.random(k) < 0.7, rng.uniform(0.05, 0.4, k), 0.0)
+        attraction = AttractionStiffness(stiffness, rng.uniform(0.0, 0.5, k), rng.uniform(0.0, 0.3, k))
+        if trial % 2:
+            columns, rows = rng.normal(size=(2 * k, 1)), rng.normal(size=(1, 2 * k))
+            extra = ExtraUnknowns(columns, rows, np.array([[1.3]]), np.array([0.4]))
+            problem = replace(problem, extra_unknowns=extra)
+        cohesion = rng.uniform(0.0, 0.1, k) if trial % 3 else None
+        friction = rng.uniform(0.0, 1.0, k)
+        problem = replace(problem, attraction=attraction, friction=friction, cohesion=cohesion)
+        status = rng.integers(0, 4, k)
+        found = signorini._solve_closed(problem, status)
+        for one, whole in zip(found, problem.solved(status), strict=True):
+            np.testing.assert_allclose(one, whole, rtol=1e-8, atol=1e-9)
+
+
+def test_what_is_returned_solves_the_whole_equations(monkeypatch):
+    problem = random_problem(1, 6, 0.3)
+    attraction = AttractionStiffness(np.full(6, 0.05), np.full(6, 0.1), np.zeros(6))
+    asked = []
+    monkeypatch.setattr(signorini, "FEW_SOLVES", 0)
+    for name in ("_solve_closed", "_solve_statuses"):
+        own = getattr(signorini, name)
+        monkeypatch.setattr(signorini, name, lambda p, s, n=name, f=own: asked.append(n) or f(p, s))
+    found = solve_with_attraction(problem, attraction, np.full(6, OPEN))
+    assert asked[0] == "_solve_closed"
+    assert asked[-1] == "_solve_statuses"
+    whole = replace(problem, attraction=attraction).solved(found.status)
+    np.testing.assert_array_equal(found.force, whole[0])

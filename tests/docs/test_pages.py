@@ -42,6 +42,8 @@ TEXTS = [
 BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.*?)^```$", re.M | re.S)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS = "docs/howto/form.md"
+#: pages with so much to compute that `.ci/run` alone runs them
+LONG = {"gallery.md", "howto/fit.md"}
 #: pages that are still to be filled to the width of the others
 UNFILLED = {"docs/theory.md", FORMS}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`
@@ -86,7 +88,7 @@ def understood(text):
             cli.parser().parse_args(shlex.split(line, comments=True)[1:])
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [pytest.param(p, marks=pytest.mark.slow) if p in LONG else p for p in PAGES])
 def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one

@@ -104,3 +104,17 @@ def test_a_line_charge_over_a_half_space():
     charge = 1e3 * solved.capacitance  # C per m at 1 V
     exact = charge**2 / (4.0 * np.pi * eps_0) * (3.35 - 1.0) / (3.35 + 1.0)
     assert solved.force == pytest.approx(exact, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("x", "expected"),
+    [
+        ([0.0, 0.15, 0.15, 0.35, 0.35, 0.5], (5.63704355, 32.9360889)),
+        ([0.0, 0.1, 0.2, 0.3, 0.4, 0.5], (4.98684381, 26.6880181)),
+    ],
+    ids=["upright", "leaning"],
+)
+def test_grooves_over_a_film_are_ngsolves(x, expected):
+    """Recorded with NGSolve 6.2.2608 by `tools/with_ngsolve.py`: triangles of order 6."""
+    solved = rigid_field(x, [0.05, 0.05, 0.25, 0.25, 0.05, 0.05], slab=FILM)
+    assert numbers(solved) == pytest.approx(expected, rel=1e-5)

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 from tools.builders import INSULATOR, balance, benchmark_scene, finger
 from tools.meshes import block
 
@@ -327,3 +328,22 @@ def test_a_motion_begins_where_the_last_one_ended():
     np.testing.assert_allclose(result.position, slid, atol=1e-15)
     np.testing.assert_allclose(result.voltage, [20, 20, 20, 20, 60, 100, 70, 40, 40, 40, 40], rtol=1e-14)
     np.testing.assert_allclose(result.indentation, [-0.2] * 8 + [-0.05, 0.1, -0.1], rtol=1e-13)
+
+
+class Threads:
+    """An observer that looks how many threads the BLAS may use in a step."""
+
+    def __init__(self):
+        self.seen = set()
+
+    def step(self, row, frame, checkpoint):
+        openblas = [one for one in threadpool_info() if one["internal_api"] == "openblas"]
+        self.seen |= {one["num_threads"] for one in openblas}
+
+
+def test_the_threads_of_a_scene_are_those_of_its_factorisation_alone():
+    with threadpool_limits(limits=2):
+        watch = Threads()
+        scene = Scene(ROUND, Flat(), motion=PRESS_AND_SLIDE[:1], solver=Solver(threads=2))
+        simulate(scene, observers=[watch])
+        assert watch.seen <= {1}

@@ -148,6 +148,7 @@ def test_a_plate_that_snaps_sets_free_what_the_closed_form_says(gap):
     assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.02)
 
 
+@pytest.mark.slow
 def test_the_energy_of_a_snap_does_not_depend_on_the_steps():
     few, many = (simulate(in_parts(SCENES["snap"], times)) for times in (32, 64))
     assert few.snap_dissipation[-1] == pytest.approx(many.snap_dissipation[-1], rel=0.05)

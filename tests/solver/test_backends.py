@@ -48,6 +48,7 @@ def numbers(element):
 
 
 @pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
+@pytest.mark.slow
 def test_the_same_numbers_without_what_is_fast(element):
     path = json.dumps([str(HERE), *sys.path])
     command = [sys.executable, "-c", WITHOUT, path, element]

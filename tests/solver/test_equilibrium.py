@@ -19,7 +19,8 @@ from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver.control import Target
+from evfem.solver.control import Force, GivenVoltage, Target
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
 
@@ -389,3 +390,38 @@ def test_residuals_of_exactly_zero_are_numbers_like_others(history):
     """
     model, _ = pressed(Display())
     assert model.equilibrium.body.linearisation._too_old(history) == (history[1] > 0.0)
+
+
+def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
+    stuck = Equilibrium._stuck
+    to_and_fro = [1.0, *[0.3, 0.1] * 20]
+    given_up = next(n for n in range(1, 41) if stuck(to_and_fro[:n]))
+    assert given_up == 25
+    assert not any(stuck([0.95**i for i in range(n)]) for n in range(1, 60))
+    assert not any(stuck([0.1] * 20 + [0.09**i for i in range(n)]) for n in range(1, 20))
+
+
+def test_a_contact_problem_known_to_have_no_solution_is_not_solved_again(monkeypatch):
+    model, _ = pressed(Display(), law=Kaczmarek(), voltage=500.0)
+    solver = model.equilibrium
+    old = solver.rest(model.bone(0.0, 0.0), 500.0)
+    solver.body.forget()
+    own, steps = type(solver.body)._linear_step, []
+
+    def linear_step(self, *known):
+        steps.append(known[4:])
+        if len(steps) == 1:  # under the tangent of this very state
+            raise ContactNotSolved("none")
+        return own(self, *known)
+
+    monkeypatch.setattr(type(solver.body), "_linear_step", linear_step)
+    solves = []
+    driven = type(solver.body)._driven
+    monkeypatch.setattr(
+        type(solver.body), "_driven", lambda self, *known: solves.append(len(steps)) or driven(self, *known)
+    )
+    target = Target(0.0, Force(0.02), GivenVoltage(500.0))
+    state = solver.step(old, target)
+    assert steps[:2] == [(), ("only",)]
+    assert 2 not in solves
+    assert state.reaction[1] == pytest.approx(-0.02, rel=1e-6)

@@ -145,6 +145,7 @@ def test_without_relaxation_the_step_fails(point):
     assert not failed.value.result.relaxations.any()
 
 
+@pytest.mark.slow
 def test_the_staggered_coupling_comes_to_the_same_rest(point):
     pulled = {"law": Kaczmarek(), "voltage": 600.0}
     together, apart = (simulate(over(point, coupling=kind, **pulled)) for kind in ("monolithic", "staggered"))
@@ -182,6 +183,7 @@ def test_friction_on_the_way_is_counted(point):
     assert (slipped < 1.1 * LENGTH).all()
 
 
+@pytest.mark.slow
 def test_a_motion_without_time_in_a_scene_with_time_ends_at_rest(point):
     """Lifted without speed after a slide that takes time, the tip loses the trough: time stands
     still, so there is no inertia to carry it on, and nothing but rest is asked for.

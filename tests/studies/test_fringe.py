@@ -53,3 +53,22 @@ def test_both_ridges_have_the_height_of_the_fingers():
         assert np.ptp(height) == pytest.approx(0.15)
         assert height[50] == 0.0
         assert x[-1] == 0.5
+
+
+def test_the_share_of_the_air_rises(numbers):
+    """More at ridged fingers than at smooth ones, and more by the full field than by columns."""
+    share = {
+        (name, kind): numbers[f"finger.{name}.pressed.{kind}_air_share"]
+        for name in ("ridged", "smooth")
+        for kind in ("local", "full")
+    }
+    assert 0.0 < share["smooth", "local"] < share["smooth", "full"] < share["ridged", "full"] < 1.0
+    assert share["ridged", "local"] < share["ridged", "full"]
+
+
+def test_participants_remain_twice_as_strong_as_measured(numbers):
+    """Ridges and fringes together change (8a) by a few per cent."""
+    for case in ("HVHD", "HVLD", "LVLD"):
+        assert numbers[f"participants.gain_median.{case}"] == pytest.approx(1.0, abs=0.1)
+        law, full = (numbers[f"participants.{key}_median_mN.{case}"] for key in ("law", "full"))
+        assert full == pytest.approx(law, rel=0.1)

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-peers, numbers, hosts, shown, problem, apart = (
+peers, numbers, hosts, shown, problem, apart, race = (
     importlib.import_module(f"{studies.__name__}.peers.{name}")
-    for name in ("study", "evaluation", "hosts", "shown", "problem", "apart")
+    for name in ("study", "evaluation", "hosts", "shown", "problem", "apart", "race")
 )
 PRESENT = [name for name in numbers.PEERS if hosts.host(name)]
 FORCES = ("Fn_at_0.5", "Fn_at_1.0", "Fn_at_1.5")
@@ -192,7 +192,7 @@ def test_iterations_go_on_until_the_residual_is_small_and_no_node_turns():
 
 
 def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
-    def run_once(package, element, scene, level, compiled):
+    def run_once(package, element, scene, level, compiled, way):
         if element == "q2":
             return {"failed": "NewtonConvergenceError: no"}
         return dict(run(package, element, scene, level).measured)
@@ -209,7 +209,7 @@ def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
 def test_warm_up_goes_on_until_nothing_is_compiled(monkeypatch):
     order, seconds = [], iter([2.0, 0.5, 0.01, 1.0, 0.01])
 
-    def run_once(package, element, scene, level, compiled):
+    def run_once(package, element, scene, level, compiled, way=None):
         order.append((package, scene))
         forms = {"form_cpu_s": next(seconds)} if package == "fenicsx" else {}
         return dict(run(package, element).measured) | forms
@@ -319,3 +319,49 @@ def test_all_leaves_peers_out(monkeypatch, capsys):
     assert cli.main(["study", "all"]) == 0
     assert "peers" in studies.NAMES
     assert called == [name for name in studies.NAMES if name not in ("peers", "campaign")]
+
+
+def raced(package, element, way, costs, errors):
+    """Runs of scene A on the levels 0, 1, ...: CPU seconds, and how far off the forces are (%)."""
+    depths = 1.5 * np.arange(1, way.press + 1) / way.press
+    reference = [problem.REFERENCE["A"].get(f"Fn_at_{depth:.1f}", 1.0) for depth in depths]
+    runs = []
+    for level, (cost, error) in enumerate(zip(costs, errors, strict=True)):
+        history = [[(1.0 + 0.01 * error) * force, 0.0, 0.0] for force in reference]
+        found = dict.fromkeys(numbers.MEASURED, cost) | {"history": history}
+        runs.append(numbers.Run(package, element, "A", level, found, way))
+    return runs
+
+
+def test_in_the_race_each_has_its_best_number_of_steps():
+    """evfem gets to 0.1 % between its levels, at the middle of the logarithms of 1 % and 0.01 %;
+    the peer is there on its first level with few steps, and never with many.
+    """
+    few, given = problem.Way(3, 6, 1e-6), problem.GIVEN
+    runs = [
+        *raced("evfem", "q2p1", given, (1.0, 4.0), (1.0, 0.01)),
+        *raced("evfem", "q2p1", few, (0.25, 1.0), (1.0, 0.01)),
+        *raced("evfem", "q2p1-half", few, (0.25,), (0.05,)),
+        *raced("getfem", "q2", given, (3.0, 9.0), (2.0, 1.0)),
+        *raced("getfem", "q2", few, (5.0,), (0.1,)),
+    ]
+    found = race.numbers(runs)
+    assert found["race.A.15+30_steps.evfem.cpu_s"] == pytest.approx(2.0)
+    assert "race.A.15+30_steps.getfem.cpu_s" not in found
+    assert found["race.A.best.evfem.cpu_s"] == pytest.approx(0.5)
+    assert found["race.A.best.evfem.press_steps"] == 3
+    assert found["race.A.best.fastest_over_evfem.cpu_s"] == pytest.approx(10.0)
+    assert found["race.A.best.fastest_over_evfem-half.cpu_s"] == pytest.approx(20.0)
+    # runs with other steps are no part of the comparison on the same nodes
+    assert "A.L0.fastest_over_evfem.q2p1.cpu_s" in numbers.numbers(runs, {})
+    assert numbers.numbers(runs, {})["A.L0.fastest_over_evfem.q2p1.cpu_s"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("element", ["q1", "q1-half"])
+def test_few_steps_end_where_many_do(element):
+    """Without friction nothing remembers the way, and half of a symmetric mesh gives the same."""
+    many = problem.quantities("A", hosts.run_once("evfem", "q1", "A", 0)["history"])
+    few = problem.Way(3, 6, 1e-6)
+    found = hosts.run_once("evfem", element, "A", 0, way=few)
+    assert len(found["history"]) == 3
+    assert problem.quantities("A", found["history"], few) == pytest.approx(many, rel=1e-5)
