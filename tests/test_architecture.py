@@ -68,8 +68,8 @@ ROOMS = {
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
-        "texture generate library cleaning importing scans parametric touch estimators database "
-        "estimate feeling commands",
+        "texture generate library cleaning importing scans parametric touch pressed sliding correction "
+        "estimators database estimate feeling commands",
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},

@@ -18,7 +18,7 @@ from evfem.studio.state import State, rows
 from evfem.textures.cleaning import Cleaning
 from evfem.textures.commands import ENDINGS
 from evfem.textures.estimate import estimate
-from evfem.textures.feeling import Rendering, playback, render
+from evfem.textures.feeling import Rendering, playback, render, render_exact
 from evfem.textures.importing import Source, friction_profile, from_csv, from_image, from_recording
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture
@@ -42,7 +42,7 @@ LOST = 0.02
 def answer(state: State) -> dict[str, Any]:
     """Profile, friction with its band, voltage, spectrum, numbers and warnings of a state."""
     curve, notes = _curve(state)
-    found = render(curve, state.touch, state.device)
+    found = _rendering(state, curve)
     x = np.linspace(0.0, min(state.touch.length, float(curve.x[-1])), POINTS)
     voltage = np.asarray(found.signal.profile(x))
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
@@ -56,6 +56,7 @@ def answer(state: State) -> dict[str, Any]:
         "lost": [bool(one) for one in np.interp(x, curve.x, found.lost.astype(float)) > 0.5],
         "band": curve.error,
         "source": curve.source,
+        "encoding": "closed form" if state.exact is None else "model",
         "voltage": _short(voltage),
         "frequency": _short(frequency),
         "wish": _short(wish),
@@ -74,6 +75,12 @@ def _curve(state: State) -> tuple[FrictionCurve, tuple[str, ...]]:
         return state.model, ()
     found = estimate(state.texture, state.touch, state.method)
     return found.curve, found.notes
+
+
+def _rendering(state: State, curve: FrictionCurve) -> Rendering:
+    if state.exact is not None:
+        return render_exact(curve, state.exact, state.touch, state.device)
+    return render(curve, state.touch, state.device)
 
 
 def _spectra(found: Rendering, speed: float, x: Floats) -> tuple[Floats, Floats, Floats]:
@@ -126,7 +133,7 @@ def file(state: State, kind: str) -> bytes:
     if kind == "friction":
         both = zip(curve.x.tolist(), curve.friction.tolist(), strict=True)
         return csv_text([["x", "friction"], *both]).encode()
-    profile = render(curve, state.touch, state.device).signal.profile
+    profile = _rendering(state, curve).signal.profile
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / f"file.{kind}"
         write_signal(path, profile, playback(profile, state.touch, state.device))

@@ -1,8 +1,9 @@
 """A run of the model for the page, in a process of its own that ends when nobody listens any more.
 
 The process sends a line per step, then the friction curve with a picture of the deformed pad, then
-a moving picture. Who asked reads them; when the page is closed or the run is cancelled, the next
-line cannot be sent and the process is ended.
+a moving picture; where the exact voltage is asked for, that voltage after the curve. Who asked
+reads them; when the page is closed or the run is cancelled, the next line cannot be sent and the
+process is ended.
 """
 
 from __future__ import annotations
@@ -26,17 +27,19 @@ from evfem.studio.state import State, parse
 #: runs at the same time, seconds between two signs of life, pictures of the animation
 MOST_RUNS, EVERY, PICTURES = 2, 0.2, 10
 #: what the last line of a run has
-LAST = frozenset({"animation", "error"})
+LAST = frozenset({"animation", "exact", "error"})
 _PLACES = threading.BoundedSemaphore(MOST_RUNS)
 
 
-def run(text: str, send: Callable[[dict[str, Any]], None]) -> None:
-    """Run the model for a state, and `send` what it says until it ends or `send` raises OSError."""
+def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
+    """Run the model for a state, and find the `exact` voltage of its display if that is wanted;
+    `send` what is said until it ends or `send` raises OSError.
+    """
     parse(text)
     with _place():
         context = get_context("spawn")
         reader, writer = Pipe(duplex=False)
-        process = context.Process(target=_work, args=(writer, text), daemon=True)
+        process = context.Process(target=_work, args=(writer, text, exact), daemon=True)
         process.start()
         writer.close()
         try:
@@ -79,11 +82,11 @@ class _Steps:
         self.send({"step": int(row["step"]), "of": self.total})
 
 
-def _work(writer: Connection, text: str) -> None:
+def _work(writer: Connection, text: str, exact: bool) -> None:
     """In the process: run, and send what is found."""
     os.environ["MPLBACKEND"] = "agg"
     try:
-        _sent(writer.send, parse(text))
+        (_send_exact if exact else _sent)(writer.send, parse(text))
     except EvfemError as error:
         writer.send({"error": str(error)})
     except (BrokenPipeError, KeyboardInterrupt):
@@ -102,10 +105,23 @@ def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:
     observer: Observer = _Steps(send)
     result = simulate(scene, observers=(observer,))
     curve = friction_of(result)
-    told = {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}
-    send({"curve": told})
+    send({"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}})
     send({"picture": _picture(result)})
     send({"animation": _animation(result)})
+
+
+def _send_exact(send: Callable[[dict[str, Any]], None], state: State) -> None:
+    from evfem.simulation.rendering import record
+    from evfem.textures.feeling import exact_voltage
+    from evfem.textures.touch import friction_of, touch_scene
+
+    observer: Observer = _Steps(send)
+    reference = record(touch_scene(state.texture, state.touch), (observer,))
+    curve = friction_of(reference.result)
+    send({"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}})
+    found = exact_voltage(reference, state.device).curve
+    columns = {"x": found.x.round(6), "voltage": found.voltage.round(4), "friction": found.friction.round(7)}
+    send({"exact": {name: column.tolist() for name, column in columns.items()}})
 
 
 def _picture(result: Any) -> str:

@@ -142,7 +142,7 @@ class Handler(BaseHTTPRequestHandler):
             data = page.file(parse(body), kind)
             self._send(data, page.FILES[kind][1], page.FILES[kind][0])
         elif path == "/run":
-            self._stream(body.decode("utf-8", "replace"))
+            self._stream(body.decode("utf-8", "replace"), query.get("encoding") == "exact")
         else:
             raise Refused(HTTPStatus.NOT_FOUND, "there is no such question")
 
@@ -160,7 +160,7 @@ class Handler(BaseHTTPRequestHandler):
         self.close_connection = True
         return Refused(status, sentence)
 
-    def _stream(self, state: str) -> None:
+    def _stream(self, state: str, exact: bool) -> None:
         """Lines of JSON as a run says them; the connection's end is the run's end."""
         begun = False
 
@@ -174,7 +174,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.flush()
 
         self.close_connection = True
-        runs.run(state, send)
+        runs.run(state, exact, send)
 
     def _head(self, status: HTTPStatus, kind: str, length: int | None) -> None:
         self.send_response(status)

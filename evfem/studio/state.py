@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
 from evfem.textures.estimate import BEST, CHOICES
-from evfem.textures.feeling import Device
+from evfem.textures.feeling import Device, ExactCurve
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
@@ -31,7 +32,7 @@ ROWS = ("name", "kind", "x", "values", "licence", "quantity", "period", "provena
 @dataclass(frozen=True)
 class State:
     """Everything that decides what the page shows; `model` is the model's friction curve where the
-    page has one for this texture and touch.
+    page has one for this texture and touch, `exact` its voltage for this display as well.
 
     >>> state = parse('{"texture": {"reference": "weave"}, "touch": {"load": 0.04}}')
     >>> state.texture.name, state.touch.load, state.device.law, state.method
@@ -43,6 +44,7 @@ class State:
     device: Device
     method: str = BEST
     model: FrictionCurve | None = None
+    exact: ExactCurve | None = None
 
 
 def parse(text: str | bytes) -> State:
@@ -51,13 +53,14 @@ def parse(text: str | bytes) -> State:
         table = json.loads(text)
     except (ValueError, RecursionError):
         raise InputError("state", "no JSON", "what the page sends") from None
-    table = _table("state", table, (*KEYS, "model"))
+    table = _table("state", table, (*KEYS, "model", "exact"))
     return State(
         _texture(table.get("texture", {"reference": "weave"})),
         _build(Touch, "touch", table.get("touch", {})),
         _build(Device, "device", table.get("device", {})),
         choice("method", table.get("method", BEST), CHOICES),
         _model(table.get("model")),
+        _exact(table.get("exact")),
     )
 
 
@@ -125,15 +128,28 @@ def rows(texture: Texture) -> dict[str, Any]:
 def _model(given: Any) -> FrictionCurve | None:
     if given is None:
         return None
-    table = _table("model", given, ("x", "friction"))
-    both = [np.asarray(table.get(key, []), dtype=object) for key in ("x", "friction")]
-    sizes = {one.shape for one in both}
-    numbers = all(type(value) in (int, float) for one in both for value in one.ravel())
-    if len(sizes) != 1 or not numbers or not 16 <= both[0].size <= MOST_ROWS or both[0].ndim != 1:
-        raise InputError("model", "another shape", f"x and friction, 16 to {MOST_ROWS} numbers each")
-    x, friction = (one.astype(float) for one in both)
-    if not (np.isfinite(x).all() and np.isfinite(friction).all() and (np.diff(x) > 0.0).all()):
-        raise InputError("model", "numbers that are not finite or do not rise", "a curve of the model")
-    if np.abs(friction).max() > 100.0 or np.abs(x).max() > 1e4:
-        raise InputError("model", "numbers out of range", "a curve of the model")
+    x, friction = _columns("model", given, {"x": 1e4, "friction": 100.0})
     return FrictionCurve(x, friction, "model")
+
+
+def _exact(given: Any) -> ExactCurve | None:
+    if given is None:
+        return None
+    return ExactCurve(*_columns("exact", given, {"x": 1e4, "voltage": 1e5, "friction": 100.0}))
+
+
+def _columns(key: str, given: Any, most: Mapping[str, float]) -> list[Floats]:
+    """Columns of numbers over a rising x, within `most` of each."""
+    table = _table(key, given, tuple(most))
+    columns = [np.asarray(table.get(name, []), dtype=object) for name in most]
+    numbers = all(type(value) in (int, float) for one in columns for value in one.ravel())
+    if len({one.shape for one in columns}) != 1 or columns[0].ndim != 1 or not numbers:
+        raise InputError(key, "another shape", f"as many numbers in each of {', '.join(most)}")
+    if not 16 <= columns[0].size <= MOST_ROWS:
+        raise InputError(key, f"{columns[0].size} numbers", f"16 to {MOST_ROWS} in each column")
+    found = [one.astype(float) for one in columns]
+    if not all(np.isfinite(one).all() for one in found) or not (np.diff(found[0]) > 0.0).all():
+        raise InputError(key, "numbers that are not finite or do not rise", "a curve of the model")
+    if any(np.abs(one).max() > limit for one, limit in zip(found, most.values(), strict=True)):
+        raise InputError(key, "numbers out of range", "a curve of the model")
+    return found

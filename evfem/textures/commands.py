@@ -14,15 +14,16 @@ from evfem.common.tables import csv_text
 from evfem.electrostatics.signalfile import write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
+from evfem.simulation.rendering import record
 from evfem.textures.cleaning import Cleaning
-from evfem.textures.estimate import estimate
+from evfem.textures.estimate import estimate, known_error
 from evfem.textures.feeling import Device, exact_voltage, playback, render
 from evfem.textures.generate import Knobs, make
 from evfem.textures.importing import Source, from_csv, from_image, from_recording
-from evfem.textures.library import about, find, names, reference
+from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture, is_data, write
-from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture
+from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture, touch_scene
 
 #: what each way of importing takes beside name, licence and note
 OPTIONS = {
@@ -138,14 +139,15 @@ def _simulate(given: argparse.Namespace) -> None:
     _check_outputs(given)
     with status(f"sliding over {texture.name}"):
         if given.exact:
-            found = exact_voltage(texture, touch, device)
+            found = exact_voltage(record(touch_scene(texture, touch)), device)
             curve = friction_of(found.reference.result)
         else:
             curve = simulate_texture(texture, touch)
     _curve(curve, given.out)
     if given.exact:
         print(f"exact: {found.comparison}")
-        _signal(found.voltage, touch, device, given.signal)
+        profile = VoltageProfile(found.curve.x, found.curve.voltage)
+        _signal(profile, touch, device, given.signal)
     elif given.signal is not None:
         _render(curve, touch, device, given.signal)
 
@@ -155,6 +157,10 @@ def _estimate(given: argparse.Namespace) -> None:
     _check_outputs(given)
     found = estimate(find(given.name), touch, given.method)
     _curve(found.curve, given.out)
+    if given.name in REFERENCES:
+        finger = "ridged" if touch.ridged else "smooth"
+        error = known_error(given.name, touch.ridged, given.method)
+        print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
     for note in found.notes:
         tell(f"note: {note}")
     if given.signal is not None:

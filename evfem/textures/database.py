@@ -4,8 +4,12 @@ Each of both fingers has `INNER` points of Sobol's sequence in the box of `RANGE
 doi:10.1016/0041-5553(67)90144-9) and the corners of the box, without the 16 at which the shortest
 wave is the steepest: sliding snaps from crest to crest there, and takes fifty times longer.
 `compute_database` runs `parametric.scene` of every point; what is finished lies in its folder and
-is not computed again. Beside each curve stands how wrong each estimator is there when it does not
-know the point: the root mean square of (mu - friction) / slope.
+is not computed again. Beside each curve stand that of the pad that yields linearly (`sliding`), and
+how wrong each estimator is there when it does not know the point: the root mean square of what is
+left of the friction, over the slope.
+
+The reference textures are slid over too, by both fingers at the usual touch: what an estimate of
+them is off by, none of which is a point of the database, stands in a table of its own.
 """
 
 from __future__ import annotations
@@ -26,23 +30,32 @@ from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import csv_text, read_columns, read_table
 from evfem.errors import InputError
 from evfem.scene.file import dump
+from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.pools import open_pool
 from evfem.sweeps.run import answered, compute
+from evfem.textures.correction import corrected, corrections, importance
 from evfem.textures.estimators import METHODS, Estimator, best_kernel, best_width, left_out
-from evfem.textures.parametric import RANGES, SAMPLES, Parametric, at, scene
+from evfem.textures.library import REFERENCES, reference
+from evfem.textures.parametric import RANGES, SAMPLES, SPEED, Parametric, at, scene
+from evfem.textures.pressed import FILE as PADS
+from evfem.textures.pressed import Remembered, remember, write
+from evfem.textures.pressed import read as read_pad
+from evfem.textures.sliding import slid
+from evfem.textures.touch import Touch, steps_over, touch_scene
 
 #: points of Sobol's sequence for each finger
 INNER = 192
-FILE, KERNELS = "textures-database.csv", "textures-kernels.csv"
-CURVE = tuple(f"mu{i:02d}" for i in range(SAMPLES))
+FILE, KERNELS, CURVES = "textures-database.csv", "textures-kernels.csv", "textures-references.csv"
+CURVE, LINEAR = (tuple(f"{name}{i:02d}" for i in range(SAMPLES)) for name in ("mu", "linear"))
 ERRORS = {method: f"error_{method}" for method in METHODS}
 
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Textures (N,) of one finger, and the apparent friction (N, SAMPLES) of a period at each.
+    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and
+    that of a pad that yields `linear`ly.
 
     Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
     rises through zero. `errors`: of each method, (N,), NaN where the point is a corner of the hull.
@@ -50,55 +63,106 @@ class Database:
 
     textures: tuple[Parametric, ...]
     friction: Floats
+    linear: Floats
     errors: Mapping[str, Floats]
     scale: Floats
     smoothing: float
 
     @cached_property
+    def slope(self) -> Floats:
+        """Slopes (N,) of the first sines."""
+        return np.array([texture.slope for texture in self.textures])
+
+    @cached_property
+    def responses(self) -> tuple[Floats, Floats, Floats]:
+        """Places (N, 6), corrections (N, 3) and their importance (N, 3)."""
+        return responses_of(self.textures, self.friction, self.linear)
+
+    @cached_property
     def estimator(self) -> Estimator:
-        """The estimator of responses at places in the box."""
-        points, responses = responses_of(self.textures, self.friction)
-        width = best_width(points * self.scale, responses)
+        """The estimator of corrections at places in the box."""
+        points, responses, weights = self.responses
+        width = best_width(points * self.scale, responses, weights)
         return Estimator(points, responses, width, self.scale, self.smoothing)
 
     @property
     def relative_errors(self) -> dict[str, Floats]:
         """Each method's errors (N,) as shares of the range of each curve."""
-        slope = np.array([texture.slope for texture in self.textures])
-        return {name: error * slope / np.ptp(self.friction, axis=1) for name, error in self.errors.items()}
+        ranges = np.ptp(self.friction, axis=1)
+        return {name: error * self.slope / ranges for name, error in self.errors.items()}
 
     @property
     def best(self) -> str:
-        """The method with the smallest median of these errors."""
-        return min(self.relative_errors.items(), key=lambda one: float(np.nanmedian(one[1])))[0]
+        """The method with the smallest mean of these errors, at most 1 each, where all have one."""
+        found = self.relative_errors
+        known = np.all([np.isfinite(error) for error in found.values()], axis=0)
+        return min(found, key=lambda name: float(np.mean(np.minimum(found[name][known], 1.0))))
+
+    def errors_of(self, responses: Floats) -> Floats:
+        """Root mean square error (N,) of the curves with these corrections (N, 3), over the slope."""
+        found = np.empty(len(self.textures))
+        for i, one in enumerate(self.textures):
+            curve = corrected(_samples(one), self.linear[i], responses[i], one.slope, one.wavelength)
+            found[i] = np.sqrt(np.mean((curve - self.friction[i]) ** 2)) / one.slope
+        return found
 
 
-def responses_of(textures: Sequence[Parametric], friction: Floats) -> tuple[Floats, Floats]:
-    """Places (N, 6) of textures, and the responses (N, SAMPLES) that are interpolated."""
+def responses_of(
+    textures: Sequence[Parametric], friction: Floats, linear: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Places (N, 6) of textures, the corrections (N, 3) that are interpolated, and how much each
+    counts (N, 3).
+    """
     points = np.array([texture.point() for texture in textures])
-    own = np.array([[texture.friction, texture.slope] for texture in textures])
-    return points, (friction - own[:, :1]) / own[:, 1:]
+    wavelength, slope = np.array([[texture.wavelength, texture.slope] for texture in textures]).T
+    curves = (friction, linear, wavelength, slope)
+    return points, corrections(*curves), importance(*curves)
+
+
+def linear_curve(texture: Parametric, pad: Remembered) -> Floats:
+    """The friction (SAMPLES,) of a pad that yields linearly."""
+    pressed = pad.at(texture.load, texture.friction)
+    return slid(pressed, texture.surface(), texture.friction, _samples(texture), SPEED)
+
+
+def _samples(texture: Parametric) -> Floats:
+    """Positions (SAMPLES,) of a period in mm."""
+    return np.linspace(0.0, texture.wavelength, SAMPLES + 1)[1:]
 
 
 def read(path: Path, ridged: bool) -> Database:
     """The database of one finger in a file that `compute_database` wrote."""
     table = read_table(path, "database")
-    if list(table) != [*RANGES, "ridged", *CURVE, *ERRORS.values()]:
+    if list(table) != [*RANGES, "ridged", *CURVE, *LINEAR, *ERRORS.values()]:
         raise InputError("database", f"{path}, with other columns", f"a file called {FILE}")
     of = table["ridged"] == float(ridged)
     rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
     textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
-    friction = np.column_stack([table[name][of] for name in CURVE])
+    friction, linear = (np.column_stack([table[name][of] for name in names]) for names in (CURVE, LINEAR))
     errors = {method: table[name][of] for method, name in ERRORS.items()}
     kernels = read_columns(path.with_name(KERNELS), ["ridged", *RANGES, "smoothing"], "database")
     _, *scale, smoothing = np.column_stack(kernels)[int(ridged)].tolist()
-    return Database(textures, friction, errors, np.array(scale), smoothing)
+    return Database(textures, friction, linear, errors, np.array(scale), smoothing)
+
+
+#: where the files are that come with evfem
+DATA = Path(evfem.__file__).parent / "data"
 
 
 @cache
 def shipped(ridged: bool) -> Database:
     """The database of one finger that comes with evfem."""
-    return read(Path(evfem.__file__).parent / "data" / FILE, ridged)
+    return read(DATA / FILE, ridged)
+
+
+@cache
+def reference_curves(ridged: bool) -> dict[str, tuple[Floats, Floats]]:
+    """Of each reference texture of heights, x (mm) and the model's friction of one finger at the
+    usual touch.
+    """
+    table = read_table(DATA / CURVES, "references")
+    of = table["ridged"] == float(ridged)
+    return {name: (table["x"][of], table[name][of]) for name in REFERENCES}
 
 
 def textures() -> list[Parametric]:
@@ -112,10 +176,19 @@ def textures() -> list[Parametric]:
     return [at(point, ridged) for point in points for ridged in (False, True)]
 
 
+def references() -> dict[tuple[str, bool], Scene]:
+    """The scenes of the reference textures of heights, by their names and whether ridged."""
+    return {
+        (name, ridged): touch_scene(reference(name), Touch(ridged=ridged))
+        for name in REFERENCES
+        for ridged in (False, True)
+    }
+
+
 def _ask(result: Result) -> dict[str, float | None]:
-    period = result.motion_index == 2
-    mu = result.applied_tangential_force[period] / result.applied_force[period]
-    return dict(zip(CURVE, mu.tolist(), strict=True))
+    last = result.motion_index == 2
+    mu = result.applied_tangential_force[last] / result.applied_force[last]
+    return {f"mu{i:02d}": value for i, value in enumerate(mu.tolist())}
 
 
 def _evaluate(text: str) -> Answer:
@@ -125,19 +198,21 @@ def _evaluate(text: str) -> Answer:
 def compute_database(
     folder: str | Path, *, workers: int | None = None, scheduler: str | None = None
 ) -> tuple[Path, dict[str, int]]:
-    """Run the model at every point that is not finished in `folder`, and write
-    `FILE` and `KERNELS` there.
+    """Run the model at every point and over every reference texture that is not finished in `folder`,
+    and write `FILE`, `KERNELS`, `CURVES` and `PADS` there.
 
     `workers` and `scheduler` as in `evfem.sweep`. Returns the file, and how many points are done and
     how many are not converged.
     """
     folder = Path(folder)
-    jobs = {digest((dump(scene(one)), evfem.__version__)): one for one in textures()}
+    scenes: list[tuple[Parametric | tuple[str, bool], Scene]] = [(one, scene(one)) for one in textures()]
+    texts = {one: dump(of) for one, of in [*scenes, *references().items()]}
+    jobs = {digest((text, evfem.__version__)): one for one, text in texts.items()}
     with alone_in(folder):
         kept = SweepFolder(folder, resume=True)
         kept.open(set(jobs), digest(sorted(jobs)))
         answers = {key: answer for key in jobs if (answer := kept.read(key)) is not None}
-        waiting = {key: dump(scene(one)) for key, one in jobs.items() if key not in answers}
+        waiting = {key: texts[one] for key, one in jobs.items() if key not in answers}
 
         def keep(key: str, answer: Answer) -> None:
             kept.write(key, answer)
@@ -146,38 +221,60 @@ def compute_database(
 
         compute(_evaluate, waiting, open_pool(workers, scheduler), keep)
         done = {one: answers[key] for key, one in jobs.items() if answers[key].status == "done"}
-        _write(folder, done)
+        write(folder / PADS, {ridged: remember(ridged) for ridged in (False, True)})
+        _write(folder, {one: answer for one, answer in done.items() if isinstance(one, Parametric)})
+        _write_references(folder, {one: done[one] for one in references() if one in done})
     return folder / FILE, {"done": len(done), "not converged": len(jobs) - len(done)}
 
 
 def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
-    """Both files of the database."""
+    """Both files of the database, by the pads beside them."""
     rows: list[list[str]] = []
     kernels: list[list[str]] = []
     for ridged in (False, True):
         textures = tuple(one for one in done if one.ridged == ridged)
         friction = np.array([[done[one].outputs[name] for name in CURVE] for one in textures], dtype=float)
-        friction = friction.round(6)  # what stands in the file is what is estimated from
-        scale, smoothing = best_kernel(*responses_of(textures, friction))
+        pad = read_pad(folder / PADS, ridged)
+        linear = np.array([linear_curve(one, pad) for one in textures])
+        friction, linear = friction.round(6), linear.round(6)  # what stands in the file is estimated from
+        scale, smoothing = best_kernel(*responses_of(textures, friction, linear))
         words = [f"{value:.4g}" for value in (*scale, smoothing)]
         kernels.append([str(int(ridged)), *words])
         written = np.array([float(word) for word in words])
-        rows += _rows(Database(textures, friction, {}, written[:-1], float(written[-1])), ridged)
+        rows += _rows(Database(textures, friction, linear, {}, written[:-1], float(written[-1])), ridged)
     write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
-    write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *ERRORS.values()], *rows]))
+    write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, *ERRORS.values()], *rows]))
 
 
 def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
-    estimator = database.estimator
-    errors = [left_out(estimator, method) - estimator.responses for method in METHODS]
-    sizes = np.sqrt(np.mean(np.square(errors), axis=2)).T
+    found = [database.errors_of(left_out(database.estimator, method)) for method in METHODS]
     return [
         [
             *(f"{getattr(one, name):.6g}" for name in RANGES),
             str(int(ridged)),
-            *(f"{mu:.6f}" for mu in curve),
-            *(f"{size:.5g}" for size in beside),
+            *(f"{mu:.6f}" for mu in (*curve, *linear)),
+            *(f"{error:.5g}" for error in beside),
         ]
-        for one, curve, beside in zip(database.textures, database.friction, sizes, strict=True)
+        for one, curve, linear, beside in zip(
+            database.textures, database.friction, database.linear, np.transpose(found), strict=True
+        )
     ]
+
+
+def _write_references(folder: Path, done: Mapping[tuple[str, bool], Answer]) -> None:
+    """The model's curves of the reference textures."""
+    rows: list[list[str]] = []
+    length, steps = Touch().length, steps_over(Touch().length)
+    for ridged in (False, True):
+        for i in range(steps):
+            values = [_value(done.get((name, ridged)), i) for name in REFERENCES]
+            x = length * (i + 1) / steps
+            rows.append([f"{x:.6g}", str(int(ridged)), *(f"{mu:.6f}" for mu in values)])
+    write_text(folder / CURVES, csv_text([["x", "ridged", *REFERENCES], *rows]))
+
+
+def _value(answer: Answer | None, step: int) -> float:
+    """The friction at a step, NaN where the run has not converged."""
+    value = None if answer is None else answer.outputs.get(f"mu{step:02d}")
+    return float("nan") if value is None else float(value)

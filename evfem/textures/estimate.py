@@ -1,34 +1,40 @@
 r"""The friction curve of a texture, estimated from the database in milliseconds.
 
-A texture is reduced to the two harmonics of the database that explain most of its heights::
+The pad slides over all of the texture as if it yielded linearly (`sliding`), and this curve is
+corrected as the model's curves of the database are (`correction`). For that the texture is reduced
+to the two harmonics of the database that explain most of its heights::
 
     h(x) ~ a (sin(q (x - x0)) + c sin(2 q (x - x0)) + d cos(2 q (x - x0)))
 
 For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of
-`TRIED` wavelengths. What the harmonics leave out is not estimated, and said. A place outside the
-database is moved to its nearest edge, and said too, as is one outside the hull of its points, where
-linear interpolation does not reach and the average stands in; the model has no such limits.
-A friction profile is taken as it is.
+`TRIED` wavelengths. That what they leave out is not corrected is said. A place outside the database
+is moved to its nearest edge, and said too, as is one outside the hull of its points, where linear
+interpolation does not reach and the average stands in; the model has no such limits. A friction
+profile is taken as it is.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError
-from evfem.textures.database import shipped
+from evfem.textures.correction import corrected
+from evfem.textures.database import Database, reference_curves, shipped
 from evfem.textures.estimators import METHODS, NEAR, hull_weights
-from evfem.textures.parametric import SAMPLES, SPEED, Parametric, at
+from evfem.textures.library import REFERENCES, reference
+from evfem.textures.parametric import SPEED, Parametric, at
+from evfem.textures.pressed import shipped_pad
+from evfem.textures.sliding import slid
 from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch
+from evfem.textures.touch import FrictionCurve, Touch, steps_over, surface_of
 
-#: wavelengths that are tried for a texture that ends, shares of its waves' variance that are enough
-#: and hardly anything, samples per period of the curve
-TRIED, ENOUGH, FINE = 300, 0.9, 96
+#: wavelengths that are tried for a texture that ends, share of its waves' variance that is enough,
+#: mm before and behind the slide over a texture that does not repeat within it
+TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
 #: error of an estimate, as a share of the range that it shows, that is said
 MUCH = 0.5
 #: relative distance from the speed of the database that is said
@@ -148,26 +154,66 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     near = at(place, touch.ridged)
     database = shipped(touch.ridged)
     method = database.best if method == BEST else method
+    response, error, inside = _asked(database, place, method)
+    x, mu, missing = _friction(texture, touch, near, response)
+    notes = _notes(wanted, found, touch)
+    if near.slope * error > MUCH * np.ptp(mu):
+        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
+    if missing:
+        notes = (*notes, f"no equilibrium was found on {missing:.0%} of the slide: {MODEL}")
+    if not inside:
+        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
+    curve = FrictionCurve(x, mu, f"estimate ({method})", near.slope * error)
+    return Estimate(curve, method, notes, found)
+
+
+def _asked(database: Database, place: Floats, method: str) -> tuple[Floats, float, bool]:
+    """The correction (3,) at a place (6,), the error of the points near it over the slope, and
+    whether it is inside their hull.
+    """
     estimator = database.estimator
     inside = hull_weights(estimator.points * estimator.scale, place * estimator.scale) is not None
     response = estimator(place, method if inside or method != "linear" else "average")
-    weight = estimator.near(place, NEAR)
     errors = database.errors[method]
     known = np.isfinite(errors)
-    error = near.slope * float(np.sqrt(np.sum((weight * errors**2)[known]) / weight[known].sum()))
-    size = int(np.clip(np.ceil(FINE * touch.length / found.wavelength), 200, 20_000))
-    x = np.linspace(0.0, touch.length, size + 1)
-    phase = (x - found.x0) / found.wavelength % 1.0
-    mu = near.friction + near.slope * np.interp(
-        phase, np.arange(SAMPLES + 1) / SAMPLES, np.append(response[-1], response)
-    )
-    curve = FrictionCurve(x, mu + (touch.friction - near.friction), f"estimate ({method})", error)
-    notes = _notes(wanted, found, touch)
-    if error > MUCH * np.ptp(mu):
-        notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
-    if not inside:
-        notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
-    return Estimate(curve, method, notes, found)
+    weight = estimator.near(place, NEAR)[known]
+    return response, float(np.sqrt(weight @ errors[known] ** 2 / weight.sum())), inside
+
+
+def _friction(
+    texture: Texture, touch: Touch, near: Parametric, response: Floats
+) -> tuple[Floats, Floats, float]:
+    """x (n,) in mm, the corrected friction (n,) there, and the share of it that was not found and is
+    interpolated.
+    """
+    x, linear, period = linear_friction(texture, replace(touch, friction=near.friction, load=near.load))
+    found = np.isfinite(linear)
+    if not found.all():
+        linear = np.interp(x, x[found], linear[found]) if found.any() else np.full_like(x, near.friction)
+    mu = corrected(x, linear, response, near.slope, period) + (touch.friction - near.friction)
+    along = np.linspace(0.0, touch.length, steps_over(touch.length) + 1)
+    return along, np.interp(along, x, mu, period=period), 1.0 - float(found.mean())
+
+
+def known_error(name: str, ridged: bool, method: str = BEST) -> float:
+    """What an estimate of a reference texture of heights is off by at the usual touch: root mean
+    square, as a share of the range of the model's curve.
+    """
+    x, friction = reference_curves(ridged)[choice("texture", name, tuple(REFERENCES))]
+    curve = estimate(reference(name), Touch(ridged=ridged), method).curve
+    wrong = np.interp(x, curve.x, curve.friction) - friction
+    return float(np.sqrt(np.mean(wrong**2)) / np.ptp(friction))
+
+
+def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, float]:
+    """x (n,) in mm, the friction (n,) there of a pad that yields linearly, NaN where it is not
+    found, and after how many mm it repeats: the texture's period, or a little more than the slide.
+    """
+    period = min(texture.period or np.inf, touch.length + 2.0 * BESIDE)
+    steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
+    x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)
+    pad = shipped_pad(touch.ridged).at(touch.load, touch.friction)
+    return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 
 
 def _sampled(texture: Texture, touch: Touch) -> tuple[Floats, Floats]:
@@ -184,8 +230,8 @@ def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> tuple[str, ...]:
     if found.explain < ENOUGH:
         notes.append(
             f"two harmonics of {found.wavelength:.3g} mm hold {found.explain:.0%} of the heights' variance, "
-            f"the rest is not estimated: {MODEL}"
+            f"the rest is not corrected: {MODEL}"
         )
     if abs(touch.speed / SPEED - 1.0) > OTHER_SPEED:
-        notes.append(f"the database was made at {SPEED:g} mm/s: {MODEL}")
+        notes.append(f"the corrections were made at {SPEED:g} mm/s: {MODEL}")
     return tuple(notes)

@@ -1,15 +1,15 @@
 r"""Estimators of the friction curve from the database, and how wrong they are.
 
-All three give weighted sums of the database's responses ``r_i(x) = (mu_i(x) - friction_i) / slope_i``
-for a point p of the box (`parametric`), whose axes are stretched by `scale` first: friction changes
-faster along some parameters than along others.
+All three give weighted sums of the database's responses r_i (`correction`) for a point p of the box
+(`parametric`), whose axes are stretched by `scale` first: responses change faster along some
+parameters than along others. An error of a response counts by `weights`, as it changes the curve.
 
 - conditional average, the paper's tool, with a Gaussian kernel (Nadaraya 1964,
   doi:10.1137/1109020)::
 
       r(p) = sum_i k_i r_i / sum_i k_i,   k_i = exp(-|p - p_i|^2 / (2 width^2))
 
-  with the width that has the smallest sum of squares when each point is left out in turn;
+  with the width that has the smallest mean error when each point is left out in turn;
 - linear interpolation between the corners of the Delaunay simplex that holds p. Its weights w solve
   ``min sum_i w_i |p_i|^2`` with ``sum_i w_i p_i = p, sum_i w_i = 1, w >= 0``, the lower hull of the
   points lifted to a paraboloid; where nothing solves it, p is outside the hull of the points;
@@ -47,7 +47,7 @@ FIRST_SCALE, FIRST_SMOOTHING, MOST_TRIES = 2.0, 0.1, 600
 @dataclass(frozen=True, eq=False)
 class Estimator:
     """Estimates responses (SAMPLES,) at places in the box from points (N, 6) and their responses
-    (N, SAMPLES); `width` is that of the conditional average, `scale` (6,) stretches the axes,
+    (N, M); `width` is that of the conditional average, `scale` (6,) stretches the axes,
     `smoothing` is that of the radial basis functions.
     """
 
@@ -58,7 +58,7 @@ class Estimator:
     smoothing: float = 0.0
 
     def __call__(self, place: Floats, method: str) -> Floats:
-        """The response (SAMPLES,) at a place (6,)."""
+        """The response (M,) at a place (6,)."""
         choice("method", method, METHODS)
         if method == "rbf":
             return np.asarray(self._surface((place * self.scale)[None])[0])
@@ -116,8 +116,8 @@ def hull_weights(points: Floats, place: Floats) -> Floats | None:
     return np.asarray(found.x) if found.status == 0 else None
 
 
-def best_width(points: Floats, responses: Floats) -> float:
-    """The kernel width with the smallest sum of squares when each point is left out in turn."""
+def best_width(points: Floats, responses: Floats, weights: Floats) -> float:
+    """The kernel width with the smallest mean error when each point is left out in turn."""
     square = np.sum((points[:, None] - points[None]) ** 2, axis=2)
     np.fill_diagonal(square, np.inf)
     nearest = square.min(axis=1, keepdims=True)
@@ -125,12 +125,17 @@ def best_width(points: Floats, responses: Floats) -> float:
     for width in WIDTHS:
         weight = np.exp(-0.5 * (square - nearest) / width**2)
         guess = weight @ responses / weight.sum(axis=1, keepdims=True)
-        errors.append(np.sum((guess - responses) ** 2))
+        errors.append(_mean_error(guess - responses, weights))
     return float(WIDTHS[int(np.argmin(errors))])
 
 
+def _mean_error(errors: Floats, weights: Floats) -> float:
+    """Mean size of weighted errors (N, M), each of which counts as 1 where it is larger."""
+    return float(np.mean(np.minimum(np.sqrt(np.sum((weights * errors) ** 2, axis=1)), 1.0)))
+
+
 def left_out(estimator: Estimator, method: str) -> Floats:
-    """What the other points say of each point's response, (N, SAMPLES); NaN where it lies outside
+    """What the other points say of each point's response, (N, M); NaN where it lies outside
     their hull, which `linear` cannot leave.
     """
     found = np.full(estimator.responses.shape, np.nan)
@@ -140,24 +145,19 @@ def left_out(estimator: Estimator, method: str) -> Floats:
     return found
 
 
-def best_kernel(points: Floats, responses: Floats) -> tuple[Floats, float]:
-    """The scale (6,) of the axes and the smoothing with the smallest mean error of points left out.
-
-    An error counts relative to the range of its curve, and as 1 where it is larger.
-    """
+def best_kernel(points: Floats, responses: Floats, weights: Floats) -> tuple[Floats, float]:
+    """The scale (6,) of the axes and the smoothing with the smallest mean error of points left out."""
     from scipy.optimize import minimize
 
     linear = np.column_stack([np.ones(len(points)), points])
     rest = responses - linear @ np.linalg.lstsq(linear, responses, rcond=None)[0]
-    ranges = np.ptp(responses, axis=1)
 
     def error(logarithms: Floats) -> float:
         stretched = points * np.exp(logarithms[:-1])
         square = np.sum((stretched[:, None] - stretched[None]) ** 2, axis=2)
         matrix = np.exp(-0.5 * square) + np.exp(logarithms[-1]) * np.eye(len(points))
         inverse = np.linalg.inv(matrix)
-        left = inverse @ rest / np.diag(inverse)[:, None]
-        return float(np.mean(np.minimum(np.sqrt(np.mean(left**2, axis=1)) / ranges, 1.0)))
+        return _mean_error(inverse @ rest / np.diag(inverse)[:, None], weights)
 
     begin = np.append(np.full(points.shape[1], np.log(FIRST_SCALE)), np.log(FIRST_SMOOTHING))
     found = minimize(error, begin, method="Nelder-Mead", options={"maxfev": MOST_TRIES})

@@ -24,6 +24,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, check_fields, number, one_of
 from evfem.contact.surfaces import Display
+from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FILM, TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.signalfile import Playback
@@ -37,11 +38,9 @@ from evfem.simulation.rendering import (
     Signal,
     compare,
     exact,
-    record,
     voltage_for,
 )
-from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch, touch_scene
+from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
@@ -119,8 +118,13 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
     wish = ApparentFriction(curve.x, load, np.maximum(curve.friction, 0.0) * load)
     signal = voltage_for(wish, device.encoding, amplifier=device.amplifier, speed=touch.speed)
     felt = np.asarray(device.encoding.tangential_force(load, signal.profile(curve.x))) / load
-    frequency, wanted = _amplitudes(curve.x, curve.friction, touch.speed)
-    _, given = _amplitudes(curve.x, felt, touch.speed)
+    return _compared(curve, signal, felt, touch.speed)
+
+
+def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
+    """What is `felt` (n,) against the wish."""
+    frequency, wanted = _amplitudes(curve.x, curve.friction, speed)
+    _, given = _amplitudes(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
     return Rendering(
         curve=curve,
@@ -166,6 +170,32 @@ def playback(profile: VoltageProfile, touch: Touch, device: Device) -> Playback:
 
 
 @dataclass(frozen=True, eq=False)
+class ExactCurve:
+    """The coupled model's own voltage (n,) in V over x (n,) mm, and the `friction` (n,) on the
+    display with it.
+    """
+
+    x: Floats
+    voltage: Floats
+    friction: Floats
+
+
+def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: Device) -> Rendering:
+    """What the coupled model makes of a friction curve with its own voltage, compared as by `render`."""
+    felt = np.interp(curve.x, found.x, found.friction)
+    voltage = np.interp(curve.x, found.x, found.voltage)
+    signal = Signal(
+        profile=VoltageProfile(found.x, found.voltage),
+        share_not_renderable=float(np.mean(curve.friction < device.friction)),
+        largest=float(found.voltage.max()),
+        rms=float(np.sqrt(np.mean(voltage**2))),
+        carrier=float(Drive().peak(found.voltage.max())),
+        error_of_display=_relative(felt, curve.friction),
+    )
+    return _compared(curve, signal, felt, touch.speed)
+
+
+@dataclass(frozen=True, eq=False)
 class Exact:
     """The coupled model's own voltage for a texture: both recordings, and how they compare."""
 
@@ -174,18 +204,16 @@ class Exact:
     comparison: Comparison
 
     @property
-    def voltage(self) -> VoltageProfile:
-        """The voltage over the position of the second slide, x = 0 where the texture begins."""
-        result = self.display.result
-        last = result.motion_index == 2
-        return VoltageProfile(result.position[last] - result.position[~last][-1], result.voltage[last])
+    def curve(self) -> ExactCurve:
+        """Voltage and friction over the position of the second slide, x = 0 where the texture begins."""
+        felt, result = friction_of(self.display.result), self.display.result
+        return ExactCurve(felt.x, result.voltage[result.motion_index == 2], felt.friction)
 
 
-def exact_voltage(texture: Texture, touch: Touch, device: Device) -> Exact:
-    """Slide over the texture by the model, then find the display's voltage that gives the same
-    friction force, step by step (`rendering.exact`). Takes two runs of the model.
+def exact_voltage(reference: Recording, device: Device) -> Exact:
+    """The display's voltage that gives the same friction force as a recorded slide of `touch_scene`
+    over a texture, step by step (`rendering.exact`). Takes another run of the model.
     """
-    reference = record(touch_scene(texture, touch))
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
     rendered = exact(reference, display, LAWS[device.law](), largest)

@@ -68,22 +68,26 @@ def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
     The bone passes x = 0 when the second slide begins.
     """
     before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
-    steps = int(np.clip(round(STEPS_PER_MM * touch.length), 20, MOST_STEPS))
     return Scene(
         FingerPad(resolution="coarse", ridges=touch.ridged, viscosity=VISCOSITY),
-        _surface(texture, touch, before),
+        surface_of(texture, touch, before),
         solver=Solver(dynamics="viscous", threads=1),
         motion=(
             Press(force=touch.load, steps=4),
             Slide(before, steps=STEPS_BEFORE, speed=touch.speed, hold="force"),
-            Slide(touch.length, steps=steps, speed=touch.speed, hold="force"),
+            Slide(touch.length, steps=steps_over(touch.length), speed=touch.speed, hold="force"),
         ),
         output=Output(every=every) if every else Output(),
         name=_file_name(texture.name),
     )
 
 
-def _surface(texture: Texture, touch: Touch, before: float) -> Flat | Profile:
+def steps_over(length: float) -> int:
+    """How many steps a slide over `length` (mm) has."""
+    return int(np.clip(round(STEPS_PER_MM * length), 20, MOST_STEPS))
+
+
+def surface_of(texture: Texture, touch: Touch, before: float) -> Flat | Profile:
     """The texture under the whole slide, moved so that its x = 0 is passed after `before` mm."""
     x, values = texture.over(-before - BESIDE, touch.length + BESIDE)
     x = x + before

@@ -202,6 +202,23 @@ def test_the_model_is_run_to_its_end_and_shown(page):
     assert "model" in page.text("numbers")
 
 
+def test_the_exact_voltage_is_found_for_this_display_only(page):
+    page.set("length", 2)
+    page.set("ridged", "")
+    page.set("display", 0.2)
+    page.click("#exact")
+    page.until(lambda: page.data("run") == "done")
+    page.settled()
+    assert page.text("numbers").count("model") == 2
+    assert any(f"Error of the force{said} %" in page.text("numbers") for said in ("0.0", "below 0.1"))
+    found = page.js("return exact.voltage")
+    signal = read_signal(page.saved("csv"))
+    assert signal.voltage.max() == pytest.approx(max(found), rel=0.01)
+    page.set("display", 0.21)
+    assert "closed form" in page.text("numbers")
+    assert page.text("numbers").count("model") == 1
+
+
 def test_a_link_reproduces_the_page(page, server, tmp_path_factory):
     page.choose("dial")
     for name, value in (("frequency", 0.7), ("second", 0.4), ("load", 0.037), ("display", 0.2)):

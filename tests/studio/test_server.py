@@ -129,14 +129,14 @@ def test_a_run_ends_when_nobody_listens(monkeypatch):
             raise BrokenPipeError
 
     with pytest.raises(BrokenPipeError):
-        runs.run("{}", send)
+        runs.run("{}", False, send)
     assert not multiprocessing.active_children()
 
 
 def test_a_run_whose_process_dies_says_so(monkeypatch):
     lines = []
     monkeypatch.setattr(runs, "_work", os.abort)  # takes no arguments: the process ends at once
-    runs.run("{}", lines.append)
+    runs.run("{}", False, lines.append)
     assert "without a result" in lines[-1]["error"]
 
 
@@ -151,7 +151,7 @@ def test_no_more_than_two_runs_at_once(monkeypatch):
 @pytest.mark.slow
 def test_a_run_tells_its_steps_its_curve_and_both_pictures():
     lines = []
-    runs.run('{"touch": {"length": 0.5, "ridged": false}}', lines.append)
+    runs.run('{"touch": {"length": 0.5, "ridged": false}}', False, lines.append)
     kinds = [next(iter(line)) for line in lines if "alive" not in line]
     steps = [line for line in lines if "step" in line]
     assert [line["step"] for line in steps] == list(range(steps[0]["of"] + 1))

@@ -41,6 +41,8 @@ DRAWN = {"x": [0.0, 0.5, 1.0, 1.5], "values": [0.0, 0.01, 0.0, -0.01], "licence"
         ({"model": {"x": list(range(20)), "friction": ["a"] * 20}}, "model: given"),
         ({"model": {"x": [0.0] * 20, "friction": [0.3] * 20}}, "model: given"),
         ({"model": {"x": list(range(20)), "friction": [1e9] * 20}}, "model: given"),
+        ({"exact": {"x": list(range(20)), "voltage": [1.0] * 20}}, "exact: given"),
+        ({"exact": {"x": list(range(20)), "voltage": [1e6] * 20, "friction": [0.3] * 20}}, "exact: given"),
     ],
 )
 def test_what_the_page_never_sends_is_refused(state, message):
@@ -75,6 +77,18 @@ def test_the_profile_of_an_answer_is_that_of_the_texture():
     x = np.array(found["x"])
     wanted = np.interp(x % 2.0, [0.0, 0.5, 1.0, 1.5, 2.0], [0.0, 10.0, 0.0, -10.0, 0.0])
     np.testing.assert_allclose(found["profile"], wanted, atol=1e-3)
+
+
+def test_the_exact_voltage_takes_the_place_of_the_closed_forms():
+    x = np.linspace(0.1, 4.0, 40)
+    exact = {"x": x.tolist(), "voltage": (900.0 + 10.0 * x).tolist(), "friction": [0.31] * 40}
+    text = json.dumps({"exact": exact, "touch": {"length": 4.0}})
+    found = page.answer(parse(text))
+    assert found["encoding"] == "model"
+    assert page.answer(parse('{"touch": {"length": 4.0}}'))["encoding"] == "closed form"
+    np.testing.assert_allclose(found["felt"], 0.31, atol=1e-5)
+    assert found["numbers"]["peak"] == pytest.approx(940.0)
+    assert page.file(parse(text), "csv") != page.file(parse('{"touch": {"length": 4.0}}'), "csv")
 
 
 def test_the_models_curve_takes_the_place_of_the_estimate():

@@ -17,6 +17,7 @@ from evfem.textures.estimators import (
 DRAW = np.random.default_rng(3)
 POINTS = np.concatenate([DRAW.random((40, 3)), np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, -1).T])
 SCALE = np.array([2.0, 1.0, 0.5])
+ONES = np.ones((len(POINTS), 1))
 LINEAR = POINTS @ np.array([[1.0, -2.0], [0.5, 3.0], [2.0, 0.0]]) + 0.7
 
 
@@ -54,11 +55,11 @@ def test_the_average_is_that_of_gaussian_weights_by_hand():
 
 def test_the_width_has_the_smallest_error_of_points_left_out():
     values = np.sin(5.0 * POINTS[:, :1])
-    best = best_width(POINTS * SCALE, values)
-    errors = {
-        width: np.sum((left_out(Estimator(POINTS, values, width, SCALE), "average") - values) ** 2)
-        for width in (best, best * 1.15, best / 1.15)
-    }
+    best = best_width(POINTS * SCALE, values, ONES)
+    errors = {}
+    for width in (best, best * 1.15, best / 1.15):
+        wrong = left_out(Estimator(POINTS, values, width, SCALE), "average") - values
+        errors[width] = np.mean(np.minimum(np.abs(wrong), 1.0))
     assert min(errors, key=errors.get) == best
 
 
@@ -84,9 +85,17 @@ def test_linear_interpolation_refuses_a_place_outside():
 
 def test_the_search_stretches_the_axis_along_which_the_response_changes():
     points = np.random.default_rng(5).random((60, 2))
-    scale, smoothing = best_kernel(points, np.sin(np.outer(9.0 * points[:, 0], [1.0, 0.7])))
+    values = np.sin(np.outer(9.0 * points[:, 0], [1.0, 0.7]))
+    scale, smoothing = best_kernel(points, values, np.full((60, 2), 0.5))
     assert scale[0] > 4.0 * scale[1]
     assert smoothing < 0.1
+
+
+def test_what_does_not_count_does_not_guide_the_search():
+    points = np.random.default_rng(5).random((60, 2))
+    values = np.sin(9.0 * points)  # the first changes along the first axis, the second along the other
+    scale, _ = best_kernel(points, values, np.tile([0.5, 0.0], (60, 1)))
+    assert scale[0] > 4.0 * scale[1]
 
 
 def test_errors_of_points_left_out_by_the_formula_are_those_of_solving_again():

@@ -5,9 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evfem.textures.feeling import BANDS, Device, exact_voltage, playback, render
+from evfem.simulation.rendering import record
+from evfem.textures.feeling import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
 from evfem.textures.library import reference
-from evfem.textures.touch import FrictionCurve, Touch
+from evfem.textures.touch import FrictionCurve, Touch, friction_of, touch_scene
 
 X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
 TOUCH = Touch(load=0.05)
@@ -76,9 +77,29 @@ def test_a_file_has_a_round_full_scale_and_both_frictions():
 @pytest.mark.slow
 def test_the_exact_voltage_gives_the_force_of_the_texture():
     touch = Touch(ridged=False, length=0.5)
-    found = exact_voltage(reference("wave-2mm"), touch, Device(friction=0.2))
+    device = Device(friction=0.2)
+    found = exact_voltage(record(touch_scene(reference("wave-2mm"), touch)), device)
     slipping = found.comparison.position > touch.friction * touch.load * 100.0
     wanted = found.reference.result.applied_tangential_force.max()
     assert np.abs(found.comparison.error[slipping]).max() < 1e-6 * wanted
-    assert found.voltage.position[-1] == pytest.approx(0.5)
-    assert found.voltage.voltage.min() > 100.0
+    assert found.curve.x[-1] == pytest.approx(0.5)
+    assert found.curve.voltage.min() > 100.0
+    rendered = render_exact(friction_of(found.reference.result), found.curve, touch, device)
+    assert rendered.force_error < 1e-6
+    assert not rendered.lost.any()
+
+
+def test_a_voltage_that_was_found_is_compared_like_one_of_the_closed_forms():
+    """The closed form's own voltage and friction, given as the model's."""
+    wish, device = curve((0.02, 10.0)), Device(friction=0.39)
+    form = render(wish, TOUCH, device)
+    given = ExactCurve(wish.x, form.signal.profile(wish.x), form.felt)
+    found = render_exact(wish, given, TOUCH, device)
+    for name in ("force_error", "change_error", "spectrum_error"):
+        assert getattr(found, name) == pytest.approx(getattr(form, name)), name
+        assert getattr(found, name) > 0.01
+    np.testing.assert_allclose(found.bands, form.bands, rtol=1e-9)
+    assert found.signal.largest == pytest.approx(form.signal.largest)
+    assert found.signal.rms == pytest.approx(form.signal.rms, rel=0.02)
+    assert found.signal.carrier == pytest.approx(form.signal.carrier)
+    assert found.signal.share_not_renderable == pytest.approx(form.signal.share_not_renderable, abs=0.02)

@@ -6,6 +6,7 @@ const DRAWN = 64;
 let drawn = Array.from({length: DRAWN}, (_, i) => 0.8 * Math.sin(2 * Math.PI * i / DRAWN));
 let upload = null;      // a texture by its rows
 let model = null;       // {key, x, friction}: the model's curve, and for which texture and touch
+let exact = null;       // {key, x, voltage, friction}: the model's voltage, and for which display as well
 let asked = 0, answered = 0, busy = false, again = false;
 let running = null;     // AbortController of the model's run
 
@@ -43,11 +44,13 @@ function state() {
 }
 
 const felt = (now) => JSON.stringify([now.texture, now.touch]);
+const shown_by = (now) => JSON.stringify([now.texture, now.touch, now.device]);
 
 // With the model's curve where there is one for this texture and touch.
 function whole() {
   const now = state();
   if (model && model.key === felt(now)) now.model = {x: model.x, friction: model.friction};
+  if (exact && exact.key === shown_by(now)) now.exact = {x: exact.x, voltage: exact.voltage, friction: exact.friction};
   return now;
 }
 
@@ -109,7 +112,7 @@ function numbers(found) {
   const n = found.numbers, percent = (v) => v === null ? "none" : v > 0 && v < 0.001 ? "below 0.1 %" : `${(100 * v).toFixed(v < 0.1 ? 1 : 0)} %`;
   const told = {
     "Voltage, rms": `${n.rms.toFixed(0)} V`, "Voltage, peak": `${n.peak.toFixed(0)} V`,
-    "Friction from": found.source,
+    "Voltage from": found.encoding, "Friction from": found.source,
     "Friction, mean": n.mean.toFixed(3), "Its range": n.range.toFixed(4),
     "Its error": found.band === null ? "none known" : `+- ${found.band.toFixed(4)}`,
     "Cannot be rendered": percent(n.lost), "Error of the force": percent(n.force_error),
@@ -129,14 +132,14 @@ function numbers(found) {
 
 // -- the model ------------------------------------------------------------------------------------------------
 
-async function run() {
-  const key = felt(state()), text = JSON.stringify(state());
+async function run(encoding) {
+  const now = state(), text = JSON.stringify(now);
   running = new AbortController();
   const mine = running;
   showRunning(true, "starting");
   let ended = "done";
   try {
-    const answer = await post("run", text, mine.signal);
+    const answer = await post(`run?encoding=${encoding}`, text, mine.signal);
     const reader = answer.body.pipeThrough(new TextDecoderStream()).getReader();
     let rest = "";
     for (;;) {
@@ -144,7 +147,7 @@ async function run() {
       if (done) break;
       const lines = (rest + value).split("\n");
       rest = lines.pop();
-      for (const line of lines) ended = told(JSON.parse(line), key) || ended;
+      for (const line of lines) ended = told(JSON.parse(line), now) || ended;
     }
   } catch (error) {
     ended = error.name === "AbortError" ? "cancelled" : "ended";
@@ -153,14 +156,17 @@ async function run() {
   if (running === mine) showRunning(false, ended);
 }
 
-function told(line, key) {
+function told(line, now) {
   if (line.of) {
     get("progress").max = line.of;
     get("progress").value = line.step;
     get("said").textContent = `step ${line.step} of ${line.of}`;
   } else if (line.curve) {
-    model = {key, ...line.curve};
-    get("said").textContent = "drawing";
+    model = {key: felt(now), ...line.curve};
+    get("said").textContent = "the slide is done";
+    refresh();
+  } else if (line.exact) {
+    exact = {key: shown_by(now), ...line.exact};
     refresh();
   } else if (line.picture) {
     show("picture", "png", line.picture);
@@ -179,7 +185,7 @@ function show(id, kind, data) {
 }
 
 function showRunning(on, said) {
-  get("run").disabled = on;
+  get("run").disabled = get("exact").disabled = on;
   get("cancel").hidden = !on;
   get("progress").hidden = !on;
   if (on) get("progress").value = 0;
@@ -332,7 +338,8 @@ async function begin() {
   get("canvas").addEventListener("pointermove", (event) => { if (event.buttons) pen(event); });
   get("canvas").addEventListener("keydown", keys);
   get("clear").addEventListener("click", () => { drawn = drawn.map(() => 0); changed(); });
-  get("run").addEventListener("click", run);
+  get("run").addEventListener("click", () => run("closed"));
+  get("exact").addEventListener("click", () => run("exact"));
   get("cancel").addEventListener("click", () => running.abort());
   for (const button of document.querySelectorAll("[data-file]")) {
     button.addEventListener("click", () => save(button.dataset.file));

@@ -1,0 +1,182 @@
+r"""The pad of the textures as it slides over a flat surface, and how it yields there.
+
+On a flat surface, once all of its contact slips, the pad's nodes have moved by q relative to the
+bone and carry the forces f. With the condensed tangent's compliance C, other forces f' move them by
+``q + C (f' - f)`` to first order. `remember` takes these from the model at `LOADS` and `FRICTIONS`,
+for a smooth and a ridged finger. In between, with bilinear weights w over the logarithm of the load
+and the friction,
+
+.. math:: q(f') = \sum_k w_k \left(q_k - \tfrac12 C_k f_k\right) + \bar C\,(f' - \tfrac12 \bar f)
+
+which is exact at what is stored, and in between where the compliance changes linearly with the
+force. The file holds the triangles of C in half precision: that the curves differ by less than they
+do from the model's is tested.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import evfem
+from evfem.common.arrays import Floats, Ints
+from evfem.common.storage import load_arrays, save_arrays
+from evfem.contact.edge import outline_nodes
+from evfem.contact.signorini import OPEN
+from evfem.contact.surfaces import Flat
+from evfem.finger.fingerpad import FingerPad
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
+from evfem.simulation.run import Run
+from evfem.solver.condensation import make_condensation
+from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
+
+FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-1"
+#: what is remembered: loads (N/mm) and friction coefficients
+LOADS, FRICTIONS = np.geomspace(0.02, 0.1, 5), np.array([0.1, 0.6])
+#: nodes kept beyond those that touch on the flat surface, on either side
+MARGIN = 14
+
+
+@dataclass(frozen=True, eq=False)
+class PressedPad:
+    """n nodes of a pad under a `load` (N/mm): their `x` and `y` (n,) where nothing has moved,
+    relative to the bone (mm). Forces F (2 n,), y components first, move them by `base` (2 n,)
+    + `compliance` (2 n, 2 n) F; `force` (2 n,) are those on a flat surface.
+    """
+
+    x: Floats
+    y: Floats
+    base: Floats
+    compliance: Floats
+    force: Floats
+    load: float
+
+
+@dataclass(frozen=True, eq=False)
+class Remembered:
+    """What is stored of one finger, for each of K loads and frictions: places (n, 2), displacements
+    and forces (K, 2 n) and compliances (K, 2 n, 2 n), y components first.
+    """
+
+    points: Floats
+    moved: Floats
+    force: Floats
+    compliance: Any
+
+    def at(self, load: float, friction: float) -> PressedPad:
+        """The pad under a load (N/mm) and a friction, those of its nodes that touch or nearly do.
+
+        Both are within `LOADS` and `FRICTIONS`.
+        """
+        weight = np.outer(_hats(np.log(LOADS), np.log(load)), _hats(FRICTIONS, friction)).ravel()
+        n = len(self.points)
+        force = weight @ self.force
+        touching = np.flatnonzero(force[:n] > 0.0)
+        near = np.arange(max(touching[0] - MARGIN, 0), min(touching[-1] + MARGIN + 1, n))
+        both = np.concatenate([near, n + near])
+        used = np.flatnonzero(weight)
+        compliances = self.compliance[np.ix_(used, both, both)].astype(float)
+        compliance = np.tensordot(weight[used], compliances, 1)
+        half = np.einsum("kij,kj->ki", compliances, 0.5 * self.force[np.ix_(used, both)])
+        base = weight[used] @ (self.moved[np.ix_(used, both)] - half) - 0.5 * compliance @ force[both]
+        x, y = self.points[near].T
+        return PressedPad(x, y, base, compliance, force[both], load)
+
+
+def _hats(nodes: Floats, x: float) -> Floats:
+    """Weights of linear interpolation at x between growing nodes."""
+    return np.array([np.interp(x, nodes, unit) for unit in np.eye(nodes.size)])
+
+
+@cache
+def shipped_pad(ridged: bool) -> Remembered:
+    """The pad of one finger that comes with evfem."""
+    return read(Path(evfem.__file__).parent / "data" / FILE, ridged)
+
+
+def read(path: Path, ridged: bool) -> Remembered:
+    """The pad of one finger in a file that `write` wrote."""
+    arrays = load_arrays(path, "pads", FORMAT)
+    points, moved, force, triangles = (
+        arrays[f"{name}_{int(ridged)}"] for name in ("points", "moved", "force", "triangle")
+    )
+    size = moved.shape[1]
+    upper = np.triu_indices(size)
+    compliance = np.zeros((len(moved), size, size), dtype=np.float32)
+    compliance[:, upper[0], upper[1]] = triangles
+    compliance[:, upper[1], upper[0]] = triangles
+    return Remembered(points, moved, force, compliance)
+
+
+def write(path: Path, pads: Mapping[bool, Remembered]) -> None:
+    """Pads, by whether they are ridged, as a file."""
+    arrays = {"format": np.array(FORMAT)}
+    for ridged, pad in pads.items():
+        upper = np.triu_indices(pad.moved.shape[1])
+        arrays |= {
+            f"points_{int(ridged)}": pad.points,
+            f"moved_{int(ridged)}": pad.moved,
+            f"force_{int(ridged)}": pad.force,
+            f"triangle_{int(ridged)}": pad.compliance[:, upper[0], upper[1]].astype(np.float16),
+        }
+    save_arrays(path, arrays)
+
+
+def flat_scene(load: float, friction: float, ridged: bool) -> Scene:
+    """Sliding over a flat surface until the whole contact slips."""
+    slip = SLIP_PER_FORCE * friction * load
+    return Scene(
+        FingerPad(resolution="coarse", ridges=ridged, viscosity=VISCOSITY),
+        Flat(friction=friction),
+        solver=Solver(dynamics="viscous", threads=1),
+        motion=(
+            Press(force=load, steps=4),
+            Slide(slip, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
+        ),
+        name="flat",
+    )
+
+
+def remember(ridged: bool) -> Remembered:
+    """Run the model on a flat surface at `LOADS` and `FRICTIONS`, and keep what is stored of it."""
+    runs = [_slid(flat_scene(load, mu, ridged)) for load in LOADS.tolist() for mu in FRICTIONS.tolist()]
+    mesh, pad = runs[0].model.mesh, runs[0].model.pad
+    order = np.searchsorted(pad.nodes, outline_nodes(mesh))
+    order = order[pad.free[order]]
+    touching = np.flatnonzero(np.any([run.state.status[order] != OPEN for run in runs], axis=0))
+    near = order[max(touching[0] - MARGIN, 0) : touching[-1] + MARGIN + 1]
+    nodes = pad.nodes[near]
+    moved = np.array([run.state.u[nodes] - run.state.bone for run in runs])
+    force = np.array([run.model.equilibrium.contact_forces(run.state)[near] for run in runs])
+    compliance = np.stack([_compliance(run, nodes) for run in runs])
+    return Remembered(mesh.points[nodes], _y_first(moved), _y_first(force), compliance)
+
+
+def _y_first(vectors: Floats) -> Floats:
+    """Vectors (K, n, 2) as (K, 2 n)."""
+    return np.concatenate([vectors[:, :, 1], vectors[:, :, 0]], axis=1)
+
+
+def _slid(scene: Scene) -> Run:
+    run = Run(scene, None)
+    for request in run.requests():
+        run.advance(request)
+        run.frames.clear()
+    return run
+
+
+def _compliance(run: Run, nodes: Ints) -> Floats:
+    """Condensed compliance (2 n, 2 n) of pad nodes, the bone held."""
+    body = run.model.body
+    unknowns = body.unknowns[nodes]
+    order = np.concatenate([unknowns[:, 1], unknowns[:, 0], body.bone])
+    factor = make_condensation(body.pattern, order, run.scene.solver.threads)
+    factor.factorise(body.tangent(run.state.u))
+    inverse = np.linalg.inv(factor.schur[:-2, :-2])
+    return np.asarray(0.5 * (inverse + inverse.T))
