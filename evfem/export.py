@@ -254,12 +254,15 @@ def instants(rows: Sequence[Mapping[str, Any]]) -> list[float]:
     [0.0, 1e-09, 0.5, 1.0]
     >>> instants([{"time": t, "position": 0.0} for t in (0.1, 0.2)])
     [0.1, 0.2]
+    >>> instants([{"time": 0.0, "position": x, "position_z": 4.0} for x in (0.0, 3.0)])
+    [4.0, 7.0]
     """
     values = np.array([float(row["time"]) for row in rows])
     if not values.any():
         values = np.array([float(row["position"]) for row in rows])
-        if np.any(np.diff(values) < 0.0):
-            values = np.cumsum(np.abs(np.diff(values, prepend=0.0)))
+        along = np.array([float(row.get("position_z", 0.0)) for row in rows])
+        if along.any() or np.any(np.diff(values) < 0.0):
+            values = np.cumsum(np.hypot(np.diff(values, prepend=0.0), np.diff(along, prepend=0.0)))
     result: list[float] = []
     for value in values.tolist():
         result.append(max(value, result[-1] + INSTANT) if result else value)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -37,7 +37,11 @@ HISTORY, SUMMARY, FIELDS, PICTURE, STATE = (
     "forces.png",
     "checkpoint.npz",
 )
-OURS = re.compile(r"history\.csv|summary\.json|fields\.pvd|fields_\d+\.vtu|forces\.png|checkpoint\.npz")
+#: of a finger in three dimensions: its skin alone, beside the fields of the solid
+SKIN = "skin.pvd"
+OURS = re.compile(
+    r"history\.csv|summary\.json|(fields|skin)\.pvd|(fields|skin)_\d+\.vtu|forces\.png|checkpoint\.npz"
+)
 #: what a killed run was writing
 LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
 
@@ -60,7 +64,7 @@ class RunFolder:
     mesh: Mesh | None = field(default=None, init=False)
     opened: bool = field(default=False, init=False)
     files: FieldFiles | None = field(default=None, init=False)
-    _series: ParaViewSeries | None = field(default=None, init=False)
+    _series: tuple[ParaViewSeries, ...] = field(default=(), init=False)
     _digest: str = field(default="", init=False)
     _lines: list[str] = field(default_factory=list, init=False)
     _pending: tuple[Row, Frame | None, Callable[[], dict[str, Any]]] | None = field(default=None, init=False)
@@ -101,14 +105,15 @@ class RunFolder:
         row, frame, checkpoint = self._pending
         if not self.opened:
             self._open()
-        if frame is not None and self._series is not None and self.mesh is not None and self._wants(row):
-            self._series.add(row, frame, self.mesh)
+        if frame is not None and self.mesh is not None and self._wants(row):
+            for series in self._series:
+                series.add(row, frame, self.mesh)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
             self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
-        if self._series is not None:
-            self._series.write_index()
+        for series in self._series:
+            series.write_index()
         self._pending = None
 
     def _wants(self, row: Row) -> bool:
@@ -128,8 +133,8 @@ class RunFolder:
         if not self.opened:
             self._open()
         self._write_history()
-        if result is not None and self._series is not None:
-            self._write_last(result, self._series)
+        if result is not None:
+            self._write_last(result)
         if result is None:
             assert self.mesh is not None
             result = Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
@@ -139,12 +144,13 @@ class RunFolder:
             _picture(result if result.depth is None else result.total, self.path / PICTURE)
         return summary
 
-    def _write_last(self, result: Result, series: ParaViewSeries) -> None:
+    def _write_last(self, result: Result) -> None:
         """The fields of the last good step, where a run ended between two that are written."""
         last = result.frames[-1] if result.frames else None
         if last is not None and last.step == self.rows[-1]["step"] and not self._wants(self.rows[-1]):
-            series.add(self.rows[-1], last, result.mesh)
-            series.write_index()
+            for series in self._series:
+                series.add(self.rows[-1], last, result.mesh)
+                series.write_index()
 
     def _open(self) -> None:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
@@ -154,16 +160,25 @@ class RunFolder:
             for name in old if self.resume else [*old, *_present(self.path)]:
                 (self.path / name).unlink()
         steps = range(1, self.scene.total_steps + 1)
-        if self.files is not None:
-            single, compressed = self.files.single, self.files.compressed
-            path = self.path / FIELDS
-            self._series = ParaViewSeries(path, self.rows, single=single, compressed=compressed)
-        series = [self._series.frame_path(n).name for n in steps] if self._series else []
+        self._series = self._paraview()
+        series = [name for one in self._series for name in (one.path.name, *_frames(one, steps))]
         names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
         names = sorted({*names, *(names_in(self.path / MANIFEST) if self.resume else ())})
         write_names(self.path / MANIFEST, names)
         self._write_history()
         self.opened = True
+
+    def _paraview(self) -> tuple[ParaViewSeries, ...]:
+        """The series of the fields, and in three dimensions that of the skin."""
+        if self.files is None or self.mesh is None:
+            return ()
+        single, compressed = self.files.single, self.files.compressed
+        return tuple(
+            ParaViewSeries(
+                self.path / name, self.rows, single=single, compressed=compressed, skin=name == SKIN
+            )
+            for name in ((FIELDS, SKIN) if self.mesh.dim == 3 else (FIELDS,))
+        )
 
 
 def saved(path: Path, scene: Scene) -> Saved | None:
@@ -234,6 +249,10 @@ def result_in(path: Path) -> Result:
 
 def _fields_of(path: Path, row: Row) -> Path:
     return ParaViewSeries(path / FIELDS).frame_path(row["step"])
+
+
+def _frames(series: ParaViewSeries, steps: Iterable[int]) -> list[str]:
+    return [series.frame_path(step).name for step in steps]
 
 
 def _without_a_row(history: Path) -> bool:

@@ -17,6 +17,7 @@ NAMES = (
     "laws",
     "fringe",
     "fingertip",
+    "fingerprint",
     "fig05",
     "fig06",
     "fig07",

@@ -36,8 +36,10 @@ from .fingertip_panels import draw
 from .measured import participant_forces
 
 LOADS, QUICK_LOADS = (0.05, 0.1, 0.25, 0.5, 1.0), (0.1, 0.5)
-#: where pads and meshes are compared, N
+#: where pads and meshes are compared (N), and the way of ridged ones there: what may touch within a
+#: step is a candidate, so that a long one costs more than three
 LOAD = 0.5
+WAY = (0.1, 0.25, LOAD)
 ASSUMPTIONS = {
     "pad": "Table 2's axes and moduli; 22.5 mm long (26 mm seen at 30 degrees); the bone's axes are assumed",
     "areas": (
@@ -182,9 +184,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     table = {name: pressed(name, result, loads) for name, result in runs.items()}
     width = {name: effective_width(one["depth_mm"], loads, name == "ridged") for name, one in table.items()}
     changed, forces = variants(quick), hovering(quick)
-    crests = (
-        {} if quick else {name: press(tip(ridges="along", **own), (LOAD,)) for name, own in CRESTS.items()}
-    )
+    crests = {} if quick else {name: press(tip(ridges="along", **own), WAY) for name, own in CRESTS.items()}
     numbers = press_numbers(table, loads) | variant_numbers(changed) | hover_numbers(forces)
     for name, one in crests.items():
         gross, _ = gross_area(one, -1)
@@ -263,7 +263,7 @@ def errors(
     if quick:
         return {}
     found = {}
-    coarse, finer = press(tip(), (0.25, LOAD)), press(tip(ridges="along", resolution="medium"), (LOAD,))
+    coarse, finer = press(tip(), (0.25, LOAD)), press(tip(ridges="along", resolution="medium"), WAY)
     at = LOADS.index(LOAD)
     ends = {
         "smooth.mesh": (coarse, table["smooth"], len(coarse.mesh.points), len(runs["smooth"].mesh.points)),

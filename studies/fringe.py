@@ -267,6 +267,7 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     for one, label in zip(series[-2:], ("towards the display", "along x"), strict=True):
         axes[3].plot(one.x, one.y, label=label)
     axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
+    axes[3].set_ylim(top=1.3)
     axes[3].legend(fontsize=7, loc="upper left")
     panel_letter(axes[3], "d")
     for k, (key, label) in enumerate((("measured", "measured"), ("law", "(8a)"), ("full", "full field"))):
@@ -274,6 +275,7 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
         axes[4].bar(np.arange(len(CASES)) + 0.27 * (k - 1), heights, 0.25, label=label)
     axes[4].set_xticks(range(len(CASES)), list(CASES))
     axes[4].set_ylabel("participants' median (mN)")
-    axes[4].legend(fontsize=7)
+    axes[4].margins(y=0.4)
+    axes[4].legend(fontsize=7, loc="upper right")
     panel_letter(axes[4], "e")
     return figure

@@ -24,12 +24,12 @@ from evfem.common.tables import numbers, read_table
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.keys import shown
 from evfem.scene.scene import DEPTH
-from evfem.simulation.history import over_depth
+from evfem.simulation.history import SPATIAL, over_depth
 from evfem.simulation.result import COLUMNS, Result
 from evfem.sweeps.file import check_key, check_output, plain_value
 from evfem.sweeps.run import output
 
-NUMBERS = tuple(name for name in COLUMNS if name != "motion")
+NUMBERS = tuple(name for name in (*COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind
 MOST = 100_000
 

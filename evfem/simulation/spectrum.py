@@ -31,10 +31,20 @@ EVEN = 1e-6
 class Spectrum(NamedTuple):
     """Frequencies (Hz) from 0 to half the rate of the steps, and the amplitude at each, in the
     unit of the column.
+
+    >>> Spectrum(np.array([0.0, 50.0, 100.0]), np.array([1.0, 3.0, 0.5]))
+    Spectrum of 3 frequencies up to 100 Hz: mean 1, largest 3 at 50 Hz
     """
 
     frequency: Floats
     amplitude: Floats
+
+    def __repr__(self) -> str:
+        """Its size, the mean, and the largest amplitude beside it."""
+        largest = 1 + int(np.argmax(self.amplitude[1:]))  # two rows at least: 0 and another frequency
+        text = f"Spectrum of {self.frequency.size} frequencies up to {self.frequency[-1]:g} Hz"
+        peak = f"{self.amplitude[largest]:.4g} at {self.frequency[largest]:g} Hz"
+        return f"{text}: mean {self.amplitude[0]:.4g}, largest {peak}"
 
 
 def spectrum(

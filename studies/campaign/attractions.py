@@ -75,6 +75,9 @@ def add_drive(random: Draw, tables: Tables) -> None:
         found |= {"drive": "resolved", "frequency": six_digits(wait["steps"] / (20.0 * wait["duration"]))}
     elif signal.get("kind") == "carrier":
         return
+    repeats = signal.get("kind") in ("sine", "square") or signal.get("repeat", False)
+    if repeats and "drive" not in found:  # the mean is over its own cycle
+        del found["frequency"]
     if "voltage" in table and "voltage" not in kinds and random.chance(0.5):
         table["amplitude"] = abs(table.pop("voltage"))
     table |= found

@@ -3,7 +3,8 @@
 Scene `number` of a seed is the same however many are drawn. Lengths in mm, forces in N/mm,
 voltages in V. The ranges are those of coarse fingers: any size, smooth and ridged, ready-made
 meshes, all surfaces, friction from 0 to 1.5, insulators of 5 um to 0.5 mm below 60 V/um and 3000 V.
-Sizes follow the finger's: `scale` is its width over that of Table 2.
+Sizes follow the finger's: `scale` is its width over that of Table 2. One scene in ten has a finger
+in three dimensions (`solids`).
 """
 
 from __future__ import annotations
@@ -12,11 +13,18 @@ from .attractions import add_drive, add_field, add_roughness, add_voltage, elect
 from .bodies import TABLE_2_WIDTH, finger, width
 from .draws import Draw
 from .grounds import add_friction_law, surface
+from .solids import draw_solid
 from .tables import Tables, copied
+
+#: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
+SHARE, SOLID = 0.1, 3
 
 
 def draw(seed: int, number: int) -> Tables:
     """The tables of scene `number` of a seed."""
+    other = Draw(seed, number, SOLID)
+    if other.chance(SHARE):
+        return draw_solid(other)
     random = Draw(seed, number)
     tables: Tables = {"version": 1, "finger": finger(random)}
     charged = random.chance(0.7)
@@ -34,7 +42,19 @@ def draw(seed: int, number: int) -> Tables:
     _add_hand(random, tables)
     add_drive(random, tables)
     add_field(random, tables)
+    _add_path(other, tables)
     return copied(tables)
+
+
+def _add_path(random: Draw, tables: Tables) -> None:
+    """Perhaps parts as long as the error of the path allows, where no time passes: the books of a
+    part with time are those of its trial in one piece, and do not close yet.
+    """
+    timed = "dynamics" in tables["solver"] or "hand" in tables or "friction_law" in tables["surface"]
+    timed |= any(motion["kind"] == "wait" for motion in tables["motion"])
+    if not timed and random.chance(0.05):
+        strategy = tables["solver"].setdefault("strategy", {})
+        strategy |= {"steps": "auto", "path_error": random.spread(1e-3, 0.1)}
 
 
 def _add_hand(random: Draw, tables: Tables) -> None:

@@ -11,10 +11,10 @@ GENERATOR = 2
 
 
 class Draw:
-    """Random numbers of one scene: the same for the same seed and number."""
+    """Random numbers of one scene: the same for the same seed, number and `further` ones."""
 
-    def __init__(self, seed: int, number: int) -> None:
-        self._random = np.random.default_rng([GENERATOR, seed, number])
+    def __init__(self, seed: int, number: int, *further: int) -> None:
+        self._random = np.random.default_rng([GENERATOR, seed, number, *further])
 
     def chance(self, probability: float) -> bool:
         """True with that probability."""

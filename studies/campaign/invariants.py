@@ -19,6 +19,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.friction import Coulomb
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
+from evfem.simulation.history import WIDTHS
 from evfem.simulation.result import COLUMNS, Frame, Result
 
 FORCE, ENERGY = 1e-6, 1e-9  # N/mm, N
@@ -84,6 +85,11 @@ def _largest_force(result: Result) -> Floats:
 ELECTRIC = ("field_energy", "leakage_dissipation")
 
 
+def _solid(result: Result) -> bool:
+    """Whether the finger has three dimensions."""
+    return result.mesh.dim == 3
+
+
 def largest_energy(result: Result) -> float:
     """Largest work or energy of a result at any time."""
     names = [name for name in COLUMNS if name.endswith(("_work", "_energy", "_dissipation"))]
@@ -102,9 +108,9 @@ def remainder(result: Result) -> Floats:
 
 
 def finite(scene: Scene, result: Result) -> Broken | None:
-    """Every number of rows and frames, but the gaps off the pad."""
-    names = [name for name in COLUMNS if name != "motion"]
-    rows = ~np.isfinite([getattr(result, name) for name in names]).all(axis=0)
+    """Every number of rows and frames, but the gaps off the pad and, in three dimensions, widths."""
+    left_out = {"motion", *(WIDTHS if _solid(result) else ())}
+    rows = ~np.isfinite([result[name] for name in result.columns if name not in left_out]).all(axis=0)
     steps = [int(step) for step in result.step[rows]]
     for frame in result.frames:
         fields = (frame.displacement, frame.contact_pressure, frame.shear_traction, frame.cauchy_stress)
@@ -115,7 +121,9 @@ def finite(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def balance(scene: Scene, result: Result) -> Broken | None:
-    """Applied, contact and attraction forces add up to nothing, as a vector; without inertia."""
+    """Applied, contact and attraction forces add up to nothing, as a vector; without inertia. In
+    three dimensions no column has what is applied along z.
+    """
     if scene.solver.dynamics == "inertial":
         return None
     x = result.applied_tangential_force - result.tangential_force + result.electrostatic_force_x
@@ -130,7 +138,8 @@ def cone(scene: Scene, result: Result) -> Broken | None:
     if not scene.ground.is_flat or not isinstance(scene.friction_law, Coulomb):
         return None
     mu = float(np.max(np.atleast_2d(scene.surface.friction)[:, -1]))  # type: ignore[attr-defined]
-    beyond = np.abs(result.tangential_force) - mu * result.normal_force
+    along_z = result["tangential_force_z"] if _solid(result) else 0.0
+    beyond = np.hypot(result.tangential_force, along_z) - mu * result.normal_force
     return _worst("cone", beyond / _largest_force(result), TOLERANCE, result.step)
 
 
@@ -185,14 +194,16 @@ def penetration(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def signs(scene: Scene, result: Result) -> Broken | None:
-    """Normal force, attraction, energies and widths are not negative; touching is not wider than
-    contact.
+    """Normal force, attraction, energies and widths or areas are not negative; touching is not wider
+    than contact.
     """
     force, energy = _largest_force(result), largest_energy(result)
+    size = "area" if _solid(result) else "width"
+    touching, whole = result[f"real_contact_{size}"], result[f"contact_{size}"]
     lowest = [
         np.minimum(result.normal_force if scene.ground.is_flat else 0.0, result.electrostatic_force) / force,
         np.minimum(result.stored_energy, result.kinetic_energy) / energy,
-        np.minimum(result.real_contact_width, result.contact_width - result.real_contact_width),
+        np.minimum(touching, whole - touching),
     ]
     return _worst("signs", -np.min(lowest, axis=0), TOLERANCE, result.step)
 

@@ -83,7 +83,9 @@ def mirrored(tables: Tables) -> Tables:
         surface["terms"] = [[0.025, -6.0, 0.0], [0.05 / 2.0, 12.0, 1.5707963267948966]]
         surface["terms"].append([-0.025, 0.0, 1.5707963267948966])
     for motion in tables["motion"]:
-        if motion["kind"] == "slide":
+        if "angle" in motion:
+            motion["angle"] = float(f"{180.0 - motion['angle']:.9g}")
+        elif motion["kind"] == "slide":
             motion["distance"] = -motion["distance"]
     return tables
 

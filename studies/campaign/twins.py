@@ -14,6 +14,8 @@ from .invariants import FORCE, Broken, largest_energy
 #: columns that are compared, and which of them change sign in a mirror
 ODD = ("position", "tangential_force", "applied_tangential_force", "electrostatic_force_x")
 COMPARED = (*ODD, "indentation", "normal_force", "applied_force", "electrostatic_force")
+#: those of a finger in three dimensions too
+ALONG = ("position_z", "tangential_force_z")
 #: relative differences that two correct results may have
 MIRRORED, HALVED = 1e-4, 1e-5
 #: share of the largest energy that snaps may set free and be none
@@ -49,9 +51,9 @@ def mirror_broken(one: Result, other: Result) -> Broken | None:
     if len(one.step) != len(other.step):
         return Broken("mirror", int(min(len(one.step), len(other.step))) + 1, 1.0, 0.0)
     scale, rows = _scale(one), []
-    for name in COMPARED:
+    for name in (*COMPARED, *(name for name in ALONG if name in one.columns)):
         sign = -1.0 if name in ODD else 1.0
-        apart = np.abs(getattr(one, name) - sign * getattr(other, name))
+        apart = np.abs(one[name] - sign * other[name])
         rows.append(apart / (scale if "force" in name else 1.0))
     worst = np.max(rows, axis=0)
     row = int(np.argmax(worst))

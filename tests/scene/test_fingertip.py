@@ -107,3 +107,21 @@ def test_a_run_leaves_what_can_be_loaded(tmp_path, capsys):
     assert result["contact_area"][-1] > 1.0
     assert result.frames[-1].displacement.shape == (len(result.mesh.points), 3)
     assert result.normal_force[-1] == pytest.approx(result.applied_force[-1], rel=1e-6)
+    import pyvista
+
+    skin = pyvista.read(folder / "skin_00001.vtu")
+    assert skin.n_points == len(result.mesh.node_sets["pad"])
+    assert float(np.nanmax(skin["contact_pressure"])) == np.nanmax(result.frames[-1].contact_pressure)
+    names = (folder / ".evfem-files").read_text().split()
+    assert {"skin.pvd", "skin_00001.vtu", "fields.pvd"} <= set(names)
+
+
+def test_a_sweep_tells_columns_of_three_dimensions():
+    tip = {"kind": "fingertip", "ridges": "none", "resolution": "coarse"}
+    tables = {"version": 1, "finger": tip, "surface": {"kind": "flat"}}
+    tables["motion"] = [{"kind": "press", "indentation": 0.1}]
+    names = ("contact_area.last", "tangential_force_z.last", "position_z.last")
+    table = ev.sweep(ev.Sweep(tables, {"finger.resolution": ["coarse"]}, outputs=names), workers=1)
+    assert [row["status"] for row in table.rows] == ["done"]
+    assert table.rows[0]["contact_area.last"] > 1.0
+    assert table.rows[0]["position_z.last"] == 0.0

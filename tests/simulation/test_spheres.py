@@ -1,60 +1,96 @@
 """A sphere on a plane in three dimensions: Hertz, and Cattaneo and Mindlin (slow).
 
 A paraboloid of nearly incompressible tissue (nu = 0.48 makes the half space's normal and shear
-motion nearly independent, as Mindlin's solution assumes), finely divided where it touches and far
-from its bone: the contact radius a is a fortieth of its width and height. Twice as many cells each
-way as here miss radius, largest pressure and depth by 1.1, 1.4 and 0.3 %.
+motion nearly independent, as Mindlin's solution assumes) in quadratic cells, with nodes of the same
+distance where it touches; cells grow with the distance towards its bone, a hundred contact radii
+away. The contact radius is a two thousandth of the sphere's: strains are small.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from scipy.optimize import brentq
 from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
 from evfem.contact.signorini import STICK
 from evfem.contact.skin import make_skin
+from evfem.mesh.mesh import raised
 from evfem.simulation.run import simulate
 
-E, NU, RADIUS = 1.0, 0.48, 100.0
+E, NU, RADIUS, SIZE, FINE = 1.0, 0.48, 1000.0, 48.0, 0.6
 STIFF = E / (1.0 - NU**2)
 
 
-def graded(t):
-    """-1 to 1: cells of the same size within the contact, growing outwards."""
-    return np.sign(t) * (0.06 * np.abs(t) + 0.94 * np.abs(t) ** 6)
+def growing(count, first, total):
+    """Places of cells from 0 to `total` that grow by a factor, the first one `first` long."""
+    factor = brentq(lambda q: first * (q**count - 1.0) / (q - 1.0) - total, 1.0001, 20.0)
+    return first * np.cumsum(factor ** np.arange(count))
 
 
-def sphere(columns, rows):
-    """The paraboloid, 24 mm wide and high, in linear cells of a tenth of the contact radius."""
-    shape = dome((columns, rows, columns), (24.0, 24.0, 24.0), RADIUS, spread=graded)
-    y = shape.points[:, 1]
-    low = 0.5 * (shape.points[:, 0] ** 2 + shape.points[:, 2] ** 2) / RADIUS
-    share = (y - low) / (24.0 - low)
-    shape.points[:, 1] = low + (24.0 - low) * (0.02 * share + 0.98 * share**4)
-    return Dome(shape, ev.NeoHookean(E=E, nu=NU))
+def paraboloid(fine, coarse, rows):
+    """Linear cells: `fine` ones on 0.6 mm from the middle, `coarse` ones beyond, `rows` upwards."""
+    cell = FINE / fine
+    half = np.append(np.linspace(0.0, FINE, fine + 1), FINE + growing(coarse, 1.3 * cell, 0.5 * SIZE - FINE))
+    along, up = np.append(-half[:0:-1], half), np.append(0.0, growing(rows, cell, SIZE))
+    count = along.size - 1
+    mesh = dome((count, rows, count), (SIZE, SIZE, SIZE), RADIUS)
+    points = mesh.points
+    i, k = (np.rint((points[:, a] / SIZE + 0.5) * count).astype(int) for a in (0, 2))
+    low = 0.5 * (points[:, 0] ** 2 + points[:, 2] ** 2) / RADIUS
+    j = np.rint((points[:, 1] - low) / (SIZE - low) * rows).astype(int)
+    low = 0.5 * (along[i] ** 2 + along[k] ** 2) / RADIUS
+    points[:] = np.column_stack([along[i], low + (SIZE - low) * up[j] / SIZE, along[k]])
+    return mesh
 
 
-def press(columns, rows):
+@dataclass(frozen=True)
+class Sphere(Dome):
+    """The same as a finger of quadratic cells."""
+
+    def mesh(self, order=2):
+        mesh = raised(self.shape)
+        pad = mesh.points[mesh.node_sets["pad"]]
+        mesh.points[mesh.node_sets["pad"], 1] = 0.5 * (pad[:, 0] ** 2 + pad[:, 2] ** 2) / RADIUS
+        return mesh
+
+
+def press(fine, coarse, rows):
     """Pressed, and pulled sideways by less than friction holds."""
-    motion = [ev.Press(indentation=2.5e-3, steps=1), ev.Slide(0.7e-3, steps=1)]
-    flat = ev.Flat(friction=0.3)
-    return simulate(dome_scene(*motion, finger=sphere(columns, rows), surface=flat, law=None, voltage=0.0))
+    motion = [ev.Press(indentation=2.5e-4, steps=1), ev.Slide(0.7e-4, steps=1)]
+    finger = Sphere(paraboloid(fine, coarse, rows), ev.NeoHookean(E=E, nu=NU))
+    given = {"surface": ev.Flat(friction=0.3), "law": None, "voltage": 0.0}
+    return simulate(dome_scene(*motion, finger=finger, solver=ev.Solver(element="hex27p1"), **given))
 
 
 @pytest.fixture(scope="module")
 def pressed():
-    return press(28, 11)
+    """10 nodes on the contact's radius, 41,000 in all."""
+    return press(6, 6, 8)
+
+
+@pytest.fixture(scope="module")
+def coarser():
+    """7 nodes on the radius, half as many in all."""
+    return press(4, 5, 7)
+
+
+def touching(result, step, traction):
+    """Distance (mm) from the middle, projected area (mm2) and traction (MPa) of the skin's nodes."""
+    skin = make_skin(result.mesh)
+    frame = result.frames[step]
+    place = (result.mesh.points + frame.displacement)[skin.nodes]
+    area, value = skin.tributary(place), getattr(frame, traction)[skin.nodes]
+    middle = ((area * value)[:, None] * place[:, ::2]).sum(axis=0) / (area @ value)
+    return np.hypot(*(place[:, ::2] - middle).T), area, value
 
 
 def spread_of(result, step, traction):
     """Mean square distance (mm2) from the middle at which a traction acts."""
-    skin = make_skin(result.mesh)
-    frame = result.frames[step]
-    place = (result.mesh.points + frame.displacement)[skin.nodes]
-    force = getattr(frame, traction)[skin.nodes] * skin.tributary(place)
-    middle = (force[:, None] * place[:, ::2]).sum(axis=0) / force.sum()
-    return float(force @ ((place[:, ::2] - middle) ** 2).sum(axis=1) / force.sum())
+    distance, area, value = touching(result, step, traction)
+    return float((area * value) @ distance**2 / (area @ value))
 
 
 def radius_under(load):
@@ -63,39 +99,45 @@ def radius_under(load):
 
 @pytest.mark.slow
 def test_radius_pressure_and_depth_are_hertz_s(pressed):
-    """a^3 = 3 F R / 4 E*, p0 = 3 F / 2 pi a^2, depth a^2 / R (Johnson, Contact Mechanics, ch. 4); the
-    pressure acts at 2 a^2 / 5 in the mean square.
+    """a^3 = 3 F R / 4 E*, p0 = 3 F / 2 pi a^2, depth a^2 / R (Johnson, Contact Mechanics, ch. 4),
+    within 0.5 %: the pressure acts at 2 a^2 / 5 in the mean square, and p^2 = p0^2 (1 - r^2 / a^2)
+    fits it up to 0.9 a, within which no node feels the edge.
     """
     load = pressed.applied_force[0]
     radius = radius_under(load)
-    assert_allclose(np.sqrt(2.5 * spread_of(pressed, 0, "contact_pressure")), radius, rtol=0.025)
-    assert_allclose(pressed.frames[0].contact_pressure.max(), 1.5 * load / (np.pi * radius**2), rtol=0.03)
-    assert_allclose(pressed.indentation[0], radius**2 / RADIUS, rtol=0.015)  # 24 mm are not a half space
+    assert_allclose(pressed.indentation[0], radius**2 / RADIUS, rtol=0.005)
+    assert_allclose(np.sqrt(2.5 * spread_of(pressed, 0, "contact_pressure")), radius, rtol=0.005)
+    distance, area, pressure = touching(pressed, 0, "contact_pressure")
+    inside, weight = distance < 0.9 * radius, np.sqrt(area)
+    columns = np.column_stack([np.ones_like(distance), -(distance**2)]) * weight[:, None]
+    square, fall = np.linalg.lstsq(columns[inside], (pressure**2 * weight)[inside], rcond=None)[0]
+    assert_allclose(np.sqrt(square), 1.5 * load / (np.pi * radius**2), rtol=0.005)
+    assert_allclose(np.sqrt(square / fall), radius, rtol=0.005)
+
+
+def misses(result):
+    """Errors of the radius, of the largest pressure of a node, and of where the shear acts."""
+    radius = radius_under(result.applied_force[0])
+    largest = 1.5 * result.applied_force[0] / (np.pi * radius**2)
+    acts = np.sqrt(2.5 * spread_of(result, 0, "contact_pressure"))
+    a = radius_under(result.normal_force[1])
+    c = a * (1.0 - result.tangential_force[1] / (0.3 * result.normal_force[1])) ** (1.0 / 3.0)
+    shear = spread_of(result, 1, "shear_traction") / (0.4 * (a**5 - c**5) / (a**3 - c**3))
+    return np.abs([acts / radius, result.frames[0].contact_pressure.max() / largest, shear]) - 1.0
 
 
 @pytest.mark.slow
-def test_the_errors_fall_with_the_cells(pressed):
-    """Half as many cells each way miss radius and largest pressure by 1.5 times as much or more."""
-    missed = []
-    for result in (press(14, 6), pressed):
-        radius = radius_under(result.applied_force[0])
-        largest = 1.5 * result.applied_force[0] / (np.pi * radius**2)
-        acts = np.sqrt(2.5 * spread_of(result, 0, "contact_pressure"))
-        missed.append(
-            [abs(acts / radius - 1.0), abs(result.frames[0].contact_pressure.max() / largest - 1.0)]
-        )
-    assert (np.array(missed[0]) > 1.5 * np.array(missed[1])).all()
+def test_the_errors_fall_with_the_cells(pressed, coarser):
+    """1.5 times as many nodes on the radius: at least 1.5 times smaller errors, of single nodes too."""
+    assert (np.abs(misses(coarser)) > 1.5 * np.abs(misses(pressed))).all()
 
 
 @pytest.mark.slow
 def test_the_shear_is_cattaneo_s_and_mindlin_s(pressed):
     """c/a = (1 - Q / mu P)^(1/3) (Johnson, ch. 7): mu p of the radius a less c/a times that of c, which
-    acts at 2 (a^5 - c^5) / 5 (a^3 - c^3) in the mean square.
+    acts at 2 (a^5 - c^5) / 5 (a^3 - c^3) in the mean square; within 1 %. Finer cells leave 0.8 %.
     """
     share = pressed.tangential_force[1] / (0.3 * pressed.normal_force[1])
     assert 0.3 < share < 0.9
-    a = radius_under(pressed.normal_force[1])
-    c = a * (1.0 - share) ** (1.0 / 3.0)
-    expected = 0.4 * (a**5 - c**5) / (a**3 - c**3)
-    assert_allclose(spread_of(pressed, 1, "shear_traction"), expected, rtol=0.055)
+    assert abs(misses(pressed)[2]) < 0.01
     assert (pressed.frames[1].contact_status == STICK).any()

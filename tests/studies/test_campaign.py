@@ -16,6 +16,7 @@ from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import FingerPad
+from evfem.finger.fingertip import Fingertip
 from evfem.scene.keys import (
     MOTIONS,
     SURFACES,
@@ -112,10 +113,11 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
-    "motion.angle": "of fingers in three dimensions, which are not drawn",
+    "finger.ridge_pixel": "of the picture of a print alone",
     "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
     "finger.ridge_scan": "a measured outline, which no generator can draw",
+    "solver.symmetry": "of scenes that are their own mirror image, which hardly any drawn one is",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
@@ -136,8 +138,8 @@ def keys_of_a_scene_file():
     }
     for name, several in tables.items():
         yield from (f"{name}.{key}" for table in several for key in table.model_fields)
-    yield from (f"finger.{spec.name}" for spec in fields(FingerPad) if spec.init)
-    yield "finger.participant"
+    yield from (f"finger.{spec.name}" for of in (FingerPad, Fingertip) for spec in fields(of) if spec.init)
+    yield from ("finger.participant", "finger.kind")
 
 
 def keys_in(table, prefix=""):
@@ -324,6 +326,55 @@ def test_steps_count_only_where_there_is_a_path(correct):
     pushed = finer.normal_force.copy()
     pushed[-1] *= 1.0001
     assert twins.steps_broken(one, replace(finer, normal_force=pushed)).name == "half the steps"
+
+
+# -- three dimensions
+
+TIP = {
+    "version": 1,
+    "finger": {"kind": "fingertip", "resolution": "coarse", "ridges": "none"},
+    "surface": {"kind": "flat", "friction": 0.1},
+    "solver": {},
+    "motion": [
+        {"kind": "press", "indentation": 0.3, "steps": 1},
+        {"kind": "slide", "distance": 0.6, "steps": 1, "angle": 30.0},
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def solid():
+    scene = tables.scene_of(TIP)
+    return scene, simulate(scene)
+
+
+def test_one_scene_in_ten_has_a_finger_in_three_dimensions(drawn):
+    solids = [one for one in drawn if one["finger"].get("kind") == "fingertip"]
+    assert 0.05 * len(drawn) < len(solids) < 0.15 * len(drawn)
+    assert {one["finger"]["resolution"] for one in solids} == {"coarse"}
+    slides = [motion for one in solids for motion in one["motion"] if motion["kind"] == "slide"]
+    assert len({motion["angle"] for motion in slides}) > 5
+
+
+def test_a_result_in_three_dimensions_has_the_same_invariants(solid):
+    scene, result = solid
+    assert invariants.broken(scene, result) == []
+    more = replace(
+        result, in_space=result.in_space | {"tangential_force_z": 2.0 * result["tangential_force_z"]}
+    )
+    assert [one.name for one in invariants.broken(scene, more)] == ["cone"]
+    wide = result.in_space | {"real_contact_area": 1.01 * result["contact_area"]}
+    assert [one.name for one in invariants.broken(scene, replace(result, in_space=wide))] == ["signs"]
+
+
+def test_a_finger_in_three_dimensions_has_its_mirror_image(solid):
+    _, result = solid
+    image = tables.mirrored(TIP)
+    assert image["motion"][1] == TIP["motion"][1] | {"angle": 150.0}
+    other = simulate(tables.scene_of(image))
+    assert twins.mirror_broken(result, other) is None
+    turned = {name: -value for name, value in other.in_space.items()}
+    assert twins.mirror_broken(result, replace(other, in_space=turned)).name == "mirror"
 
 
 # -- ends
