@@ -67,7 +67,7 @@ ROOMS = {
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
-        {"numpy", "scipy", "PIL", "SurfaceTopography"},
+        {"numpy", "scipy", "PIL", "SurfaceTopography", "threadpoolctl"},
         "texture generate library cleaning importing scans parametric touch pressed sliding correction "
         "estimators database estimate feeling commands",
     ),

@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
@@ -213,7 +214,8 @@ def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, flo
     steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
     x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)
     pad = shipped_pad(touch.ridged).at(touch.load, touch.friction)
-    return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
+    with threadpool_limits(limits=1):  # small dense solves lose more by sharing
+        return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 
 
 def _sampled(texture: Texture, touch: Touch) -> tuple[Floats, Floats]:
