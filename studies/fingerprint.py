@@ -24,12 +24,17 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import Series, Study, new_figure, panel_letter
+from .common import COLOURS, Series, Study, new_figure, panel_letter
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PATTERNS = {"along": "C7", "whorl": "C0", "loop": "C1", "arch": "C2"}
+PATTERNS = {
+    "along": COLOURS["neutral"],
+    "whorl": COLOURS["kaczmarek"],
+    "loop": COLOURS["strong_troxel"],
+    "arch": COLOURS["fe"],
+}
 DIRECTIONS = {"x": 0.0, "z": 90.0}
 PITCH, LOAD, VOLTAGE, FRICTION = 0.75, 0.25, 1000.0, 0.3
 #: slides (mm), one after the other; the first, short one tells the stiffness
@@ -156,11 +161,8 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
         panel_letter(ax, letter)
     for ax in axes[0, len(shown) :]:
         ax.set_visible(False)
-    for one in patterns:
-        for way, style in (("x", "-"), ("z", "--")):
-            slid = found[one, way]
-            axes[1, 0].plot(slid.distance, slid.share, style, color=PATTERNS[one], marker="o", markersize=3)
-    axes[1, 0].set(xlabel="slide (mm)", ylabel="friction over that of full slip", ylim=(0, 1.05))
+    _bars(axes[1, 0], patterns, {way: [found[one, way].onset for one in patterns] for way in DIRECTIONS})
+    axes[1, 0].set_ylabel(f"slide (mm) at {100.0 * ONSET:g} % of the friction of full slip")
     bars = ["smooth", *patterns]
     _bars(axes[1, 1], bars, {way: [found[one, way].stiffness for one in bars] for way in DIRECTIONS})
     axes[1, 1].set_ylabel("stiffness (N/mm)")
@@ -168,26 +170,17 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
     pull = [found[one, "x"].result.electrostatic_force[PRESSED] / smooth for one in patterns]
     axes[1, 2].bar(patterns, pull, color=[PATTERNS[one] for one in patterns])
     axes[1, 2].set_ylabel("attraction over that of a smooth pad")
-    axes[1, 2].tick_params(axis="x", labelsize="small")
+    for ax in axes[1]:
+        ax.tick_params(axis="x", labelsize="small", rotation=30)
     for ax, letter in zip(axes[1], "def", strict=True):
         panel_letter(ax, letter)
-    axes[1, 0].legend(handles=_handles(patterns), fontsize="x-small")
     return figure
 
 
 def _bars(ax: Any, names: list[str], values: dict[str, list[float]]) -> None:
     place = np.arange(len(names))
     for shift, (way, heights), hatch in zip((-0.2, 0.2), values.items(), ("", "///"), strict=True):
-        colours = [PATTERNS.get(name, "C4") for name in names]
+        colours = [PATTERNS.get(name, COLOURS["measured"]) for name in names]
         ax.bar(place + shift, heights, 0.4, color=colours, hatch=hatch, edgecolor="white", label=way)
     ax.set_xticks(place, names)
-    ax.tick_params(axis="x", labelsize="small")
     ax.set_xlabel("plain: along x, hatched: along z", fontsize="small")
-
-
-def _handles(patterns: list[str]) -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], color=PATTERNS[one], label=one) for one in patterns]
-    ways = (("-", "slide along x"), ("--", "slide along z"))
-    return handles + [Line2D([], [], color="k", linestyle=style, label=label) for style, label in ways]

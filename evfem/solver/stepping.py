@@ -47,6 +47,8 @@ JUMP = 1e-3
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
+#: steps that were solved one after the other: their targets and ends
+Parts = list[tuple[Target, State]]
 
 
 @dataclass
@@ -97,7 +99,9 @@ class Stepper:
             if not self._keeps(error, fraction - done):
                 continue
             trusted = self.substep
-            for new in parts:
+            for target, new in parts:
+                if len(parts) > 1:
+                    self._restart(state, target)
                 accept(state, new)
                 state, substeps = new, substeps + 1
             if self.allowed is not None:
@@ -125,16 +129,26 @@ class Stepper:
         wanted = max(longer(error / self.allowed) * part, self.equilibrium.strategy.smallest_part)
         self.substep = min(1.0, max(wanted, self.substep) if cut else wanted)
 
-    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[list[State], float]:
+    def _part(self, state: State, path: Path, done: float, fraction: float) -> tuple[Parts, float]:
         """The equilibria of a part to accept, and the error of its path: two halves where that is
         limited.
         """
+        whole = path(done, fraction)
         if self.allowed is None:
-            return [self.solve(state, path(done, fraction))], 0.0
+            return [(whole, self.solve(state, whole))], 0.0
         middle = 0.5 * (done + fraction)
-        half = self.solve(state, path(done, middle))
-        end = self.solve(half, path(middle, fraction))
-        return [half, end], apart(self.solve(state, path(done, fraction), start=end), end)
+        first, second = path(done, middle), path(middle, fraction)
+        half = self.solve(state, first)
+        end = self.solve(half, second)
+        return [(first, half), (second, end)], apart(self.solve(state, whole, start=end), end)
+
+    def _restart(self, old: State, target: Target) -> None:
+        """Start the clocks of the step from `old` to `target` again: others were tried since, and works
+        are booked by the last one.
+        """
+        self.equilibrium.interface.begin(old, target.duration)
+        if self.body is not None and self.body.dynamics is not None:
+            self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
     def _released(
         self, state: State, target: Target, accept: Callable[[State, State], None], failed: StepFailed

@@ -54,8 +54,8 @@ ERRORS = {method: f"error_{method}" for method in METHODS}
 
 @dataclass(frozen=True, eq=False)
 class Database:
-    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and
-    that of a pad that yields `linear`ly.
+    """Textures (N,) of one finger, and over a period of each the apparent friction (N, SAMPLES) and,
+    as `linear`, that of a pad that yields linearly.
 
     Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
     rises through zero. `errors`: of each method, (N,), NaN where the point is a corner of the hull.

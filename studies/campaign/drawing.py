@@ -47,12 +47,8 @@ def draw(seed: int, number: int) -> Tables:
 
 
 def _add_path(random: Draw, tables: Tables) -> None:
-    """Perhaps parts as long as the error of the path allows, where no time passes: the books of a
-    part with time are those of its trial in one piece, and do not close yet.
-    """
-    timed = "dynamics" in tables["solver"] or "hand" in tables or "friction_law" in tables["surface"]
-    timed |= any(motion["kind"] == "wait" for motion in tables["motion"])
-    if not timed and random.chance(0.05):
+    """Perhaps parts as long as the error of the path allows."""
+    if random.chance(0.05):
         strategy = tables["solver"].setdefault("strategy", {})
         strategy |= {"steps": "auto", "path_error": random.spread(1e-3, 0.1)}
 

@@ -282,3 +282,18 @@ def test_where_nothing_remembers_the_way_automatic_steps_are_the_given_ones():
     np.testing.assert_array_equal(results[0].normal_force, results[1].normal_force)
     assert results[1].substeps.tolist() == [1, 1, 1]
     assert "path_error" not in results[1].provenance["solver"]
+
+
+@pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
+def test_books_close_where_automatic_steps_pass_time(dynamics):
+    """Works are booked by the clock of each accepted half, not by that of the trial in one piece."""
+    motion = [Press(indentation=0.3, steps=2, speed=20.0), Slide(0.2, steps=1, speed=20.0)]
+    strategy = Strategy(steps="auto", path_error=1e-2)
+    body = finger(block(8, 3, sag=0.4), viscosity=0.003)
+    result = simulate(
+        Scene(body, Flat(friction=0.3), motion=motion, solver=Solver(dynamics=dynamics, strategy=strategy))
+    )
+    kept = result.stored_energy + result.kinetic_energy + result.integrator_dissipation
+    lost = result.friction_dissipation + result.viscous_dissipation + result.snap_dissipation
+    assert result.substeps.max() > 1
+    np.testing.assert_allclose(kept + lost, result.external_work, atol=1e-7 * result.external_work[-1])
