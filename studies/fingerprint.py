@@ -162,7 +162,7 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
     for ax in axes[0, len(shown) :]:
         ax.set_visible(False)
     _bars(axes[1, 0], patterns, {way: [found[one, way].onset for one in patterns] for way in DIRECTIONS})
-    axes[1, 0].set_ylabel(f"slide (mm) at {100.0 * ONSET:g} % of the friction of full slip")
+    axes[1, 0].set_ylabel("onset of sliding (mm)")
     bars = ["smooth", *patterns]
     _bars(axes[1, 1], bars, {way: [found[one, way].stiffness for one in bars] for way in DIRECTIONS})
     axes[1, 1].set_ylabel("stiffness (N/mm)")
