@@ -14,6 +14,9 @@ from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_pow
 from evfem.tissue.moduli import bulk_modulus, check_rates, check_volumetric
 from evfem.tissue.splitlaw import stepped_tangent
 
+#: largest exponent: stretches of tissue to this power are still numbers
+MOST = 1000.0
+
 
 @dataclass(frozen=True)
 class Ogden:
@@ -39,11 +42,11 @@ class Ogden:
     volume_measure: Literal["log", "trace"] = field(default="log", init=False, repr=False)
 
     def __post_init__(self) -> None:
-        for key in ("mu", "alpha"):
+        none = "a number, or a list of numbers, none of them zero"
+        for key, allowed, inside in (("mu", none, bool), ("alpha", f"{none} or beyond +-{MOST:g}", _power)):
             given = getattr(self, key)
             values = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
-            allowed = "a number, or a list of numbers, none of them zero"
-            set_frozen(self, **{key: tuple(real(key, v, allowed, lambda v: v != 0.0) for v in values)})
+            set_frozen(self, **{key: tuple(real(key, v, allowed, inside) for v in values)})
         if len(self._terms[0]) != len(self._terms[1]):
             raise InputError("alpha", self.alpha, "as many numbers as in mu")
         if not self.shear_modulus > 0.0:
@@ -118,3 +121,8 @@ class Ogden:
         _, q = self.split_stress(F, theta)
         P33 = q + sum(m * np.exp(-a / 3.0 * theta) for m, a in zip(*self._terms, strict=True))
         return P33 / det(F)
+
+
+def _power(exponent: float) -> bool:
+    """Whether stretches of tissue to this power are numbers that tell something."""
+    return 0.0 < abs(exponent) <= MOST

@@ -92,4 +92,6 @@ def test_the_command_says_it_in_one_line(tmp_path, capsys, monkeypatch):
     (tmp_path / "scene.toml").write_text(text)
     assert main(["run", "scene.toml", "--no-fields", "--no-plots"]) == 0
     (line,) = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
-    assert line.startswith("evfem: warning: scene.toml: the surface is sharper than the node spacing of the pad")
+    assert line.startswith(
+        "evfem: warning: scene.toml: the surface is sharper than the node spacing of the pad"
+    )

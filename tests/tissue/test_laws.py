@@ -370,3 +370,14 @@ def test_constants_of_a_tangent_take_no_memory():
     A, c, k = NeoHookean(E=1.0, nu=0.3).split_tangent(*split_states((1000, 9)))
     assert A.strides[-2:] == c.strides[-2:] == k.strides[-2:] == (0, 0)
     assert not A.flags.writeable
+
+
+def test_exponents_of_ogden_are_those_that_numbers_hold():
+    """The largest one has a tangent at rest, where all stretches are equal, as a neo-Hookean law of the
+    same moduli; beyond it stretches to its power are no numbers.
+    """
+    law = Ogden(mu=[0.02 / 1000.0], alpha=[1000.0], nu=0.3)
+    same = NeoHookean(E=2.0 * 0.01 * 1.3, nu=0.3)
+    np.testing.assert_allclose(law.tangent(np.eye(3)), same.tangent(np.eye(3)), atol=1e-12)
+    with pytest.raises(InputError, match=r"alpha: given -1000\.5; allowed: .* beyond \+-1000"):
+        Ogden(mu=[-0.02], alpha=[-1000.5], nu=0.3)
