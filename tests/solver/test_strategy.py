@@ -214,9 +214,11 @@ def test_one_round_is_all_there_is_where_one_was_asked_for():
 class Decaying(Steps):
     """y' = -y by backward Euler: what a step of length h leaves of a state is 1 / (1 + h)."""
 
+    interface = SimpleNamespace(begin=lambda old, duration: None)
+
     def step(self, old, target, frozen=None, start=None):
-        self.ways.append((target, start is not None))
-        return SimpleNamespace(reaction=old.reaction / (1.0 + target), bone=np.zeros(2))
+        self.ways.append((target.duration, start is not None))
+        return SimpleNamespace(reaction=old.reaction / (1.0 + target.duration), bone=np.zeros(2))
 
 
 def decayed(allowed):
@@ -224,7 +226,7 @@ def decayed(allowed):
     steps, ends = Decaying(Strategy(), 1.0), [0.0]
     stepper = Stepper(steps, allowed=allowed)
     start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
-    path = lambda done, fraction: fraction - done  # noqa: E731
+    path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
     new, count = stepper.follow(start, path, lambda old, new: ends.append(float(new.reaction[0])))
     assert count == len(ends) - 1
     whole = [way for way, checked in steps.ways if checked]
