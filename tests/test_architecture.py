@@ -49,7 +49,7 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
         "findings "
-        "equilibrium mirrored factorised relaxation path stepping",
+        "equilibrium mirrored factorised relaxation path voltage stepping",
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},

@@ -54,9 +54,6 @@ from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 
-#: coulombs in a nanocoulomb per millimetre, per metre of depth
-NANO = 1e-6
-
 #: coulombs per metre of depth in a nanocoulomb per millimetre
 NANO = 1e-6
 
@@ -116,7 +113,7 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         run = Run(scene, resume)
         _tell(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
-        # and of the dense compliance of a skin in three dimensions, which has thousands of rows
+        # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
         with threadpool_limits(limits=scene.solver.threads if run.model.mesh.dim == 3 else None):
             for request in run.requests():
                 frame = run.advance(request)

@@ -36,14 +36,8 @@ from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import Folded, State, StepFailed
+from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
-
-#: a change of the voltage that is rounding (relative), and a voltage that is none (V)
-ROUNDING, TINY = 1e-14, 1e-300
-#: a change that is more than this share of the one before is slow
-SLOWLY = 0.1
-#: voltages closer than this share of themselves between which what a charge takes jumps by more
-JUMP = 1e-3
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
@@ -236,48 +230,3 @@ class Stepper:
                 return new
             new = equilibrium.step(state, target, frozen, start=new if done else None)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)
-
-
-@dataclass
-class VoltageSearch:
-    """The voltage (V) that a given charge takes: the pad settles under a `voltage`, and then the charge
-    would take another one. Where this settles slowly, or not, the next is by the secant of what the
-    last two lacked, or between the highest that was too low and the lowest that was too high.
-
-    A pad that snaps at a voltage between these two has no equilibrium in between.
-    """
-
-    voltage: float
-    tolerance: float
-    change: float = np.inf
-    last: tuple[float, float] | None = None
-    low: float = -np.inf
-    high: float = np.inf
-
-    def settles(self, found: float) -> bool:
-        """Whether the charge takes the voltage, `found` (V), that there was; if not, sets the next one.
-        As far as the equilibria are exact, to rounding where nothing deforms.
-        """
-        voltage, lacking, before = self.voltage, found - self.voltage, self.change
-        self.change = abs(lacking) / max(abs(found), TINY)
-        if self.change <= ROUNDING or (self.change <= self.tolerance and self.change > 0.1 * before):
-            return True
-        if lacking > 0.0:
-            self.low = max(self.low, voltage)
-        else:
-            self.high = min(self.high, voltage)
-        following = found
-        if self.last is not None and self.change > SLOWLY * before and lacking != self.last[1]:
-            following = voltage - lacking * (voltage - self.last[0]) / (lacking - self.last[1])
-        if not self.low < following < self.high:
-            following = 0.5 * (self.low + self.high) if np.isfinite(self.high - self.low) else found
-        self.last, self.voltage = (voltage, lacking), following
-        return False
-
-    @property
-    def jumps(self) -> bool:
-        """Whether equilibria at nearly the same voltage ask for different ones."""
-        if not np.isfinite(self.high - self.low):
-            return False
-        near = self.high - self.low <= JUMP * max(abs(self.low), abs(self.high))
-        return bool(near and self.change > JUMP)

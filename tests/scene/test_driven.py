@@ -163,3 +163,22 @@ def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)
     samples = ev.Sampled([60.0, 160.0, 60.0, -40.0], 300.0, repeat=True)
     assert frequency(replace(plain, voltage=samples)) == 75.0
+
+
+@pytest.mark.parametrize(
+    ("signal", "voltage", "said"),
+    [
+        ('kind = "charge", charge = 0.02', ev.ChargeControl(0.02), "given charge"),
+        ('kind = "open_circuit", voltage = 80.0, after = 0.05', ev.OpenCircuit(80.0, 0.05), "disconnected"),
+        (
+            'kind = "charge", charge = {kind = "sine", frequency = 0.5, amplitude = 0.02}',
+            ev.ChargeControl(ev.Sine(0.5, 0.02)),
+            "given charge",
+        ),
+    ],
+)
+def test_a_charge_and_an_open_circuit_have_keys(signal, voltage, said):
+    made = loads(f'{HEAD}drive = "resolved"\nsignal = {{{signal}}}\n{HOVER}{WAIT}')
+    assert made.voltage == voltage
+    assert loads(dump(made)) == made
+    assert said in next(term.reason for term in ev.plan(made).terms if term.name == "drive")

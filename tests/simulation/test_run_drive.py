@@ -9,7 +9,6 @@ from tools.meshes import block
 import evfem as ev
 from evfem.electrostatics import alternating_pressure, step_pressure
 from evfem.electrostatics.laws import eps_0
-from evfem.scene.file import dump, loads
 
 SKIN = ev.Dielectric(1136.0, (), 2e-4)
 SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
@@ -239,42 +238,6 @@ def test_a_charge_over_time_is_followed_by_a_soft_pad():
     charge = 1e6 * 2.0 * found.field_energy[1:] / found.voltage[1:]
     np.testing.assert_allclose(charge, 0.03 * np.sin(2.5 * 2.0 * np.pi * found.time[1:]), rtol=1e-7)
     assert found.voltage[0] == 0.0
-
-
-def test_a_charge_and_an_open_circuit_have_keys_of_a_scene_file():
-    text = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "strong_troxel"
-insulator = "touchscreen"
-drive = "resolved"
-signal = {SIGNAL}
-[[motion]]
-kind = "hover"
-gap = 0.5
-[[motion]]
-kind = "wait"
-duration = 0.1
-steps = 4
-"""
-    for signal, voltage in (
-        ('{kind = "charge", charge = 0.02}', ev.ChargeControl(0.02)),
-        ('{kind = "open_circuit", voltage = 80.0, after = 0.05}', ev.OpenCircuit(80.0, 0.05)),
-        (
-            '{kind = "charge", charge = {kind = "sine", frequency = 0.5, amplitude = 0.02}}',
-            ev.ChargeControl(ev.Sine(0.5, 0.02)),
-        ),
-    ):
-        made = loads(text.replace("{SIGNAL}", signal))
-        assert made.voltage == voltage
-        assert loads(dump(made)) == made
-        said = next(term.reason for term in ev.plan(made).terms if term.name == "drive")
-        assert ("given charge" if "charge" in voltage.kind else "disconnected") in said
 
 
 def test_another_law_tells_no_balance_of_the_source():

@@ -2,7 +2,7 @@
 
 import pytest
 
-from evfem.solver.stepping import VoltageSearch
+from evfem.solver.voltage import VoltageSearch
 
 
 def searched(needed, start=0.0, most=40):
