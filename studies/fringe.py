@@ -41,7 +41,7 @@ from evfem.electrostatics.grading import graded
 from evfem.electrostatics.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
-from .common import CASES, Series, Study, new_figure, panel_letter, participants
+from .common import CASES, COLOURS, Series, Study, new_figure, panel_letter, participants
 from .measured import participant_forces
 
 if TYPE_CHECKING:
@@ -241,41 +241,60 @@ def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
 def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     figure = new_figure(3.6, 12.0)
     axes = figure.subplots(1, 5, width_ratios=(1.0, 1.0, 1.2, 1.0, 1.0))
-    for axis, insulator, letter in zip(axes, INSULATORS, "ab", strict=False):
-        for shape, colour in (("t7", "C0"), ("sinus", "C1")):
+    _draw_errors(axes[:2], series)
+    _draw_gains(axes[2], numbers)
+    ways = (("towards the display", "kaczmarek"), ("along x", "strong_troxel"))
+    for one, (label, colour) in zip(series[-2:], ways, strict=True):
+        axes[3].plot(one.x, one.y, color=COLOURS[colour], label=label)
+    axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
+    axes[3].set_ylim(top=1.3)
+    axes[3].legend(fontsize=7, loc="upper left")
+    kinds = (
+        ("measured", "measured", "measured"),
+        ("law", "(8a)", "strong_troxel"),
+        ("full", "full field", "fe"),
+    )
+    for k, (key, label, colour) in enumerate(kinds):
+        heights = [numbers[f"participants.{key}_median_mN.{case}"] for case in CASES]
+        places = np.arange(len(CASES)) + 0.27 * (k - 1)
+        axes[4].bar(places, heights, 0.25, color=COLOURS[colour], label=label)
+    axes[4].set_xticks(range(len(CASES)), list(CASES))
+    axes[4].set_ylabel("participants' median (mN)")
+    axes[4].margins(y=0.4)
+    axes[4].legend(fontsize=7, loc="upper right")
+    for axis, letter in zip(axes, "abcde", strict=True):
+        panel_letter(axis, letter)
+    return figure
+
+
+def _draw_errors(axes: Any, series: list[Series]) -> None:
+    """The column law's errors over the gap, for each insulator."""
+    from matplotlib.patches import Patch
+
+    shapes = (("t7", "kaczmarek", "finger's ridges"), ("sinus", "strong_troxel", "sinusoid"))
+    for axis, insulator in zip(axes, INSULATORS, strict=True):
+        for shape, name, label in shapes:
+            colour = COLOURS[name]
             own = {s.name.split()[-1]: s for s in series if s.name.startswith(f"{shape} {insulator} ")}
             x = np.maximum(own["columns"].x, 3e-4)
-            label = "finger's ridges" if shape == "t7" else "sinusoid"
             axis.semilogx(x, own["columns"].y, "o-", color=colour, markersize=3, label=label)
             axis.fill_between(x, own["low"].y, own["high"].y, color=colour, alpha=0.15, linewidth=0)
         axis.axhline(0.0, color="0.6", linewidth=0.8)
         axis.set_xlabel("gap (mm), leftmost 0")
         axis.set_title(insulator, fontsize=9)
-        panel_letter(axis, letter)
     axes[0].set_ylabel("column law's error (%)")
     axes[0].legend(fontsize=7)
+    axes[1].legend(handles=[Patch(color="0.85", label="bounds of the energy")], fontsize=7, loc="upper left")
+
+
+def _draw_gains(axis: Any, numbers: dict[str, float]) -> None:
+    """What the full field adds to the pull of fingers and of skin."""
     keys = [key for key in numbers if key.startswith("finger.") and key.endswith("full_over_local")]
     bars = [100.0 * (numbers[key] - 1.0) for key in keys]
     labels = [" ".join(key.split(".")[1:3]) for key in keys]
-    labels += [f"skin, {name}" for name in ROUGH]
+    labels += [f"grooved skin, {1e3 * gap:g} um gap" for gap in ROUGH.values()]
     bars += [100.0 * (numbers[f"spreading.{name}"] - 1.0) for name in ROUGH]
-    axes[2].barh(labels, bars, color=["C0"] * len(keys) + ["C2"] * len(ROUGH))
-    axes[2].invert_yaxis()
-    axes[2].tick_params(axis="y", labelsize=7)
-    axes[2].set_xlabel("full field, more pull (%)")
-    panel_letter(axes[2], "c")
-    for one, label in zip(series[-2:], ("towards the display", "along x"), strict=True):
-        axes[3].plot(one.x, one.y, label=label)
-    axes[3].set(xlabel="electrode's edge (mm)", ylabel="pull over that without edge")
-    axes[3].set_ylim(top=1.3)
-    axes[3].legend(fontsize=7, loc="upper left")
-    panel_letter(axes[3], "d")
-    for k, (key, label) in enumerate((("measured", "measured"), ("law", "(8a)"), ("full", "full field"))):
-        heights = [numbers[f"participants.{key}_median_mN.{case}"] for case in CASES]
-        axes[4].bar(np.arange(len(CASES)) + 0.27 * (k - 1), heights, 0.25, label=label)
-    axes[4].set_xticks(range(len(CASES)), list(CASES))
-    axes[4].set_ylabel("participants' median (mN)")
-    axes[4].margins(y=0.4)
-    axes[4].legend(fontsize=7, loc="upper right")
-    panel_letter(axes[4], "e")
-    return figure
+    axis.barh(labels, bars, color=[COLOURS["kaczmarek"]] * len(keys) + [COLOURS["fe"]] * len(ROUGH))
+    axis.invert_yaxis()
+    axis.tick_params(axis="y", labelsize=7)
+    axis.set_xlabel("full field, more pull (%)")
