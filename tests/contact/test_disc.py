@@ -79,7 +79,7 @@ def test_cohesion_widens_the_disc_of_what_touches():
 
 
 def test_cohesion_of_nodes_that_feel_each_other():
-    """Newton's method ends in its first round: sweeps alone would come there too."""
+    """Newton's method ends in its first round."""
     problem, _ = half_space(10, 0.2, (0.03, -0.02), 0.2)
     problem = replace(problem, cohesion=np.full(problem.size, 2e-3))
     found = solve_disc(problem, np.zeros(3 * problem.size))
@@ -116,8 +116,11 @@ def test_a_sphere_that_slides_and_turns_has_stick_and_slip_in_all_directions(fri
     assert (found.status != OPEN).sum() > 20
 
 
-def test_sweeps_alone_come_to_the_same_forces():
+@pytest.mark.parametrize("cohesion", [None, 2e-3])
+def test_sweeps_alone_come_to_the_same_forces(cohesion):
     problem, _ = half_space(8, 0.3, (0.03, 0.02), 0.1)
+    if cohesion is not None:
+        problem = replace(problem, cohesion=np.full(problem.size, cohesion))
     nothing = np.zeros(3 * problem.size)
     swept = sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 400)
     assert_allclose(swept.contact, solve_disc(problem, nothing).force, atol=1e-9)
