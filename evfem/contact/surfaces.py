@@ -225,9 +225,9 @@ class Sinusoid(RigidSurface):
     def _sum(self, x: Array, order: int) -> Array:
         """Derivative of the given order: each one is a factor k and a quarter of a turn."""
         assert self.terms is not None
-        total = np.zeros_like(x, dtype=float)
+        total: Any = 0.0
         for a, k, phase in self.terms:
-            total += a * k**order * np.sin(k * x + phase + order * np.pi / 2)
+            total = total + a * k**order * np.sin(k * x + phase + order * np.pi / 2)
         return total
 
     def height(self, x: Array) -> Array:
