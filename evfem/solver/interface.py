@@ -18,7 +18,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.friction import Slipping
-from evfem.contact.pad import Pad, fold, surface_state
+from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
 from evfem.solver.state import State
@@ -121,6 +121,7 @@ class Interface:
 
     contact_step = LinearContactStep
     pad: Any
+    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -145,18 +146,29 @@ class Interface:
         """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
         return self.points + u[self.pad.nodes]
 
+    def surface_at(self, state: State) -> SurfaceState:
+        """The surface below the pad nodes; that of the last two states is kept, for the balance, the
+        contact problem, the acceptance and the ledger all ask for it.
+        """
+        for u, found in self._seen:
+            if u is state.u:
+                return found
+        found = surface_state(self.surface, self.positions(state.u))
+        self._seen = ((state.u, found), *self._seen[:1])
+        return found
+
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface:
         below a thin insulator the rounding of their gaps would be a force.
         """
         position = self.positions(state.u)
         touching = state.status != OPEN
-        position[touching, 1] -= surface_state(self.surface, position).gap[touching]
+        position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        surface = surface_state(self.surface, self.positions(state.u))
+        surface = self.surface_at(state)
         normal, shear = state.contact_force.T
         slope, stretch = surface.slope, surface.stretch
         return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
@@ -167,8 +179,7 @@ class Interface:
         """What the contact problem has to know of the candidates c (numbers of pad nodes); of
         every pad node the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
         """
-        position = self.positions(state.u)[c]
-        surface = surface_state(self.surface, position)
+        position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         origin = self._origin(old)[c]
         slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
@@ -267,7 +278,7 @@ class Interface:
 
     def shallowest_penetration(self, state: State) -> float | None:
         """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
-        gap = surface_state(self.surface, self.positions(state.u)).gap
+        gap = self.surface_at(state).gap
         sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[sunk].max()) if sunk.any() else None
 
@@ -279,8 +290,7 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        position = self.positions(state.u)
-        surface = surface_state(self.surface, position)
+        position, surface = self.positions(state.u), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
