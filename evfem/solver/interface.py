@@ -170,8 +170,10 @@ class Interface:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
         surface = self.surface_at(state)
         normal, shear = state.contact_force.T
-        slope, stretch = surface.slope, surface.stretch
-        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+        slope, force = surface.slope, np.empty_like(state.contact_force)
+        force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
+        force /= surface.stretch[:, None]
+        return force
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
