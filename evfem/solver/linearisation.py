@@ -111,7 +111,8 @@ class Linearisation:
         gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
-            return self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))
+            self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))
+            return
         steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
         needed = self.pad.free & (near | (weakening > steep))
         if not needed.any():
