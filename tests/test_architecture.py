@@ -37,13 +37,14 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
-        "laws grading outlines bounds curves fieldmesh poisson rigid columns dielectrics charges relaxation "
-        "alternating roughness forces signals wav timesignals drive encoding hjif signalfile",
+        "laws grading outlines bounds curves fieldmesh poisson rigid columncells columns meanpull "
+        "dielectrics charges relaxation alternating roughness forces signals wav timesignals drive "
+        "encoding hjif signalfile",
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction fullfield elimination signorini "
-        "follower condensed coulomb sweeps disc spatial stability",
+        "friction surfaces textures own pad edge skin charging attraction fullfield drivenfield "
+        "elimination signorini follower condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
@@ -53,8 +54,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
-        "motion terms driven scene written keys voltage meanings schema file resolution drift sense "
-        "fieldchoice timescales spatial way symmetry plan",
+        "motion terms driven fieldless scene written keys voltage meanings schema file resolution drift "
+        "sense fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

@@ -111,6 +111,8 @@ class Attraction:
 
     #: whether `work` is known from an energy
     has_energy = False
+    #: whether the forces are more than those of columns
+    has_fringes = False
 
     def column_forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
@@ -141,6 +143,14 @@ class Attraction:
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
         sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
+
+    def way_forces(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """`forces_along`, of the columns where there are fringes: what a way has beyond the mean of its
+        ends comes from closing gaps, and the columns know these.
+        """
+        return self.forces_along(positions, voltages, touching, pressing)
 
     def _sideways(self, x: Floats, potential: Floats) -> Floats:
         """Forces along x (P,) that lengthen the tributary lengths, at x (P,), by the potential (P,)."""

@@ -167,7 +167,15 @@ class FieldAttraction(Attraction):
     ) -> Floats:
         """The column law's forces (P, 2), for the tangent."""
         pressed = None if pressing is None else pressing[None]
-        return Attraction.forces_along(self, position[None], np.array([voltage]), touching, pressed)[0]
+        return self.way_forces(position[None], np.array([voltage]), touching, pressed)[0]
+
+    def way_forces(
+        self, positions: Floats, voltages: Floats, touching: Any, pressing: Floats | None = None
+    ) -> Floats:
+        """The column law's forces (W, P, 2)."""
+        return Attraction.forces_along(self, positions, voltages, touching, pressing)
+
+    has_fringes = True
 
     @property
     def has_energy(self) -> bool:  # type: ignore[override]
@@ -220,10 +228,20 @@ class FieldAttraction(Attraction):
 
     @cached_property
     def _columns(self) -> Columns:
-        layers = [(self.surface.insulator.eps_r, INSULATOR), (getattr(self.law, "gap_eps_r", 1.0), AIR)]
+        return self.columns_of(self.insulator_eps_r, getattr(self.law, "gap_eps_r", 1.0), self.skin.eps_r)
+
+    @property
+    def insulator_eps_r(self) -> float:
+        """Relative permittivity of the insulator."""
+        return float(self.surface.insulator.eps_r)
+
+    def columns_of(self, insulator: complex, gap: complex, skin: complex) -> Columns:
+        """Columns of layers with these relative permittivities; without a skin's layer where it has no
+        thickness.
+        """
         if np.max(self.skin.thickness) > 0.0:
-            layers.append((float(self.skin.eps_r), SKIN))
-        return Columns(tuple(eps for eps, _ in layers), tuple(share for _, share in layers))
+            return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
+        return Columns((insulator, gap), (INSULATOR, AIR))
 
     def seen(self, position: Floats) -> Any:
         """The lines (sparse, L x P) at which columns stand: between two that stand one above the other,
@@ -248,7 +266,7 @@ class FieldAttraction(Attraction):
         frame = surface_state(self.surface, place)
         insulator = self.surface.insulator
         rough = self._separation(position, pressing) * np.ones(self._size)
-        lowest = SERIES_GAP * insulator.thickness / insulator.eps_r
+        lowest = SERIES_GAP * insulator.thickness / self.insulator_eps_r
         gap = np.maximum(np.maximum(frame.gap, 0.0) + np.maximum(lines @ rough, 0.0), lowest)
         ground = place[:, 1] - frame.gap
         levels = [ground - insulator.thickness, ground, ground + gap]
@@ -267,7 +285,9 @@ class FieldAttraction(Attraction):
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""
         skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
-        return certificate(x, levels[2] - levels[1], self.surface.insulator, skin, self._columns.eps_r[1])
+        return certificate(
+            x, levels[2] - levels[1], self.surface.insulator, skin, self._columns.eps_r[1].real
+        )
 
     def check(self, position: Floats) -> None:
         """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its

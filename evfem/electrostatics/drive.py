@@ -185,6 +185,16 @@ def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
     return float(np.sqrt(total)), order[kept], square[kept] / (total if total > 0.0 else 1.0)
 
 
+def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
+    """Orders of the harmonics of a drive, or of a `signal` that repeats, and their shares of the squared
+    effective voltage.
+    """
+    found = powers(signal)
+    if found is not None:
+        return found[1:]
+    return (np.ones(1), np.ones(1)) if drive.waveform == "sine" else harmonics()
+
+
 def steady_layers(solids: tuple[Layer, ...], drive: Drive, gap_eps_r: float) -> Layers | None:
     """The layers under a direct voltage that has always been there; None where the gap has no field."""
     found = [(layer.thickness, *seen_at(layer, None)) for layer in solids]
@@ -205,10 +215,9 @@ def mean_law(
     """
     gap_eps_r = getattr(law, "gap_eps_r", 1.0)
     given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
-    spectrum = powers(signal)
-    if frequency is None or (spectrum is None and drive.waveform == "sine"):
+    if frequency is None or (powers(signal) is None and drive.waveform == "sine"):
         return law, Layers.of(*solids, frequency=frequency, **given)
-    order, weight = harmonics() if spectrum is None else spectrum[1:]
+    order, weight = spectrum(drive, signal)
     steady = steady_layers(solids, drive, gap_eps_r) if 0.0 in order else None
     if 0.0 in order and steady is None:
         order, weight = order[1:], weight[1:]

@@ -13,8 +13,8 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.checks import Values
 from evfem.electrostatics.charges import Sandwich
-from evfem.electrostatics.drive import Drive, mean_law, powers
-from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
+from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
@@ -92,6 +92,31 @@ def attracting(scene: Any, skin: Layer, insulator: Layer) -> tuple[Any, Layers]:
         thickness = np.asarray(skin.thickness) + insulator.thickness
         return scene.law, Layers(sandwich(scene, skin, insulator).reference, thickness)
     return mean_law(scene.law, drive, at, (skin, insulator), scene.voltage)
+
+
+def conducts(scene: Any, skin: Layer, insulator: Layer) -> bool:
+    """Whether a drive's gap conducts, or one of the layers is a dielectric and no mere number."""
+    given = (
+        scene.drive.gap_conductivity,
+        *(callable(getattr(layer.eps_r, "permittivity", None)) for layer in (skin, insulator)),
+    )
+    return any(given)
+
+
+def permittivities(
+    scene: Any, skin: Layer, insulator: Layer
+) -> list[tuple[float, complex, complex, complex]]:
+    """Of each harmonic of a drive its share of the squared effective voltage, and the complex relative
+    permittivities of insulator, gap and skin at its frequency; for voltages without a direct part.
+    """
+    at, gap_eps_r = frequency(scene), getattr(scene.law, "gap_eps_r", 1.0)
+    assert at is not None
+    found = []
+    for order, share in zip(*(part.tolist() for part in spectrum(scene.drive, scene.voltage)), strict=True):
+        gap = gap_eps_r + scene.drive.gap_conductivity / (2j * np.pi * at * order * eps_0)
+        solid = [complex(layer.permittivity(at * order)) for layer in (insulator, skin)]
+        found.append((share, solid[0], complex(gap), solid[1]))
+    return found
 
 
 def lossless(scene: Any, layer: Layer) -> Layer:

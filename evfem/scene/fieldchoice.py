@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.contact.pad import make_pad
-from evfem.electrostatics.laws import StrongTroxel
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.driven import skin_thickness
+from evfem.scene.driven import lossless, skin_thickness, solids
+from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover
 from evfem.scene.scene import Scene
 
@@ -33,8 +35,9 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
         if scene.field == "full":
             raise InputError("electrostatics.field", "full with a solid", "local or auto: the plane has it")
         return FieldChoice(False, "column by column: a solid has no other")
-    if type(scene.law) is not StrongTroxel:
-        return FieldChoice(False, f"column by column: {type(scene.law).__name__} is no law of a field")
+    against = without_field(scene)
+    if against is not None:
+        return FieldChoice(False, f"column by column: {against[0]} goes with no field")
     bounds, gap = field_bounds(scene, mesh)
     share = f"{100.0 * bounds.spread:.2g} %"
     where = "at first touch" if gap == 0.0 else f"at a gap of {gap:g} mm"
@@ -57,9 +60,11 @@ def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
     line = in_line(pad, facing(pad, position))
     height = position[:, 1] - scene.ground.height(position[:, 0])
     electrical = scene.finger.electrical
-    skin = skin_thickness(electrical, mesh, pad.nodes) / electrical.stratum_corneum_eps_r
-    insulator = scene.ground.insulator
-    assert insulator is not None
+    thickness = skin_thickness(electrical, mesh, pad.nodes)
+    skin, insulator = (
+        lossless(scene, layer) for layer in solids(scene, thickness, electrical.stratum_corneum_eps_r)
+    )
+    reduced = np.asarray(skin.thickness) / skin.eps_r
     above = (height - height.min() + gap)[line]
     gap_eps_r = getattr(scene.law, "gap_eps_r", 1.0)
-    return certificate(position[line, 0], above, insulator, skin[line], gap_eps_r), gap
+    return certificate(position[line, 0], above, insulator, reduced[line], gap_eps_r), gap

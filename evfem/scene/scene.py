@@ -28,12 +28,12 @@ from evfem.common.views import called, changed, short, table
 from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw, Surface, TimeSignal
 from evfem.scene.driven import applied, check_drive
+from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
@@ -346,18 +346,9 @@ def _check_field(scene: Scene) -> None:
     if scene.field != "full" and (ended or not scene.grounded):
         given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"
         raise InputError("electrostatics.field", given, "full: the column law knows neither")
-    if scene.field == "local":
-        return
-    reasons = {
-        "no law": scene.law is None,
-        "air_layer = false": not scene.air_layer,
-        "a drive": scene.drive is not None,
-        type(scene.law).__name__: scene.field == "full" and type(scene.law) is not StrongTroxel,
-    }
-    against = [reason for reason, applies in reasons.items() if applies]
-    if against:
-        allowed = "local, or StrongTroxel (the law of rigid layers) with its air layer and without a drive"
-        raise InputError("electrostatics.field", f"{scene.field} with {against[0]}", allowed)
+    against = without_field(scene)
+    if against is not None and scene.field == "full":
+        raise InputError("electrostatics.field", f"full with {against[0]}", f"local, or {against[1]}")
 
 
 def _check_friction(scene: Scene) -> None:

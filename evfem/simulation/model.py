@@ -22,7 +22,15 @@ from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.symmetry import Half
-from evfem.scene.driven import attracting, lossless, sandwich, skin_thickness, solids
+from evfem.scene.driven import (
+    attracting,
+    conducts,
+    lossless,
+    permittivities,
+    sandwich,
+    skin_thickness,
+    solids,
+)
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -169,7 +177,13 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)
     assert isinstance(pad, Pad)
-    return FieldAttraction(*local, facing(pad, mesh.points[pad.nodes]), skin, not scene.grounded)
+    full = (*local, facing(pad, mesh.points[pad.nodes]), skin, not scene.grounded)
+    if scene.drive is None or not conducts(scene, skin, insulator):
+        return FieldAttraction(*full)
+    from evfem.contact.drivenfield import DrivenFieldAttraction, Harmonic
+
+    harmonics = tuple(Harmonic(*one) for one in permittivities(scene, skin, insulator))
+    return DrivenFieldAttraction(*full, harmonics=harmonics)
 
 
 def _check_quadratic(scene: Scene) -> None:

@@ -129,6 +129,8 @@ WAY, SHARE = _along((0.0, 1.0))
 FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, 1 / 4, 3 / 4, 15 / 16, 63 / 64, 1.0))
 #: the places see an integrand whose highest Legendre coefficients are below this share of the largest
 SEEN = 1e-3
+#: its two ends
+ENDS = np.array([0.0, 1.0])
 #: Legendre coefficients (8,) over the way from the values at the places `WAY`
 _LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2.0 * WAY - 1.0, WAY.size - 1))
 #: and where the friction coefficient is
@@ -232,8 +234,11 @@ class Part:
         along = moved - np.where(open_[:, None], new.bone - old.bone, 0.0)
         if not (along[:, 1].any() or model.attraction.direction == "normal"):
             return trapezoidal
-        way = self._on_the_way(along, (old.voltage, new.voltage))
-        return trapezoidal + way - _mean_work(old.attraction, new.attraction, along)
+        voltages = (old.voltage, new.voltage)
+        ends = _mean_work(old.attraction, new.attraction, along)
+        if model.attraction.has_fringes:
+            ends = float(np.mean(self._pulls(along, ENDS, voltages)))
+        return trapezoidal + self._on_the_way(along, voltages) - ends
 
     def _on_the_way(self, along: Floats, voltages: tuple[float, float]) -> float:
         """Work of the attraction along `along` (P, dim) of the straight way between two voltages."""
@@ -283,8 +288,9 @@ class Part:
         return work
 
     def _pulls(self, along: Floats, ways: Floats, voltages: tuple[float, float]) -> Floats:
-        """Attraction times the way `along` (P, dim) at the parts `ways` (w,) of the straight way,
-        the squared voltage growing evenly: (w,) in N mm per mm of depth.
+        """Attraction, where there are fringes that of the columns, times the way `along` (P, dim) at the
+        parts `ways` (w,) of the straight way, the squared voltage growing evenly: (w,) in N mm per mm of
+        depth.
         """
         attraction, old, new = self.model.attraction, self.old, self.new
         assert attraction is not None
@@ -294,7 +300,7 @@ class Part:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges
         places, pressed = begin + ways[:, None, None] * (end - begin), (old.contact_force, new.contact_force)
         pressing = pressed[0][:, 0] + ways[:, None] * (pressed[1] - pressed[0])[:, 0]
-        forces = attraction.forces_along(places, volts, old.touching, pressing)
+        forces = attraction.way_forces(places, volts, old.touching, pressing)
         return np.asarray(np.sum(forces * along, axis=(1, 2)))
 
     def friction(self) -> float:

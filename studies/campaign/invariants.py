@@ -289,7 +289,7 @@ def nodal_cone(scene: Scene, result: Result) -> Broken | None:
         outside, inside = shear - np.max(bounds, axis=0), np.min(bounds, axis=0) - shear
         return _relative(np.maximum(outside, np.where(slips, inside, 0.0)), frame)
 
-    return _frames("nodal cone", result, beyond, TOLERANCE)
+    return _frames("nodal cone", result, beyond, max(TOLERANCE, 10.0 * scene.solver.tolerance))
 
 
 @check

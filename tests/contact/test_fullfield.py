@@ -154,12 +154,17 @@ def test_the_plan_chooses_by_the_bounds():
     assert not ev.plan(law).has("full field")
 
 
+WAIT = ev.Wait(duration=0.1)
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
         ({"field": "whole"}, "local | full | auto"),
         ({"field": "full", "law": ev.Kaczmarek()}, "Kaczmarek"),
         ({"field": "full", "air_layer": False}, "air_layer"),
+        ({"field": "full", "drive": ev.Drive(resolved=True, frequency=50.0), "motion": [WAIT]}, "resolved"),
+        ({"field": "full", "drive": ev.Drive(), "voltage": ev.Sine(50.0, 9.0, bias=9.0)}, "direct"),
     ],
 )
 def test_what_has_no_full_field_is_refused(options, said):
@@ -272,3 +277,56 @@ def test_bounds_know_what_fills_the_gap(filling):
     layers = ev.Layers.of(skin, film)
     full = FieldAttraction(law, layers, pad, surface, "normal", edges=facing(pad, points), skin=skin)
     full.check(points)
+
+
+DRY = ev.Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8)
+
+
+def driven(field, drive, motion, voltage=50.0, insulator=ev.TOUCHSCREEN):
+    given = {"direction": "normal", "field": field, "drive": drive}
+    display = ev.Display(insulator, friction=0.3)
+    return ev.Scene(SMOOTH, display, ev.StrongTroxel(), voltage, motion, **given)
+
+
+def test_a_driven_pad_feels_the_field_of_layers_that_conduct():
+    """Far from contact both are near the law; what loses nothing has the energy's forces to the bit."""
+    hover = [ev.Hover(gap=0.02)]
+    pulls = {
+        (field, drive is DRY): ev.simulate(driven(field, drive, hover)).electrostatic_force[0]
+        for field in ("local", "full")
+        for drive in (DRY, ev.Drive(frequency=250.0), None)
+    }
+    assert pulls["full", True] == pytest.approx(pulls["local", True], rel=5e-3)
+    assert pulls["full", True] != pytest.approx(pulls["full", False], rel=1e-4)
+    same = [ev.simulate(driven("full", drive, hover)) for drive in (ev.Drive(frequency=250.0), None)]
+    assert same[0].electrostatic_force[0] == same[1].electrostatic_force[0]
+
+
+def test_harmonics_of_a_square_wave_add_up():
+    """A pad over the whole spectrum is pulled by the sum over its harmonics' sines."""
+    square = ev.Drive(frequency=250.0, waveform="square", gap_conductivity=1e-8)
+    hover = [ev.Hover(gap=0.02)]
+    attraction = make_model(driven("full", square, hover)).attraction
+    assert sum(one.share for one in attraction.harmonics) == pytest.approx(1.0)
+    local = make_model(driven("local", square, hover)).attraction
+    pad, points = arc(12, 3.0, 2.0)
+    points[:, 1] = 0.0003
+    skin = ev.Layer(np.full(len(points), 0.38), 1650.0)
+    of = (local.law, ev.Layers(local.layers.reduced[:, :1], 0.381, local.layers.loss[:, :1]))
+    surface = ev.Display(ev.TOUCHSCREEN, y=0.0)
+    given = {"edges": facing(pad, points), "skin": skin, "harmonics": attraction.harmonics}
+    flat = type(attraction)(*of, pad, surface, "normal", **given)
+    pulls = [forces[:, 1].sum() for forces in (flat.forces(points, 50.0, None),
+                                               flat.column_forces(points, 50.0, None))]  # fmt: skip
+    assert pulls[0] == pytest.approx(pulls[1], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_the_exact_encoding_drives_the_full_field():
+    """A wished friction force is met with the field of layers that conduct."""
+    motion = [ev.Press(force=0.05, steps=2), ev.Slide(distance=1.5, steps=4)]
+    wished = ev.FollowForce([0.0, 1.5], [0.016, 0.016], 3000.0)
+    result = ev.simulate(driven("full", DRY, motion, wished, ev.FILM))
+    assert result.applied_tangential_force[-2:] == pytest.approx([0.016] * 2, rel=1e-6)
+    left = result.normal_force - result.electrostatic_force
+    assert result.applied_force == pytest.approx(left, rel=1e-6)

@@ -309,6 +309,7 @@ def test_the_mirror_image_of_a_scene_gives_the_mirrored_rows(correct):
     other = simulate(tables.scene_of(tables.mirrored(SCENE)))
     assert twins.smooth(result)
     assert not twins.smooth(replace(result, snap_dissipation=result.stored_energy))
+    assert not twins.smooth(replace(result, integrator_dissipation=-result.stored_energy))
     assert twins.mirror_broken(result, other) is None
     assert twins.mirror_broken(result, result).name == "mirror"  # not its own mirror image
     pushed = other.normal_force.copy()

@@ -1,0 +1,82 @@
+r"""The mean attraction over the cycle from the full field, in layers that conduct.
+
+As `evfem.contact.fullfield`, with Poisson's problem of complex permittivities at each harmonic n of
+the drive and the mean pulls :math:`F_n` on the nodes at 1 V (`evfem.electrostatics.meanpull`),
+
+.. math:: f_j = U^2 \sum_n w_n F_{n, j}, \qquad \sum_n w_n = 1,
+
+with the share w_n of a harmonic in the squared effective voltage. The attraction stays proportional
+to the squared voltage, so that controls and encodings know nothing of it; the tangent is that of
+the column law with the same losses. The forces have no energy: on the way between two states the
+work is that of the column law, and that of the fringes is counted trapezoidally. The bounds are
+those of an energy; of the layers without losses they decide for `auto`.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact.fullfield import KEPT, FieldAttraction
+from evfem.electrostatics.columns import Columns
+from evfem.electrostatics.meanpull import mean_pull
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """A sine of a cycle: its share of the squared effective voltage, and the complex relative
+    permittivities of insulator, gap and skin at its frequency.
+    """
+
+    share: float
+    insulator: complex
+    gap: complex
+    skin: complex
+
+
+@dataclass(frozen=True, eq=False)
+class DrivenFieldAttraction(FieldAttraction):
+    """The mean attraction of the full field under an alternating voltage."""
+
+    harmonics: tuple[Harmonic, ...] = ()
+    pulls: OrderedDict[bytes, Floats] = field(default_factory=OrderedDict)
+
+    #: the mean force of a field with losses is no derivative of an energy
+    has_energy = False
+
+    @property
+    def insulator_eps_r(self) -> float:
+        """Real part of the insulator's permittivity at the first harmonic."""
+        return float(self.harmonics[0].insulator.real)
+
+    @cached_property
+    def _of_harmonics(self) -> tuple[tuple[float, Columns], ...]:
+        stacks = ((one.insulator, one.gap, one.skin) for one in self.harmonics)
+        real = (tuple(eps if eps.imag else eps.real for eps in stack) for stack in stacks)
+        shares = (one.share for one in self.harmonics)
+        return tuple((share, self.columns_of(*stack)) for share, stack in zip(shares, real, strict=True))
+
+    @cached_property
+    def _columns(self) -> Columns:
+        return self._of_harmonics[0][1]
+
+    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
+        """Mean forces (P, 2) at 1 V effective; those of the last positions are remembered."""
+        lines = self.seen(position)
+        x, levels = self.outline(position, lines, pressing)
+        key = x.tobytes() + levels.tobytes()
+        found = self.pulls.get(key)
+        if found is None:
+            pulls = (
+                share * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
+                for share, columns in self._of_harmonics
+            )
+            found = np.asarray(lines.T @ sum(pulls))
+            self.pulls[key] = found
+            while len(self.pulls) > KEPT:
+                self.pulls.popitem(last=False)
+        return found
