@@ -116,10 +116,12 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
     `contact_step` is the linear step in which its contact is solved; nodes with a gap below
-    `neighbourhood` (mm) become candidates together.
+    `neighbourhood` (mm) become candidates together. Where the candidates of an interface follow the
+    contact, those of the last step that are far by now are let go.
     """
 
     contact_step = LinearContactStep
+    follows = False
     pad: Any
     _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
