@@ -125,6 +125,7 @@ def test_new_tangents_that_gain_little_are_known_from_the_residuals():
     assert not to_and_fro([1.0, 0.4, 0.2, 0.08, 0.03])
 
 
+@pytest.mark.filterwarnings("ignore:a finger of")
 def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     """A nail of 200 MPa above a finger that hovers: iterations that went on would shuffle its last
     digits.
