@@ -81,6 +81,25 @@ class Pins:
         return bool(loose.any())
 
 
+class Returned:
+    """Nodes that have slipped and stick again, in the iterations of one step: `nodes` (P,) bool.
+
+    Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
+    a node at rest which the friction of rest does not: the iterations would let it slip and stick by
+    turns. Such a node slips along the chord of the law from rest, which says the same of rest as the
+    law. For a law that is concave in the speed its iterations contract wherever the tissue is stable.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.nodes = np.zeros(size, dtype=bool)
+        self._slipped = np.zeros(size, dtype=bool)
+
+    def watch(self, c: Ints, status: Ints) -> None:
+        """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
+        self.nodes[c] |= self._slipped[c] & (status == STICK)
+        self._slipped[c] |= status >= FORWARD
+
+
 def steps_of_friction(surface: Any, short: float) -> Floats:
     """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
     3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
@@ -97,10 +116,12 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
     `contact_step` is the linear step in which its contact is solved; nodes with a gap below
-    `neighbourhood` (mm) become candidates together.
+    `neighbourhood` (mm) become candidates together. Where the candidates of an interface follow the
+    contact, those of the last step that are far by now are let go.
     """
 
     contact_step = LinearContactStep
+    follows = False
     pad: Any
     _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
@@ -113,12 +134,14 @@ class Interface:
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
+        self._returned = Returned(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
         self.pins.begin(self.positions(old.u)[:, 0])
+        self._returned = Returned(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
@@ -181,14 +204,17 @@ class Interface:
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
         """The candidates c under a law of friction other than Coulomb's."""
         slip = np.where(known.status >= FORWARD, known.slip, 0.0)
-        found = self._slipping(old, state, c, known.friction, slip).linearised(law)
+        moving = self._slipping(old, state, c, known.friction, slip)
+        found = moving.linearised(law)
+        self._returned.watch(c, known.status)
+        by_speed = np.where(self._returned.nodes[c], moving.chord(law), found.by_speed)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
         return replace(
             known,
             friction=found.slope,
             cohesion=found.offset,
-            slip_stiffness=found.by_speed / self.duration if self.duration > 0.0 else None,
+            slip_stiffness=by_speed / self.duration if self.duration > 0.0 else None,
             friction_slope=known.friction_slope * by_place,
         )
 
