@@ -41,8 +41,8 @@ ASSUMPTIONS = {
     "reference": "exact contact, extrapolated from quadratic elements of two packages that agree; within "
     "0.04 % (A), 0.2 % (B); there is none for C",
     "cpu_s": "least of the rounds (three, one on L2), process time of all threads, set-up included, imports "
-    "left out; FEniCSx with its forms compiled before, except in the quick version; cold_cpu_s: its first run, which compiles "
-    "them, and form_cpu_s what of it went into the forms",
+    "left out; FEniCSx with its forms compiled before, except in the quick version; cold_cpu_s: its first "
+    "run, which compiles them, and form_cpu_s what of it went into the forms",
     "process_cpu_s": "of the same round, from the start of the interpreter, imports included",
     "peak_MB": "largest resident memory of the process, interpreter and imports (imported_MB) included",
     "contact": "evfem exact; peers: penalty of 1000 N/mm per mm at every node, below 0.1 um of penetration, "
