@@ -55,7 +55,10 @@ SHORTER, LONGER         and so does a time step outside these multiples of the o
 ALIKE                   below this residual iterations with a new tangent each are combined too   thin
                                                                                                   insulators
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
-                        the last ones, have no residual below those before
+                        the last ones, have no residual below
+FALLING                 this fraction of those before
+ASTRAY                  the same, after two thirds more, while no residual is below STALLED       thin
+                                                                                                  insulators
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
@@ -98,6 +101,7 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 DRAG_STEPS              steps of a release, failed ones included, before it is given up
+PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE                   a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
@@ -133,7 +137,9 @@ WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
-STUCK = 12
+STUCK = 8
+FALLING = 0.9
+ASTRAY = 6
 MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
@@ -154,6 +160,7 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 60
+PATIENT = 16
 VERGE = 0.9
 STAGGERED_LIMIT = 200
 NAMED = 3

@@ -40,6 +40,7 @@ from evfem.common.constants import (
     SEARCH_LIMIT,
     SEARCH_START,
     SHORTEST_FRACTION,
+    SLOW,
     SMALLEST_FORCE,
     SMALLEST_J,
     TURNED,
@@ -73,6 +74,11 @@ class Update:
     u: Floats
     squared: float
     fraction: float
+
+
+def to_and_fro(residuals: list[float]) -> bool:
+    """Whether the last iterations have gained little on those two and more before."""
+    return len(residuals) > 4 and min(residuals[-2:]) > SLOW * min(residuals[-4:-2])
 
 
 class FactorisedBody:
@@ -188,7 +194,7 @@ class FactorisedBody:
         again, residuals = self._renewed, self.record.residuals
         self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
         # where new tangents one after the other gain little, their maps are nearly one
-        if self._renewed and not (again and residuals[-1] < ALIKE):
+        if self._renewed and not (again and (residuals[-1] < ALIKE or to_and_fro(residuals))):
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)

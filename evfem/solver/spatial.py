@@ -43,7 +43,7 @@ class SkinInterface(Interface):
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 3)."""
-        surface = surface_state(self.surface, self.positions(state.u))
+        surface = self.surface_at(state)
         normal, along, z = state.contact_force.T
         slope, stretch = surface.slope, surface.stretch
         x, y = (along - slope * normal) / stretch, (normal + slope * along) / stretch
