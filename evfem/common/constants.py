@@ -38,6 +38,12 @@ FAR                     so many times as high as the scene's deepest indentation
 NEIGHBOURS              and so does one below so many node distances once any is chosen           B
 STEEP                   an attraction whose negative stiffness exceeds this fraction of the       thin
                         softest shear modulus per height of the body makes its node a candidate   insulators
+HELD                    in 3D, the fraction up to which the negative stiffness of an open node    attraction
+                        is taken off the tangent: any body holds that
+TAKEN                   and the fraction above which it makes the node a candidate                attraction
+FIRST                   in 3D, at least this fraction of the pad's nodes are candidates           press
+GROWN, GROWING          where they become so many times more within a linear step, it is done     press
+                        again with them, at most so often
 FAINT                   changes of tributary lengths that stiffen no node by more than this       C
                         fraction are left to the iterations
 WEAK                    an attraction whose feedback on its own node is below this fraction       C
@@ -49,7 +55,10 @@ SHORTER, LONGER         and so does a time step outside these multiples of the o
 ALIKE                   below this residual iterations with a new tangent each are combined too   thin
                                                                                                   insulators
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
-                        the last ones, have no residual below those before
+                        the last ones, have no residual below
+FALLING                 this fraction of those before
+ASTRAY                  the same, after two thirds more, while no residual is below STALLED       thin
+                                                                                                  insulators
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
@@ -92,6 +101,7 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 DRAG_STEPS              steps of a release, failed ones included, before it is given up
+PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE                   a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near
 STAGGERED_LIMIT         rounds of the staggered coupling
@@ -120,12 +130,16 @@ REACH = 1.2
 FAR = 1.3
 NEIGHBOURS = 4.0
 STEEP = 0.02
+HELD, TAKEN = 2.0, 10.0
+FIRST, GROWN, GROWING = 0.05, 3.0, 4
 FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
-STUCK = 12
+STUCK = 8
+FALLING = 0.9
+ASTRAY = 6
 MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
@@ -146,6 +160,7 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 60
+PATIENT = 16
 VERGE = 0.9
 STAGGERED_LIMIT = 200
 NAMED = 3

@@ -75,3 +75,11 @@ class Elimination:
     def drops(self, force: Floats, extra: Floats) -> Floats:
         """The drops (q,) under forces (2 k,) beside them and with the extra unknowns (p,)."""
         return np.asarray(self.constant - self.by_force @ force - self.by_extra @ extra)
+
+
+def bordered(matrix: Floats, columns: Floats, rows: Floats, pivot: Floats) -> Floats:
+    """A matrix (n, n) with p further columns, rows and their pivots: (n + p, n + p)."""
+    n, p = columns.shape
+    whole = np.empty((n + p, n + p))
+    whole[:n, :n], whole[:n, n:], whole[n:, :n], whole[n:, n:] = matrix, columns, rows, pivot
+    return whole

@@ -26,7 +26,7 @@ doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Uni
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -210,6 +210,12 @@ class Slipping:
         by_speed = self._derivative(law, "speed") * self.length
         by_mu = self._derivative(law, "mu") * self.length
         return Linearised(slope, np.where(over, 0.0, offset), by_speed, by_mu)
+
+    def chord(self, law: FrictionLaw) -> Floats:
+        """Growth of the largest shear forces from rest to their speeds, (k,) in N/mm per mm/s."""
+        moving = self.speed > 0.0
+        growth = self.bound(law) - replace(self, speed=np.zeros_like(self.speed)).bound(law)
+        return np.where(moving, growth / np.where(moving, self.speed, 1.0), 0.0)
 
     def _derivative(self, law: FrictionLaw, by: Literal["pressure", "mu", "speed"]) -> Floats:
         at = {"pressure": self.pressure, "mu": self.mu, "speed": self.speed, "age": self.age}

@@ -11,6 +11,7 @@ positive when open; normal and tangent of the surface are :math:`n = (-h', 1)/r`
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -179,12 +180,16 @@ class SurfaceState:
     slope: Floats
     curvature: Floats
 
-    @property
+    def of(self, nodes: Ints) -> SurfaceState:
+        """At these of the nodes alone."""
+        return SurfaceState(self.gap[nodes], self.slope[nodes], self.curvature[nodes])
+
+    @cached_property
     def stretch(self) -> Floats:
         """Arc length of the profile per unit of x."""
         return np.sqrt(1.0 + self.slope**2)
 
-    @property
+    @cached_property
     def normal_gap(self) -> Floats:
         """Gap along the profile's normal at the node's x (first order)."""
         return self.gap / self.stretch

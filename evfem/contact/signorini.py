@@ -70,7 +70,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, ROUNDING, STABLE
-from evfem.contact.elimination import Elimination, Motions
+from evfem.contact.elimination import Elimination, Motions, bordered
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
@@ -364,7 +364,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         row = extra.rows[:, rows]
         row[:, : active.size] *= 1.0 - gain
         row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
-        matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
+        matrix = bordered(matrix, extra.columns[rows], row, extra.pivot)
         right = np.append(right, extra.right - extra.rows @ known)
     try:
         x = np.linalg.solve(matrix, right)
@@ -399,7 +399,7 @@ def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats
     matrix, row = left.compliance[np.ix_(rows, rows)], left.rows[:, rows]
     matrix[:, : active.size] += left.compliance[np.ix_(rows, k + active)] * ratio[active]
     row[:, : active.size] += left.rows[:, k + active] * ratio[active]
-    matrix = np.block([[matrix, left.columns[rows]], [row, left.pivot]])
+    matrix = bordered(matrix, left.columns[rows], row, left.pivot)
     right = np.append(-left.start[rows] - left.compliance[rows] @ push, left.right - left.rows @ push)
     try:
         x = np.linalg.solve(matrix, right)

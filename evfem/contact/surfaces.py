@@ -225,8 +225,10 @@ class Sinusoid(RigidSurface):
     def _sum(self, x: Array, order: int) -> Array:
         """Derivative of the given order: each one is a factor k and a quarter of a turn."""
         assert self.terms is not None
-        sines = [a * k**order * np.sin(k * x + phase + order * np.pi / 2) for a, k, phase in self.terms]
-        return np.sum(sines, axis=0)
+        total: Any = 0.0
+        for a, k, phase in self.terms:
+            total = total + a * k**order * np.sin(k * x + phase + order * np.pi / 2)
+        return total
 
     def height(self, x: Array) -> Array:
         """Height (mm) of the unshifted profile at x (mm)."""

@@ -1,6 +1,10 @@
 """Electrostatic attraction and voltage signals: force laws, dielectrics, closed forms, encoding,
 files.
+
+The full field of rigid bodies is loaded when it is first asked for: the closed forms need numpy alone.
 """
+
+from typing import TYPE_CHECKING, Any
 
 from evfem.electrostatics.alternating import (
     alternating_pressure,
@@ -12,7 +16,9 @@ from evfem.electrostatics.alternating import (
 )
 from evfem.electrostatics.dielectrics import SKINS, Dielectric, DielectricTable
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.electrostatics.rigid import FieldSolution, rigid_field
+
+if TYPE_CHECKING:
+    from evfem.electrostatics.rigid import FieldSolution, rigid_field
 
 __all__ = [
     "SKINS",
@@ -32,3 +38,12 @@ __all__ = [
     "step_pressure",
     "step_rates",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """PEP 562: what needs scipy and scikit-fem."""
+    if name not in ("FieldSolution", "rigid_field"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from evfem.electrostatics import rigid
+
+    return getattr(rigid, name)

@@ -9,7 +9,7 @@ import numpy as np
 from evfem.common.constants import VERGE
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
-from evfem.solver.state import Folded, State, StepFailed
+from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 
 FINER = "less friction or a finer mesh"
 
@@ -25,6 +25,8 @@ def _lost(model: Model, failed: StepFailed) -> str:
     """The sentence on the equilibrium that was lost; empty where nothing shows that there is none."""
     if isinstance(failed, Folded) or failed.last is None:
         return ""
+    if isinstance(failed, LiftedOff):
+        return f"{failed.reason}; it was lost at {_place(model, failed.last[0])}"
     state, target = failed.last
     try:
         with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite

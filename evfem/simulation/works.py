@@ -83,7 +83,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charging, Flow
-from evfem.contact.pad import surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.electrostatics.laws import StrongTroxel
 from evfem.simulation.model import Model
@@ -337,9 +336,8 @@ class Part:
         """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they
         left.
         """
-        model, old, new = self.model, self.old, self.new
-        interface = model.equilibrium.interface
-        stretch = [surface_state(model.surface, interface.positions(s.u)).stretch for s in (old, new)]
+        old, new, interface = self.old, self.new, self.model.equilibrium.interface
+        stretch = [interface.surface_at(state).stretch for state in (old, new)]
         slip = 0.5 * (stretch[0] + stretch[1]) * (self._x[1] - self._x[0])
         slip = slip + self._compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
         status = np.where(new.touching | (old.status == STICK), new.status, old.status)

@@ -30,7 +30,16 @@ from typing import Protocol
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import GROWTH_GRACE, GROWTH_LIMIT, MORE, SMALLEST_FORCE, STUCK
+from evfem.common.constants import (
+    ASTRAY,
+    FALLING,
+    GROWTH_GRACE,
+    GROWTH_LIMIT,
+    MORE,
+    SMALLEST_FORCE,
+    STALLED,
+    STUCK,
+)
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
@@ -289,10 +298,11 @@ class Equilibrium(Statics):
 
     @staticmethod
     def _stuck(history: list[float]) -> bool:
-        """Whether the last residuals (i,) are none below those before: iterations that go to and
+        """Whether the last residuals (i,) are hardly below those before: iterations that go to and
         fro, of which more are in vain where a shorter part ends soon.
         """
-        return len(history) > 2 * STUCK and min(history[-STUCK:]) >= min(history[:-STUCK])
+        last, least = (ASTRAY, 5 * ASTRAY // 3) if min(history) > STALLED else (STUCK, 2 * STUCK + 1)
+        return len(history) >= least and min(history[-last:]) >= FALLING * min(history[:-last])
 
     def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)

@@ -30,6 +30,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
     ALIKE,
+    GROWING,
+    GROWN,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     LOST,
@@ -38,6 +40,7 @@ from evfem.common.constants import (
     SEARCH_LIMIT,
     SEARCH_START,
     SHORTEST_FRACTION,
+    SLOW,
     SMALLEST_FORCE,
     SMALLEST_J,
     TURNED,
@@ -71,6 +74,11 @@ class Update:
     u: Floats
     squared: float
     fraction: float
+
+
+def to_and_fro(residuals: list[float]) -> bool:
+    """Whether the last iterations have gained little on those two and more before."""
+    return len(residuals) > 4 and min(residuals[-2:]) > SLOW * min(residuals[-4:-2])
 
 
 class FactorisedBody:
@@ -186,7 +194,7 @@ class FactorisedBody:
         again, residuals = self._renewed, self.record.residuals
         self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
         # where new tangents one after the other gain little, their maps are nearly one
-        if self._renewed and not (again and residuals[-1] < ALIKE):
+        if self._renewed and not (again and (residuals[-1] < ALIKE or to_and_fro(residuals))):
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)
@@ -199,6 +207,7 @@ class FactorisedBody:
                 raise
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
+        after = self._grown(old, state, target, balance, after)
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         bone = after.bone.copy()
@@ -207,6 +216,25 @@ class FactorisedBody:
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
+
+    def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
+        """The next iterate, where candidates follow the contact: nodes that have sunk in on the way join
+        them, and where they are many, the way is gone again with them.
+        """
+        if not self.interface.follows:
+            return after
+        for _ in range(GROWING):
+            known = self.linearisation.candidates.size
+            gap = self.interface.shallowest_penetration(after)
+            if gap is None:
+                break
+            self.admit(after, gap)
+            if self.linearisation.candidates.size < GROWN * known:
+                break
+            self.linearisation.factorise(state)
+            self._anderson.reset()
+            after = self._linear_step(old, state, target, balance)
+        return after
 
     def _linear_step(
         self, old: State, state: State, target: Target, balance: Balance, search: Search = "never"

@@ -18,7 +18,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.friction import Slipping
-from evfem.contact.pad import Pad, fold, surface_state
+from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
 from evfem.solver.state import State
@@ -81,6 +81,25 @@ class Pins:
         return bool(loose.any())
 
 
+class Returned:
+    """Nodes that have slipped and stick again, in the iterations of one step: `nodes` (P,) bool.
+
+    Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
+    a node at rest which the friction of rest does not: the iterations would let it slip and stick by
+    turns. Such a node slips along the chord of the law from rest, which says the same of rest as the
+    law. For a law that is concave in the speed its iterations contract wherever the tissue is stable.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.nodes = np.zeros(size, dtype=bool)
+        self._slipped = np.zeros(size, dtype=bool)
+
+    def watch(self, c: Ints, status: Ints) -> None:
+        """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
+        self.nodes[c] |= self._slipped[c] & (status == STICK)
+        self._slipped[c] |= status >= FORWARD
+
+
 def steps_of_friction(surface: Any, short: float) -> Floats:
     """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
     3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
@@ -97,11 +116,14 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
     `contact_step` is the linear step in which its contact is solved; nodes with a gap below
-    `neighbourhood` (mm) become candidates together.
+    `neighbourhood` (mm) become candidates together. Where the candidates of an interface follow the
+    contact, those of the last step that are far by now are let go.
     """
 
     contact_step = LinearContactStep
+    follows = False
     pad: Any
+    _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
     def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -112,17 +134,30 @@ class Interface:
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
+        self._returned = Returned(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
         self.pins.begin(self.positions(old.u)[:, 0])
+        self._returned = Returned(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
         """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
         return self.points + u[self.pad.nodes]
+
+    def surface_at(self, state: State) -> SurfaceState:
+        """The surface below the pad nodes; that of the last two states is kept, for the balance, the
+        contact problem, the acceptance and the ledger all ask for it.
+        """
+        for u, found in self._seen:
+            if u is state.u:
+                return found
+        found = surface_state(self.surface, self.positions(state.u))
+        self._seen = ((state.u, found), *self._seen[:1])
+        return found
 
     def resting(self, state: State) -> Floats:
         """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface:
@@ -130,15 +165,17 @@ class Interface:
         """
         position = self.positions(state.u)
         touching = state.status != OPEN
-        position[touching, 1] -= surface_state(self.surface, position).gap[touching]
+        position[touching, 1] -= self.surface_at(state).gap[touching]
         return position
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-        surface = surface_state(self.surface, self.positions(state.u))
+        surface = self.surface_at(state)
         normal, shear = state.contact_force.T
-        slope, stretch = surface.slope, surface.stretch
-        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+        slope, force = surface.slope, np.empty_like(state.contact_force)
+        force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
+        force /= surface.stretch[:, None]
+        return force
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
@@ -146,8 +183,7 @@ class Interface:
         """What the contact problem has to know of the candidates c (numbers of pad nodes); of
         every pad node the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
         """
-        position = self.positions(state.u)[c]
-        surface = surface_state(self.surface, position)
+        position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         origin = self._origin(old)[c]
         slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
@@ -168,14 +204,17 @@ class Interface:
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
         """The candidates c under a law of friction other than Coulomb's."""
         slip = np.where(known.status >= FORWARD, known.slip, 0.0)
-        found = self._slipping(old, state, c, known.friction, slip).linearised(law)
+        moving = self._slipping(old, state, c, known.friction, slip)
+        found = moving.linearised(law)
+        self._returned.watch(c, known.status)
+        by_speed = np.where(self._returned.nodes[c], moving.chord(law), found.by_speed)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
         return replace(
             known,
             friction=found.slope,
             cohesion=found.offset,
-            slip_stiffness=found.by_speed / self.duration if self.duration > 0.0 else None,
+            slip_stiffness=by_speed / self.duration if self.duration > 0.0 else None,
             friction_slope=known.friction_slope * by_place,
         )
 
@@ -243,7 +282,7 @@ class Interface:
 
     def shallowest_penetration(self, state: State) -> float | None:
         """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
-        gap = surface_state(self.surface, self.positions(state.u)).gap
+        gap = self.surface_at(state).gap
         sunk = self.pad.free & (state.status == OPEN) & (gap < -self.tolerance * self.length)
         return float(gap[sunk].max()) if sunk.any() else None
 
@@ -255,8 +294,7 @@ class Interface:
 
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
-        position = self.positions(state.u)
-        surface = surface_state(self.surface, position)
+        position, surface = self.positions(state.u), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)

@@ -11,8 +11,10 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
     repeat
         solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
         if it failed: a higher rate, slower
-        else: accept; a lower rate, faster, but not while the speed grows
-            while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
+        else: accept; a lower rate, faster, but not while the speed grows, nor soon where lower ones have
+            failed again and again
+            give up where a finger that is pulled has lost the surface: nothing brings it back
+        while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
             it is found
 
 Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
@@ -40,10 +42,24 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.constants import DRAG_CALMER, DRAG_CHANGE, DRAG_GROWTH, DRAG_MOST, DRAG_REST, DRAG_STEPS
+from evfem.common.constants import (
+    DRAG_CALMER,
+    DRAG_CHANGE,
+    DRAG_GROWTH,
+    DRAG_MOST,
+    DRAG_REST,
+    DRAG_STEPS,
+    PATIENT,
+)
 from evfem.solver.control import GivenVoltage, Target
-from evfem.solver.state import Folded, State, StepFailed
+from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
+
+#: why a release ends in the air
+LIFTED = (
+    "there is no equilibrium near here: the finger is pulled with {:.3g} N/mm and lifts off, where the "
+    "attraction holds {:.3g} N/mm"
+)
 
 
 @dataclass
@@ -73,7 +89,7 @@ class Relaxation:
         held = replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
-        rate, slower, speed, quiet = 1.0, DRAG_CHANGE, 0.0, DRAG_REST
+        rate, slower, speed, quiet, patience = 1.0, DRAG_CHANGE, 0.0, DRAG_REST, Patience()
         for _ in range(DRAG_STEPS):
             self.body.release(state.u, rate)
             try:
@@ -81,11 +97,13 @@ class Relaxation:
             except Folded:
                 raise
             except StepFailed:
+                patience.failed()
                 rate, slower = slower * rate, DRAG_CHANGE * slower
                 if rate > DRAG_MOST:
                     raise
                 continue
             accept(state, new)
+            _refuse_flight(new, held)
             before, speed = speed, rate * float(np.abs(new.u - state.u).max())
             state, slower = new, DRAG_CHANGE
             if speed > before:
@@ -96,7 +114,8 @@ class Relaxation:
                     accept(state, rest)
                     return rest
                 quiet = DRAG_CALMER * rate
-            rate *= _next(speed / before if before > 0.0 else 0.0)
+            change = _next(speed / before if before > 0.0 else 0.0)
+            rate *= max(change, patience.least(change))
         raise StepFailed("the released finger does not come to rest", [])
 
     def _rest(self, state: State, target: Target) -> State | None:
@@ -106,6 +125,43 @@ class Relaxation:
             return self.solve(state, target)
         except StepFailed:
             return None
+
+
+def _refuse_flight(state: State, target: Target) -> None:
+    """Raise `LiftedOff` where nothing touches, the bone is pulled, and the attraction, which only
+    falls on the way up, holds less than that.
+    """
+    held = -float(state.attraction[:, 1].sum())
+    pull = target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
+    if pull > max(held, 0.0) and not state.touching.any():
+        raise LiftedOff(LIFTED.format(pull, held), [])
+
+
+@dataclass
+class Patience:
+    """For how many steps a rate of drag stays after a lower one has failed: twice as long each time
+    that the next lower one fails at once. A front that peels node by node needs the same drag all the
+    way; asked again after each step, whether less would do, most of the work is in vain.
+    """
+
+    longest: int = 0
+    left: int = 0
+    lowered: bool = False
+
+    def failed(self) -> None:
+        """A step failed."""
+        self.longest = min(2 * self.longest, PATIENT) if self.lowered and self.longest else 1
+        self.left, self.lowered = self.longest, False
+
+    def least(self, change: float) -> float:
+        """The least factor of the rate after a step that succeeded and would have it changed by the
+        factor `change`.
+        """
+        if self.lowered:
+            self.longest = 0
+        self.left = max(self.left - 1, 0)
+        self.lowered = change < 1.0 and not self.left
+        return 1.0 if self.left else 0.0
 
 
 def _next(growth: float) -> float:

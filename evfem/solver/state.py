@@ -39,6 +39,10 @@ class Folded(StepFailed):
     """The outline of what was found crosses itself; no smaller part and no release helps that."""
 
 
+class LiftedOff(StepFailed):
+    """A released finger that is pulled harder than the attraction holds has lost the surface."""
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """A configuration of a body with N nodes, P of them on the pad.

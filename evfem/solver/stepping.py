@@ -35,7 +35,7 @@ from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
-from evfem.solver.state import Folded, State, StepFailed
+from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
 
@@ -160,6 +160,9 @@ class Stepper:
         try:
             rest = relaxation.follow(state, target, accept)
         except Folded:
+            raise
+        except LiftedOff as lifted:
+            lifted.last = failed.last
             raise
         except StepFailed:
             raise failed from None

@@ -44,7 +44,9 @@ class Body:
         self.terms = self.given if dynamics is None else (*terms, dynamics)
         self.drag_rate = 0.0
         bone, dim = space.mesh.node_sets["bone"], space.mesh.dim
-        free = np.setdiff1d(np.arange(space.size), bone)
+        held = np.zeros(space.size, dtype=bool)
+        held[bone] = True
+        free = np.flatnonzero(~held)
         self.size = dim * free.size + dim
         self.bone: Ints = np.arange(dim * free.size, self.size)
         self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)

@@ -15,6 +15,7 @@ counts twice: its entries on the diagonal are gathered apart.
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import combinations_with_replacement
 from typing import Any
 
 import numpy as np
@@ -31,53 +32,70 @@ class Pattern:
 
     def __init__(self, nodes: Ints, dim: int) -> None:
         """`nodes` (E, n): the cells' nodes by their numbers in the reduced system, from 0 on."""
+        import scipy.sparse as sparse
+
+        nodes = nodes.astype(np.int32)
         count = int(nodes.max()) + 1
         self.dim, self.size = dim, dim * count
         self._first, self._second = np.triu_indices(nodes.shape[1])
         left, right = nodes[:, self._first], nodes[:, self._second]
-        low, high = np.minimum(left, right), np.maximum(left, right)
-        alone = np.arange(count, dtype=np.int64) * (count + 1)  # a node that no cell has keeps a diagonal
-        pairs = np.concatenate([(low.astype(np.int64) * count + high).ravel(), alone])
-        keys, position = np.unique(pairs, return_inverse=True)
-        self._pairs: Ints = np.searchsorted(keys, np.arange(count + 1, dtype=np.int64) * count)
-        self._fill(keys % count)
-        t = position[: low.size].reshape(low.shape) - self._pairs[low]
-        self.places: Ints = np.empty((*low.shape, dim, dim), dtype=np.int32)
-        for a, b in np.ndindex(dim, dim):
-            self.places[..., a, b] = self._places(left, right, t, a, b)
+        low, high = np.minimum(left, right).ravel(), np.maximum(left, right).ravel()
+        alone = np.arange(count, dtype=np.int32)  # a node that no cell has keeps a diagonal
+        ends = np.append(low, alone), np.append(high, alone)
+        pairs = sparse.csr_matrix((np.ones(ends[0].size, dtype=np.int32), ends), (count, count))
+        self._pairs: Ints = pairs.indptr
+        pairs.data = self._fill(pairs.indices)
+        t = np.asarray(pairs[low, high]).reshape(left.shape)
+        self.places: Ints = np.empty((*left.shape, dim, dim), dtype=np.int32)
+        self._find_places(left, right, t)
 
-    def _places(self, left: Ints, right: Ints, t: Ints, a: int, b: int) -> Ints:
-        """Places (E, P) of entry (a, b) of the pairs (left, right)."""
-        itself = self._first == self._second
+    def _find_places(self, left: Ints, right: Ints, t: Ints) -> None:
+        """Fill in the places of the entries of the t-th pairs (E, P) of the nodes `left`, `right`."""
+        itself, turned = self._first == self._second, left > right
         twice = (left == right) & ~itself
-        row, column = np.where(left > right, b, a), np.where(left > right, a, b)
-        row, column = np.where(twice, min(a, b), row), np.where(twice, max(a, b), column)
-        found: Ints = self._place(np.minimum(left, right), row, t, column)
-        if a > b:
-            found[:, itself] = self.indices.size
-        if a == b:
-            found[twice] = self.indices.size + 1 + a
-        return found
+        own = self._begin(np.minimum(left, right), t)
+        for a, b in combinations_with_replacement(range(self.dim), 2):
+            upper = lower = self._place(own, a, b)
+            if a != b:
+                lower = self._place(own, b, a)
+                lower[twice] = upper[twice]
+                upper, lower = np.where(turned, lower, upper), np.where(turned, upper, lower)
+                lower[:, itself] = self.indices.size
+            else:
+                upper[twice] = self.indices.size + 1 + a
+            self.places[..., a, b], self.places[..., b, a] = upper, lower
 
-    def _place(self, i: Any, a: Any, t: Any, b: Any) -> Any:
-        """Place of entry (a, b) of the t-th pair of node i."""
-        dim, before = self.dim, self._pairs
-        begin = dim * dim * before[i] - i * (dim * (dim - 1) // 2)
-        return begin + a * dim * (before[i + 1] - before[i]) - a * (a - 1) // 2 + dim * t + b - a
+    def _begin(self, i: Any, t: Any) -> tuple[Any, Any]:
+        """Of the t-th pairs of nodes i the places of their first entries, and how many entries of the
+        nodes' first rows there are.
+        """
+        dim, before = self.dim, self._pairs[i]
+        begin = dim * dim * before - i * (dim * (dim - 1) // 2) + dim * t
+        return begin, dim * (self._pairs[i + 1] - before)
 
-    def _fill(self, second: Ints) -> None:
-        """Rows, columns and diagonal of the matrix from the second nodes of all pairs."""
+    def _place(self, own: tuple[Any, Any], a: int, b: int) -> Any:
+        """Places of the entries (a, b) of pairs."""
+        begin, row = own
+        return begin + a * row + (b - a - a * (a - 1) // 2)
+
+    def _fill(self, second: Ints) -> Ints:
+        """Rows, columns and diagonal of the matrix from the second nodes of all pairs (K,); the number
+        t (K,) of each pair among those of its first node.
+        """
         dim, count = self.dim, self.size // self.dim
-        first = np.repeat(np.arange(count), np.diff(self._pairs))
-        t = np.arange(second.size) - self._pairs[first]
-        nodes = np.arange(count)
-        self.diagonal: Ints = np.stack([self._place(nodes, a, 0, a) for a in range(dim)], axis=1).ravel()
+        nodes = np.arange(count, dtype=np.int32)
+        first = np.repeat(nodes, np.diff(self._pairs))
+        t = np.arange(second.size, dtype=np.int32) - self._pairs[first]
+        own = self._begin(nodes, 0)
+        self.diagonal: Ints = np.stack([self._place(own, a, a) for a in range(dim)], axis=1).ravel()
         entries = dim * dim * second.size - count * (dim * (dim - 1) // 2)
         self.indptr: Ints = np.append(self.diagonal, entries).astype(np.int32)
         self.indices: Ints = np.empty(entries, dtype=np.int32)
+        own, apart = self._begin(first, t), second > first
         for a, b in np.ndindex(dim, dim):
-            there = (second > first) | (a <= b)
-            self.indices[self._place(first[there], a, t[there], b)] = dim * second[there] + b
+            there = slice(None) if a <= b else apart
+            self.indices[self._place(own, a, b)[there]] = dim * second[there] + b
+        return t
 
     def zeros(self) -> Floats:
         """What the entries of cell matrices are added to, (Z + 1 + dim,)."""

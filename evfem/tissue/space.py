@@ -49,8 +49,10 @@ def scikit_mesh(mesh: Mesh) -> Any:
     import skfem
 
     linear = {3: skfem.MeshTri, 4: skfem.MeshQuad, 8: skfem.MeshHex}[mesh.corners]
-    vertices, t = np.unique(mesh.cells[:, : mesh.corners], return_inverse=True)
-    t = t.reshape(-1, mesh.corners).T
+    corners = mesh.cells[:, : mesh.corners]
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[corners] = True
+    vertices, t = np.flatnonzero(used), (np.cumsum(used) - 1)[corners].T
     if mesh.corners == 8:  # scikit-fem has its own order of the corners
         t = t[[int(np.flatnonzero((PLACES[:8] == 2 * p - 1).all(axis=1))[0]) for p in linear.elem.refdom.p.T]]
     base = linear(np.ascontiguousarray(mesh.points[vertices].T), np.ascontiguousarray(t))

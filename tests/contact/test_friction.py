@@ -7,11 +7,13 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.contact.friction import KINDS, Slipping
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.errors import InputError
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
+from evfem.solver.interface import Returned
 
 pytestmark = pytest.mark.solver
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
@@ -157,6 +159,32 @@ def test_what_depends_on_the_speed_converges_quadratically():
     result = ev.simulate(soft)
     assert result.substeps.tolist() == [1] * 7
     assert result.newton_iterations.max() <= 8
+
+
+def test_friction_that_rises_steeply_from_rest_neither_cuts_nor_stops_a_step():
+    """Its tangent, extrapolated back to rest, holds nodes there which the friction of rest does not:
+    they would slip and stick by turns, at any length of a part.
+    """
+    soft = ev.Scene(
+        finger(block(8, 2), E=0.05, nu=0.3),
+        ev.Flat(friction=0.3),
+        motion=[ev.Press(force=0.02, steps=1), slid(1.0, distance=0.02)],
+        friction_law=ev.RateFriction(1.35, ratio=1.45, exponent=0.13),
+    )
+    result = ev.simulate(soft)
+    assert result.substeps.tolist() == [1] * 4
+    assert result.newton_iterations.max() <= 30
+
+
+def test_a_node_that_sticks_again_slips_along_the_chord_from_rest():
+    seen = nodes([0.01, 0.01, 0.01], speed=np.array([0.0, 2.0, 40.0]))
+    rest = nodes([0.01] * 3, speed=np.zeros(3)).bound(POWER)
+    np.testing.assert_allclose(rest + seen.chord(POWER) * seen.speed, seen.bound(POWER), rtol=1e-12)
+    assert seen.chord(POWER)[0] == 0.0
+    returned = Returned(4)
+    returned.watch(np.array([0, 1, 3]), np.array([STICK, FORWARD, BACKWARD]))
+    returned.watch(np.array([0, 1, 3]), np.array([FORWARD, STICK, OPEN]))
+    assert returned.nodes.tolist() == [False, True, False, False]
 
 
 def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():

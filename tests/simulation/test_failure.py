@@ -15,7 +15,7 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.failure import advice
 from evfem.simulation.run import Run, simulate
 from evfem.solver.control import Target
-from evfem.solver.state import Folded, StepFailed
+from evfem.solver.state import Folded, LiftedOff, StepFailed
 from evfem.solver.strategy import Strategy
 
 
@@ -67,6 +67,12 @@ def test_a_fold_is_told_as_it_is():
     found = said(failure=Folded)
     assert found[0] == "nodes keep changing"
     assert "less voltage" in found[-1]
+
+
+def test_a_finger_that_was_pulled_off_is_told_as_it_is_and_from_where():
+    lost = said(failure=LiftedOff)[:2]
+    assert lost[0] == "nodes keep changing"
+    assert lost[1].startswith("it was lost at position 0 mm, indentation 0.1 mm, 0.0")
 
 
 def test_a_plain_failure_keeps_its_reason():

@@ -107,6 +107,19 @@ def test_pattern_adds_cells_up():
     np.testing.assert_allclose(twice.full(entries(twice, cell)).toarray(), [[1.0, 5.0], [5.0, 20.0]])
 
 
+@pytest.mark.parametrize("dim", [2, 3])
+def test_pattern_adds_up_the_components_of_nodes_that_a_cell_has_twice(dim):
+    nodes = np.array([[0, 3, 1, 3], [3, 2, 3, 0], [2, 1, 0, 3]])
+    cells = np.random.default_rng(5).normal(size=(3, 4 * dim, 4 * dim))
+    cells += np.swapaxes(cells, 1, 2)
+    unknowns = (dim * nodes[:, :, None] + np.arange(dim)).reshape(3, -1)
+    dense = np.zeros((4 * dim, 4 * dim))
+    for rows, matrix in zip(unknowns, cells, strict=True):
+        np.add.at(dense, (rows[:, None], rows), matrix)
+    pattern = Pattern(nodes, dim)
+    np.testing.assert_allclose(pattern.full(entries(pattern, cells)).toarray(), dense, atol=1e-13)
+
+
 @every_back_end
 @pytest.mark.parametrize("kept", [KEPT, np.sort(KEPT), KEPT[:1]], ids=["any order", "sorted", "one"])
 def test_condensation_equals_dense_elimination(back_end, kept):

@@ -394,11 +394,16 @@ def test_residuals_of_exactly_zero_are_numbers_like_others(history):
 
 def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
     stuck = Equilibrium._stuck
-    to_and_fro = [1.0, *[0.3, 0.1] * 20]
-    given_up = next(n for n in range(1, 41) if stuck(to_and_fro[:n]))
-    assert given_up == 25
+
+    def given_up(one, other):
+        return next(n for n in range(1, 41) if stuck([1.0, *[one, other] * 20][:n]))
+
+    assert given_up(0.3, 0.01) == 17
+    assert given_up(0.3, 0.11) == 10  # nothing speaks for an end
+    crawling = [0.09 * 0.999**i for i in range(40)]
+    assert next(n for n in range(1, 41) if stuck(crawling[:n])) == 17
     assert not any(stuck([0.95**i for i in range(n)]) for n in range(1, 60))
-    assert not any(stuck([0.1] * 20 + [0.09**i for i in range(n)]) for n in range(1, 20))
+    assert not any(stuck([0.1] * 12 + [0.09**i for i in range(n)]) for n in range(1, 20))
 
 
 def test_a_contact_problem_known_to_have_no_solution_is_not_solved_again(monkeypatch):

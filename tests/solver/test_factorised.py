@@ -15,6 +15,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model
 from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
+from evfem.solver.factorised import to_and_fro
 from evfem.solver.state import StepFailed
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -114,3 +115,10 @@ def test_a_pad_that_touches_nothing_begins_moved_along_with_the_bone(pressed):
     begun = body.begin(free, Target.held(np.array([0.1, -0.15]), 500.0), False, free)
     np.testing.assert_allclose(begun.u - free.u, np.broadcast_to([0.1, 0.05], free.u.shape), atol=1e-14)
     assert begun.voltage == 500.0
+
+
+def test_new_tangents_that_gain_little_are_known_from_the_residuals():
+    assert to_and_fro([1.0, 1e-2, 8e-3, 1e-2, 7e-3])
+    assert not to_and_fro([1e-2, 8e-3, 1e-2, 7e-3])
+    assert not to_and_fro([1.0, 1e-2, 8e-3, 1e-2, 3e-3])
+    assert not to_and_fro([1.0, 0.4, 0.2, 0.08, 0.03])

@@ -138,3 +138,29 @@ def test_short_ramps_of_friction_are_jumps_at_their_rougher_end():
     found = steps_of_friction(surface, 0.05)
     np.testing.assert_allclose(found, [[1.01, 0.2, 0.6], [2.0, 0.6, 0.3], [3.0, 0.3, 0.1]])
     np.testing.assert_array_equal(steps_of_friction(surface, 0.005), surface.friction_jumps)
+
+
+def test_the_surface_is_evaluated_once_for_an_iterate_and_anew_for_the_next():
+    asked = []
+
+    class Counted(Flat):
+        is_flat = False
+
+        def height(self, x):
+            asked.append(x)
+            return 0.01 * np.sin(x)
+
+        def slope(self, x):
+            return 0.01 * np.cos(x)
+
+        def curvature(self, x):
+            return -0.01 * np.sin(x)
+
+    model = make_model(Scene(finger(block(4, 2)), Counted(), motion=Press(indentation=0.01, steps=1)))
+    interface, state = model.equilibrium.interface, model.equilibrium.rest(np.zeros(2), 0.0)
+    moved = replace(state, u=state.u + np.array([0.3, 0.0]))
+    asked.clear()
+    here = [interface.surface_at(one) for one in (state, replace(state, voltage=1.0), moved, state)]
+    assert here[0] is here[1] is here[3]
+    assert len(asked) == 2
+    assert here[2].slope == pytest.approx(0.01 * np.cos(interface.positions(moved.u)[:, 0]), abs=1e-15)

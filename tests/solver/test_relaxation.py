@@ -10,21 +10,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from tools.builders import SKIN
-from tools.meshes import between, held
+from tools.builders import SKIN, finger
+from tools.meshes import between, block, held
 
 from evfem.contact.follower import FollowerStiffness
-from evfem.contact.surfaces import Sinusoid
+from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import MeshedFinger
-from evfem.scene.motion import Press, Slide
+from evfem.scene.motion import Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
-from evfem.solver.relaxation import Relaxation
+from evfem.solver.relaxation import Patience, Relaxation
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
 
@@ -166,6 +166,38 @@ def test_a_prescribed_load_is_kept(point):
     assert result.relaxations.sum() == 1
     np.testing.assert_allclose(result.applied_force[4:], load, rtol=1e-7)
     assert left_over(result).max() < 1e-6
+
+
+def test_a_finger_pulled_harder_than_the_attraction_holds_lifts_off():
+    """A block whose ends the attraction pulls down keeps that pull while the voltage falls."""
+    motion = [Press(indentation=1e-4, steps=1), VoltageRamp(voltage=0.0, steps=1, hold="force")]
+    held_by_voltage = Scene(finger(block(8, 2, sag=0.01), E=0.02), Display(), Kaczmarek(), 1500.0, motion)
+    with pytest.raises(NotConverged, match=r"near here: the finger is pulled with 0\.0002") as lost:
+        simulate(held_by_voltage)
+    assert lost.value.step == 2
+    assert "it was lost at position 0 mm" in str(lost.value)
+
+
+def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
+    """Failures after a lowering let the rate stay for 1, 2, 4 ... steps; a lowering that succeeds starts
+    anew.
+    """
+    patience = Patience()
+    patience.failed()
+
+    def stays():
+        count = 1
+        while patience.least(0.5):
+            count += 1
+        patience.failed()
+        return count
+
+    assert [stays() for _ in range(7)] == [1, 2, 4, 8, 16, 16, 16]
+    while patience.least(0.5):
+        pass
+    patience.least(0.5)
+    assert stays() == 1
+    assert Patience().least(0.5) == 0.0
 
 
 def test_friction_on_the_way_is_counted(point):
