@@ -163,11 +163,13 @@ def renewed(text: str, found: dict[str, Found]) -> str:
 
 
 def rows_of_readme(text: str, found: Found) -> str:
-    """README with its two rows and the date of the run of `peers`."""
+    """README with its two rows and the date of the run of `peers`; as it is where the run lacks them."""
     n, made = found["numbers"], found["provenance"]
-    key = "B.L2.evfem_q2p1"
+    key, race = "B.L2.evfem_q2p1", "race.B.best"
     others = [v for p in PACKAGES if (v := n.get(f"B.L2.{p}_q2.cpu_s")) is not None and p != "evfem"]
-    own, peer = n["race.B.best.evfem.cpu_s"], n["race.B.best.fastest_over_evfem.cpu_s"]
+    if not others or not {f"{key}.cpu_s", f"{race}.fastest_over_evfem.cpu_s"} <= n.keys():
+        return text
+    own, peer = n[f"{race}.evfem.cpu_s"], n[f"{race}.fastest_over_evfem.cpu_s"]
     slide = f"error {worst(n, key):.2f} %, {short(n[f'{key}.cpu_s'])} CPU s"
     rows = {
         "a slide on 23,000 nodes": f"{slide}; fastest other package {short(min(others))} s",
@@ -187,6 +189,8 @@ def main(folder: Path) -> None:
     """Renew both pages from the files of a folder."""
     files = {study: folder / f"{study}.json" for study in BLOCKS}
     found = {study: json.loads(file.read_text()) for study, file in files.items() if file.exists()}
+    if quick := [study for study, one in found.items() if one["provenance"].get("quick")]:
+        sys.exit(f"{', '.join(quick)} in {folder}: run with --quick; the pages take whole runs alone")
     PAGE.write_text(renewed(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
     if "peers" in found:
         README.write_text(

@@ -38,6 +38,12 @@ FAR                     so many times as high as the scene's deepest indentation
 NEIGHBOURS              and so does one below so many node distances once any is chosen           B
 STEEP                   an attraction whose negative stiffness exceeds this fraction of the       thin
                         softest shear modulus per height of the body makes its node a candidate   insulators
+HELD                    in 3D, the fraction up to which the negative stiffness of an open node    attraction
+                        is taken off the tangent: any body holds that
+TAKEN                   and the fraction above which it makes the node a candidate                attraction
+FIRST                   in 3D, at least this fraction of the pad's nodes are candidates           press
+GROWN, GROWING          where they become so many times more within a linear step, it is done     press
+                        again with them, at most so often
 FAINT                   changes of tributary lengths that stiffen no node by more than this       C
                         fraction are left to the iterations
 WEAK                    an attraction whose feedback on its own node is below this fraction       C
@@ -124,6 +130,8 @@ REACH = 1.2
 FAR = 1.3
 NEIGHBOURS = 4.0
 STEEP = 0.02
+HELD, TAKEN = 2.0, 10.0
+FIRST, GROWN, GROWING = 0.05, 3.0, 4
 FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5

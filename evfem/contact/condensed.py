@@ -89,7 +89,10 @@ class Candidates:
     def axes(self) -> Floats:
         """Rows n and t of every node, (c, 2, 2)."""
         cos, sin = 1.0 / self.surface.stretch, self.surface.slope / self.surface.stretch
-        return np.stack([np.stack([-sin, cos], axis=1), np.stack([cos, sin], axis=1)], axis=1)
+        axes = np.empty((sin.size, 2, 2))
+        axes[:, 0, 0], axes[:, 1, 1] = -sin, sin
+        axes[:, 0, 1] = axes[:, 1, 0] = cos
+        return axes
 
     def follower_rate(self, own: Floats) -> Floats:
         """Change of the contact force in the laboratory frame per x displacement of its node, (c,

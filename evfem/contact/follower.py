@@ -113,6 +113,9 @@ def local(axes: Floats, columns: Floats) -> Floats:
     """
     if not axes[:, 0, 0].any():
         return columns
-    y, x = columns.reshape(2, len(axes), -1)
-    normal = axes[:, 0, :1] * x + axes[:, 0, 1:] * y
-    return np.concatenate([normal, axes[:, 1, :1] * x + axes[:, 1, 1:] * y])
+    k, found = len(axes), np.empty(columns.shape)
+    y, x = columns[:k], columns[k:]
+    for a, part in enumerate((found[:k], found[k:])):
+        np.multiply(axes[:, a, :1], x, out=part)
+        part += axes[:, a, 1:] * y
+    return found

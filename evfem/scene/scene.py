@@ -106,6 +106,19 @@ class Solver:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
             raise InputError("penalty_normal", ABSENT, allowed)
 
+    @classmethod
+    def within(cls, error: float = 1e-3) -> Solver:
+        """What costs least where forces shall err by at most this share beside the mesh's own error:
+        residuals of a thousandth of it, steps that are cut only where the path would err by more,
+        and half of a symmetric scene.
+
+        >>> auto = Strategy(steps="auto", path_error=0.001)
+        >>> Solver.within(0.001) == Solver(tolerance=1e-6, symmetry=True, strategy=auto)
+        True
+        """
+        strategy = Strategy(steps="auto", path_error=error)
+        return cls(tolerance=1e-3 * error, symmetry=True, strategy=strategy)
+
     def element_on(self, corners: int) -> str:
         """The element used on cells with that many corners (3, 4 or 8).
 

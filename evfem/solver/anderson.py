@@ -75,13 +75,10 @@ def _vector(state: State) -> Floats:
 
 
 def _state(state: State, vector: Floats) -> State:
-    sizes = [state.u.size, state.contact_force.size, state.bone.size, state.pressure.size]
-    u, force, bone, pressure, squared = np.split(vector, np.cumsum(sizes))
-    return replace(
-        state,
-        u=u.reshape(state.u.shape),
-        contact_force=force.reshape(state.contact_force.shape),
-        bone=bone,
-        pressure=pressure.reshape(state.pressure.shape),
-        voltage=KILOVOLT * float(np.sqrt(max(squared[0], 0.0))),
-    )
+    parts, end = [], 0
+    for part in (state.u, state.contact_force, state.bone, state.pressure):
+        begin, end = end, end + part.size
+        parts.append(vector[begin:end].reshape(part.shape))
+    u, force, bone, pressure = parts
+    voltage = KILOVOLT * float(np.sqrt(max(vector[-1], 0.0)))
+    return replace(state, u=u, contact_force=force, bone=bone, pressure=pressure, voltage=voltage)

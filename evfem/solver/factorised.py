@@ -30,6 +30,8 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
     ALIKE,
+    GROWING,
+    GROWN,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
     LOST,
@@ -206,6 +208,7 @@ class FactorisedBody:
                 raise
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
+        after = self._grown(old, state, target, balance, after)
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         bone = after.bone.copy()
@@ -214,6 +217,25 @@ class FactorisedBody:
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
+
+    def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
+        """The next iterate, where candidates follow the contact: nodes that have sunk in on the way join
+        them, and where they are many, the way is gone again with them.
+        """
+        if not self.interface.follows:
+            return after
+        for _ in range(GROWING):
+            known = self.linearisation.candidates.size
+            gap = self.interface.shallowest_penetration(after)
+            if gap is None:
+                break
+            self.admit(after, gap)
+            if self.linearisation.candidates.size < GROWN * known:
+                break
+            self.linearisation.factorise(state)
+            self._anderson.reset()
+            after = self._linear_step(old, state, target, balance)
+        return after
 
     def _linear_step(
         self, old: State, state: State, target: Target, balance: Balance, search: Search = "never"

@@ -116,10 +116,12 @@ class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
     `contact_step` is the linear step in which its contact is solved; nodes with a gap below
-    `neighbourhood` (mm) become candidates together.
+    `neighbourhood` (mm) become candidates together. Where the candidates of an interface follow the
+    contact, those of the last step that are far by now are let go.
     """
 
     contact_step = LinearContactStep
+    follows = False
     pad: Any
     _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
@@ -170,8 +172,10 @@ class Interface:
         """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
         surface = self.surface_at(state)
         normal, shear = state.contact_force.T
-        slope, stretch = surface.slope, surface.stretch
-        return np.stack([shear - slope * normal, normal + slope * shear], axis=1) / stretch[:, None]
+        slope, force = surface.slope, np.empty_like(state.contact_force)
+        force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
+        force /= surface.stretch[:, None]
+        return force
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats

@@ -26,7 +26,21 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ALIKE, FAINT, FAR, LONGER, SHORTER, SLOW, SPARE, STABLE, STALLED, STEEP
+from evfem.common.constants import (
+    ALIKE,
+    FAINT,
+    FAR,
+    FIRST,
+    HELD,
+    LONGER,
+    SHORTER,
+    SLOW,
+    SPARE,
+    STABLE,
+    STALLED,
+    STEEP,
+    TAKEN,
+)
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
@@ -55,7 +69,8 @@ class Linearisation:
         self.record = record or Record()
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
-        self.steep = STEEP * min(law.shear_modulus for law, _ in body.tissue.groups) / depth
+        self.softest = min(law.shear_modulus for law, _ in body.tissue.groups) / depth
+        self.steep = STEEP * self.softest
         height = self.interface.points[:, 1]
         self._deep = height - height.min() <= FAR * limits.deepest
         self.single = not body.tissue.nearly_incompressible
@@ -66,12 +81,13 @@ class Linearisation:
         self.frozen = False
         self._made_at: TangentPoint | None = None
         self._outdated = self._renewed_near = False
+        self._lets_go = True
         self._drag_rate = 0.0
 
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
         self.touching, self.frozen = old.status != OPEN, frozen
-        self._renewed_near = False
+        self._renewed_near, self._lets_go = False, True
 
     def start_clock(self, old: State, duration: float) -> None:
         """Start the clock of a step; a factorisation made for a much longer or shorter one is of
@@ -94,6 +110,9 @@ class Linearisation:
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
         weakening = self.negative_stiffness(state)
+        if self.interface.follows:
+            self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))
+            return
         steep, near = self.steep * self.pad.tributary(position), (gap <= reach) | (state.status != OPEN)
         needed = self.pad.free & (near | (weakening > steep))
         if not needed.any():
@@ -105,6 +124,19 @@ class Linearisation:
         wider = self.pad.free & (wider | self._deep) | needed
         self.candidates = np.union1d(self.candidates, np.flatnonzero(wider))
         self.factor = None
+
+    def _follow(self, state: State, gap: Floats, steep: Any) -> None:
+        """Let the candidates follow the contact: what touches, has sunk in or is strongly attracted,
+        and half as many others with the smallest gaps (P,). What has left is let go, once in a step.
+        """
+        needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
+        if self.candidates.size and needed[self.candidates].sum() == needed.sum():
+            return
+        count = max(SPARE * needed.sum(), FIRST * self.pad.free.sum())
+        enough = np.sort(gap)[min(int(count), int(self.pad.free.sum()) - 1)]
+        chosen = np.flatnonzero(self.pad.free & (gap <= enough) | needed)
+        self.candidates = chosen if self._lets_go else np.union1d(self.candidates, chosen)
+        self.factor, self._lets_go = None, False
 
     # -- factorisation
 
@@ -138,6 +170,8 @@ class Linearisation:
             self.record.backend = type(self.factor).__name__
         pressure = state.pressure if state.pressure.size else None
         upper = self.body.tangent(state.u, pressure)
+        if self.interface.follows:
+            self._weaken(upper, state)
         try:
             self.factor.factorise(upper)
         except Singular as error:
@@ -150,6 +184,17 @@ class Linearisation:
         at = (state.u, state.voltage, self.touching, self.frozen, begin, seconds)
         self._made_at = TangentPoint(*at, state.status, state.pressure)
         self.record.factorisations += 1
+
+    def _weaken(self, upper: Floats, state: State) -> None:
+        """Take what weakens the attraction of open nodes that are no candidates off the tangent, as
+        far as it certainly stays positive: a body bears more than its shear modulus over its height.
+        """
+        most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
+        weakening = np.minimum(self.negative_stiffness(state), most)
+        weakening[self.candidates] = 0.0
+        weakened = np.flatnonzero((weakening > 0.0) & self.pad.free)
+        unknowns = self.body.unknowns[self.pad.nodes[weakened]][:, 1]
+        upper[self.body.pattern.diagonal[unknowns]] -= weakening[weakened]
 
     def made_at(self, state: State) -> bool:
         """Whether the factorisation is that of `state`."""

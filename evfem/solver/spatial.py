@@ -29,6 +29,7 @@ class SkinInterface(Interface):
     """The skin of a body and the surface below it; `points` (N, 3) of the undeformed mesh."""
 
     contact_step = SpatialContactStep
+    follows = True  # a dense compliance of three unknowns each: only what is needed, and spare
 
     def __init__(self, pad: Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
@@ -38,7 +39,7 @@ class SkinInterface(Interface):
         self.pins = Pins(np.zeros((0, 3)), pad.nodes.size)
         self.law: FrictionLaw | None = None
         self.duration = 0.0
-        self.neighbourhood = 0.0  # a dense compliance of three unknowns each: only what is needed, and spare
+        self.neighbourhood = 0.0
 
     def contact_forces(self, state: State) -> Floats:
         """Contact forces on the pad nodes in the laboratory frame (P, 3)."""

@@ -68,9 +68,12 @@ def host(package: str) -> str | None:
 
 
 def environment(python: str) -> dict[str, str]:
-    """The variables of a process: one thread; this interpreter's packages only for itself."""
+    """The variables of a process: one thread; this interpreter's packages only for itself; modules
+    compiled once, as installed packages are.
+    """
     path = os.pathsep.join(p for p in sys.path if p) if python == sys.executable else ""
-    return {k: v for k, v in os.environ.items() if k != "PYTHONHOME"} | ONE_THREAD | {"PYTHONPATH": path}
+    kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONDONTWRITEBYTECODE")}
+    return kept | ONE_THREAD | {"PYTHONPATH": path}
 
 
 def missing() -> list[str]:

@@ -2,6 +2,7 @@
 the file's.
 """
 
+import json
 import runpy
 from pathlib import Path
 
@@ -50,6 +51,21 @@ def test_the_rows_of_readme_are_those_of_the_file():
     assert "| a slide on 23,000 nodes | error 0.05 %, 3.2 CPU s; fastest other package 64 s |" in text
     assert "| time to 0.1 % of the friction force | 0.25 CPU s; fastest other package 5 s |" in text
     assert "with version 9.9 on\n2030-01-02:" in text
+
+
+def test_a_run_without_the_slide_leaves_the_readme_as_it_is():
+    fewer = {key: value for key, value in NUMBERS.items() if not key.startswith("race.B")}
+    text = MEASURED["README"].read_text("utf-8")
+    assert MEASURED["rows_of_readme"](text, PEERS | {"numbers": fewer}) == text
+
+
+def test_quick_runs_do_not_get_to_the_pages(tmp_path):
+    quick = PEERS | {"provenance": MADE | {"quick": True}}
+    (tmp_path / "peers.json").write_text(json.dumps(quick))
+    before = MEASURED["PAGE"].read_text("utf-8")
+    with pytest.raises(SystemExit, match="--quick"):
+        MEASURED["main"](tmp_path)
+    assert MEASURED["PAGE"].read_text("utf-8") == before
 
 
 @pytest.mark.parametrize("value", [None, 0.123, 9.96, 12.4, 345.0])

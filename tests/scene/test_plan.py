@@ -118,3 +118,17 @@ def test_time_charges_and_the_air_layer_are_remembered_too():
     assert remembers(replace(slow, solver=ev.Solver(dynamics="viscous"))) == ("time",)
     alternating = {"drive": ev.Drive(resolved=True), "voltage": ev.Sine(100.0, 50.0)}
     assert remembers(replace(scene, motion=motion, **alternating)) == ("charges",)
+
+
+@pytest.mark.parametrize("error", [0.0, 1.5, 1e-11])
+def test_forces_cannot_be_wanted_to_any_error(error):
+    with pytest.raises(ev.InputError):
+        ev.Solver.within(error)
+
+
+def test_forces_to_an_error_need_what_the_plan_says():
+    scene = ev.Scene(finger(BLOCK), ev.Flat(friction=0.0), motion=[ev.Press(indentation=0.1, steps=3)])
+    cheap, exact = replace(scene, solver=ev.Solver.within(0.02)), ev.simulate(scene)
+    assert "steps auto: nothing remembers the way, each step is one part" in plan(cheap).solver
+    assert cheap.solver.symmetry
+    assert ev.simulate(cheap).normal_force == pytest.approx(exact.normal_force, rel=0.02)

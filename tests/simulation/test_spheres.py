@@ -1,9 +1,10 @@
 """A sphere on a plane in three dimensions: Hertz, and Cattaneo and Mindlin (slow).
 
-A paraboloid of nearly incompressible tissue (nu = 0.48 makes the half space's normal and shear
-motion nearly independent, as Mindlin's solution assumes) in quadratic cells, with nodes of the same
-distance where it touches; cells grow with the distance towards its bone, a hundred contact radii
-away. The contact radius is a two thousandth of the sphere's: strains are small.
+A paraboloid of nearly incompressible tissue in quadratic cells (nu = 0.495: Mindlin's solution assumes
+that normal and shear motion are independent; on a half space, by the solutions of Boussinesq and
+Cerruti, its shear acts 1.4 % nearer to the middle at nu = 0.48 and 0.2 % at 0.495),
+with nodes of the same distance where it touches; cells grow with the distance towards its bone, a
+hundred contact radii away. The contact radius is a two thousandth of the sphere's: strains are small.
 """
 
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from evfem.contact.skin import make_skin
 from evfem.mesh.mesh import raised
 from evfem.simulation.run import simulate
 
-E, NU, RADIUS, SIZE, FINE = 1.0, 0.48, 1000.0, 48.0, 0.6
+E, NU, RADIUS, SIZE, FINE = 1.0, 0.495, 1000.0, 48.0, 0.6
 STIFF = E / (1.0 - NU**2)
 
 
@@ -135,9 +136,9 @@ def test_the_errors_fall_with_the_cells(pressed, coarser):
 @pytest.mark.slow
 def test_the_shear_is_cattaneo_s_and_mindlin_s(pressed):
     """c/a = (1 - Q / mu P)^(1/3) (Johnson, ch. 7): mu p of the radius a less c/a times that of c, which
-    acts at 2 (a^5 - c^5) / 5 (a^3 - c^3) in the mean square; within 1 %. Finer cells leave 0.8 %.
+    acts at 2 (a^5 - c^5) / 5 (a^3 - c^3) in the mean square; within 0.5 %.
     """
     share = pressed.tangential_force[1] / (0.3 * pressed.normal_force[1])
     assert 0.3 < share < 0.9
-    assert abs(misses(pressed)[2]) < 0.01
+    assert abs(misses(pressed)[2]) < 0.005
     assert (pressed.frames[1].contact_status == STICK).any()

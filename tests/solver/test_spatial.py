@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from tools.domes import dome_scene
+from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
 from evfem.contact.coulomb import SLIP
@@ -13,6 +13,7 @@ from evfem.contact.pad import surface_state
 from evfem.contact.signorini import OPEN, STICK
 from evfem.contact.spatial import SpatialCandidates, Turning
 from evfem.simulation.model import make_model
+from evfem.solver.control import Force, GivenVoltage, Target
 
 RAMP = ev.Sinusoid(terms=[[0.4, 1.0, 0.0]], friction=0.3)
 
@@ -139,3 +140,99 @@ def test_turning_forces_are_part_of_the_body():
     assert weaker is not None
     largest = np.linalg.eigvals(C[:, ::3] @ np.zeros((3, 9)) + C @ (50.0 * np.abs(T))).real.max()
     assert_allclose(weaker.rate, 0.9 / largest * strong.rate)
+
+
+# -- candidates follow the contact
+
+
+def at_rest(voltage=0.0, surface=None, divisions=(12, 2, 12)):
+    """Solver, model and state of a dome of many nodes just above the surface."""
+    law = ev.Kaczmarek() if voltage else None
+    given = {"surface": surface or ev.Flat(friction=0.3), "law": law, "voltage": voltage}
+    model = make_model(dome_scene(ev.Press(force=0.1), finger=Dome(shape=dome(divisions)), **given))
+    state = model.equilibrium.rest(model.bone(0.0, 0.0), voltage)
+    return model.equilibrium.body, model, state
+
+
+def sunk(state, depth):
+    """The same, moved down with its bone."""
+    down = np.array([0.0, -depth, 0.0])
+    return replace(state, u=state.u + down, bone=state.bone + down)
+
+
+def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next():
+    body, model, state = at_rest()
+    linear, free = body.linearisation, int(model.pad.free.sum())
+    linear.begin(state, False)
+    linear.choose_candidates(state, 0.0)
+    few = linear.candidates
+    assert 0 < few.size < 0.2 * free
+    deep = sunk(state, 0.15)
+    linear.choose_candidates(deep, 0.0)
+    gap = surface_state(model.surface, model.equilibrium.positions(deep.u)).gap
+    assert set(np.flatnonzero(gap <= 0.0)) <= set(linear.candidates)
+    assert few.size < linear.candidates.size < free
+    # a node of the rim touches too: within the step it joins, in the next one the others may go
+    rim = int(np.argmax(np.where(model.pad.free, gap, -np.inf)))
+    touches = replace(state, status=np.where(np.arange(gap.size) == rim, STICK, OPEN))
+    wide = linear.candidates
+    linear.choose_candidates(touches, 0.0)
+    assert set(linear.candidates) >= {rim, *wide}
+    linear.begin(state, False)
+    linear.candidates = wide
+    linear.choose_candidates(touches, 0.0)
+    assert rim in linear.candidates
+    assert linear.candidates.size < wide.size
+
+
+def test_what_sinks_in_on_a_linear_step_is_a_candidate_of_the_next():
+    """Under a large force the dome sinks onto many nodes at once."""
+    body, model, state = at_rest(divisions=(20, 2, 20))
+    target = Target(0.0, Force(0.5), GivenVoltage(0.0), z=0.0)
+    state = body.begin(state, target, False, state)
+    still = np.zeros_like(state.contact_force)
+    model.equilibrium.interface.begin(state, 0.0)
+    state, balance = body.balance(state, still, target)
+    body.record.residuals = [balance.residual]
+    known = body.linearisation.candidates
+    after = body.advance(state, state, target, balance)
+    gap = surface_state(model.surface, model.equilibrium.positions(after.u)).gap
+    deep = np.flatnonzero(model.pad.free & (gap < -1e-6))
+    assert body.linearisation.candidates.size > known.size
+    assert set(deep) <= set(body.linearisation.candidates)
+
+
+class Kept:
+    """A condensation that keeps what it is given."""
+
+    def __init__(self, size):
+        self.schur = np.eye(size)
+
+    def factorise(self, upper):
+        self.upper = upper
+
+
+@pytest.mark.parametrize("voltage", [100.0, 4000.0])
+def test_the_tangent_knows_how_the_attraction_of_open_nodes_weakens(voltage):
+    """As far as any body holds it: twice the shear modulus over the height, 2 mm, on a node's area."""
+    display = ev.Display(y=-0.02, insulator=ev.Layer(thickness=0.09, eps_r=3.35), friction=0.3)
+    body, model, state = at_rest(voltage, display)
+    linear = body.linearisation
+    linear.begin(state, False)
+    linear.choose_candidates(state, 0.0)
+    linear.candidates = linear.candidates[:1]
+    upper = []
+    for linear.frozen in (True, False):  # a frozen attraction has no stiffness
+        linear.factor = Kept(6)
+        linear.factorise(state)
+        upper.append(linear.factor.upper.copy())
+    taken = np.zeros(body.body.pattern.size)
+    taken[:] = (upper[0] - upper[1])[body.body.pattern.diagonal]
+    rate, area = linear.negative_stiffness(state), model.pad.tributary(model.equilibrium.positions(state.u))
+    most = 2.0 * model.scene.finger.law.shear_modulus / 2.0 * area
+    expected = np.where(model.pad.free, np.minimum(rate, most), 0.0)
+    expected[linear.candidates] = 0.0
+    assert ((rate > most)[expected > 0.0]).any() == (voltage > 1000.0)
+    at = body.body.unknowns[model.pad.nodes[expected > 0.0]]
+    assert_allclose(taken[at[:, 1]], expected[expected > 0.0], rtol=1e-6)
+    assert_allclose(taken[at[:, [0, 2]]], 0.0, atol=1e-12)
