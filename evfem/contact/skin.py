@@ -117,13 +117,30 @@ class Skin:
 
 
 def _hull_area(points: Floats) -> float:
-    """Area of the convex hull of points (n, 2); 0 of points on a line."""
-    from scipy.spatial import ConvexHull, QhullError
+    """Area of the convex hull of points (n, 2), by the monotone chain of their lower and upper
+    halves; 0 of points on a line. Source: A. M. Andrew, Inf. Process. Lett. 9 (1979) 216,
+    doi:10.1016/0020-0190(79)90072-3.
 
-    try:
-        return float(ConvexHull(points).volume)
-    except QhullError:
-        return 0.0
+    >>> round(_hull_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]])), 12)
+    2.0
+    """
+    places = points[np.lexsort(points.T[::-1])].tolist()
+    corners = _lower_half(places)[:-1] + _lower_half(places[::-1])[:-1]
+    x, z = np.array(corners or [[0.0, 0.0]]).T
+    return float(0.5 * (x @ np.roll(z, -1) - z @ np.roll(x, -1)))
+
+
+def _lower_half(places: list[list[float]]) -> list[list[float]]:
+    """Corners of the hull below places in the order of the walk."""
+    chain: list[list[float]] = []
+    for x, z in places:
+        while len(chain) > 1:
+            (x0, z0), (x1, z1) = chain[-2:]
+            if (x1 - x0) * (z - z0) - (z1 - z0) * (x - x0) > 0.0:
+                break
+            chain.pop()
+        chain.append([x, z])
+    return chain
 
 
 def make_skin(mesh: Mesh) -> Skin:

@@ -18,10 +18,10 @@ from evfem.scene.motion import Slide
 from evfem.scene.scene import Scene
 
 SOLID = "with a finger in three dimensions"
-#: factors of a hexahedral finger (bytes) and their growth with the nodes: 98 MB of 11k nodes, n^1.4
-FACTOR_BYTES, FACTOR_NODES, FACTOR_GROWTH = 98e6, 11e3, 1.4
-#: how many times that memory is needed at once while they are made
-MAKING = 2.0
+#: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the
+#: nodes; of the dense matrices of contact, which grow with the square of the skin's nodes, of which a
+#: fifth may touch. Fitted to peaks of fingers with 5,000 to 53,000 nodes pressed to 0.5 or 1 N.
+PACKAGES, BODY, BODY_GROWTH, CONTACT = 0.13e9, 0.0226e9, 1.1, 27.0
 
 
 def check_space(scene: Scene, mesh: Mesh) -> None:
@@ -79,25 +79,29 @@ def _goes_across(scene: Scene) -> bool:
     return any(isinstance(motion, Slide) and motion.way[1] != 0.0 for motion in scene.motion)
 
 
-def factor_memory(nodes: int) -> float:
-    """Memory (bytes) that the factors of a hexahedral finger take, about.
+def needed_memory(mesh: Mesh) -> float:
+    """Memory (bytes) that a run with a finger of hexahedra takes at most, within 20 % where its
+    tissue is not nearly incompressible and PARDISO is there.
 
-    >>> f"{factor_memory(22_000) / 1e6:.0f} MB, {factor_memory(107_000) / 1e9:.1f} GB"
-    '259 MB, 2.4 GB'
+    >>> from evfem.finger.fingertip import Fingertip
+    >>> f"{needed_memory(Fingertip(resolution='coarse').mesh()) / 1e9:.1f} GB"
+    '1.1 GB'
     """
-    return float(FACTOR_BYTES * (nodes / FACTOR_NODES) ** FACTOR_GROWTH)
+    body = BODY * (len(mesh.points) / 1000.0) ** BODY_GROWTH
+    return float(PACKAGES + body + CONTACT * float(len(mesh.node_sets["pad"])) ** 2)
 
 
 def memory(mesh: Mesh) -> str:
     """What the direct solver of a finger in three dimensions needs, in a sentence."""
-    factors = factor_memory(len(mesh.points))
-    return f"its factors take about {factors / 1e6:.2g} MB, {MAKING:g} times that while they are made"
+    return f"a run takes about {needed_memory(mesh) / 1e9:.2g} GB of memory"
 
 
 def check_memory(mesh: Mesh) -> None:
-    """Raise InputError where the direct solver of this finger needs more memory than there is."""
-    needed, there = MAKING * factor_memory(len(mesh.points)), physical_memory()
-    if mesh.dim == 3 and needed > there:
+    """Raise InputError where a finger in three dimensions needs more memory than there is."""
+    if mesh.dim != 3:
+        return
+    needed, there = needed_memory(mesh), physical_memory()
+    if needed > there:
         given = f"{len(mesh.points)} nodes, whose direct solver needs about {needed / 1e9:.2g} GB of memory"
         allowed = (
             f"what fits into the {there / 1e9:.2g} GB of this machine: a coarser resolution, or fewer ridges"

@@ -181,11 +181,12 @@ class FactorisedBody:
         return float(free / largest)
 
     def _rounding(self, state: State) -> float:
-        """Forces (N/mm) below which the balance is rounding of displacements that contain the
-        bone's travel.
+        """Forces (N/mm) below which the balance is rounding: of displacements that contain the
+        bone's travel, and of the stresses of the stiffest cells.
         """
         epsilon = float(np.finfo(float).eps)
-        return 4.0 * epsilon * self.linearisation.stiffest * float(np.abs(state.bone).max())
+        travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
+        return epsilon * self.linearisation.stiffest * travel
 
     # -- one outer iteration
 
