@@ -49,7 +49,7 @@ ROOMS = {
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation interface spatial linearisation pressure anderson "
-        "findings "
+        "travel findings "
         "equilibrium mirrored factorised relaxation path voltage stepping",
     ),
     "scene": (

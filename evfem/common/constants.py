@@ -57,8 +57,6 @@ ALIKE                   below this residual iterations with a new tangent each a
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
                         the last ones, have no residual below
 FALLING                 this fraction of those before
-ASTRAY                  the same, after two thirds more, while no residual is below STALLED       thin
-                                                                                                  insulators
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
@@ -137,9 +135,8 @@ WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
-STUCK = 8
+STUCK = 12
 FALLING = 0.9
-ASTRAY = 6
 MORE = 1.5
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60

@@ -14,14 +14,13 @@ those of an energy; of the layers without losses they decide for `auto`.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.fullfield import KEPT, FieldAttraction
+from evfem.contact.fullfield import FieldAttraction
 from evfem.electrostatics.columns import Columns
 from evfem.electrostatics.meanpull import mean_pull
 
@@ -43,7 +42,6 @@ class DrivenFieldAttraction(FieldAttraction):
     """The mean attraction of the full field under an alternating voltage."""
 
     harmonics: tuple[Harmonic, ...] = ()
-    pulls: OrderedDict[bytes, Floats] = field(default_factory=OrderedDict)
 
     #: the mean force of a field with losses is no derivative of an energy
     has_energy = False
@@ -64,19 +62,10 @@ class DrivenFieldAttraction(FieldAttraction):
     def _columns(self) -> Columns:
         return self._of_harmonics[0][1]
 
-    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
-        """Mean forces (P, 2) at 1 V effective; those of the last positions are remembered."""
-        lines = self.seen(position)
-        x, levels = self.outline(position, lines, pressing)
-        key = x.tobytes() + levels.tobytes()
-        found = self.pulls.get(key)
-        if found is None:
-            pulls = (
-                share * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
-                for share, columns in self._of_harmonics
-            )
-            found = np.asarray(lines.T @ sum(pulls))
-            self.pulls[key] = found
-            while len(self.pulls) > KEPT:
-                self.pulls.popitem(last=False)
-        return found
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[None, Floats]:
+        """Mean forces (L, 2) on the lines at 1 V effective, whatever the slope below."""
+        pulls = (
+            share * mean_pull(columns, x, levels, self._electrodes, self.floating).forces
+            for share, columns in self._of_harmonics
+        )
+        return None, np.asarray(sum(pulls))

@@ -115,7 +115,7 @@ class FieldAttraction(Attraction):
     edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     skin: Any = None
     floating: bool = False
-    solved: OrderedDict[bytes, Capacitance] = field(default_factory=OrderedDict)
+    solved: OrderedDict[bytes, tuple[Capacitance | None, Floats]] = field(default_factory=OrderedDict)
 
     @property
     def _plane(self) -> Pad:
@@ -203,15 +203,36 @@ class FieldAttraction(Attraction):
 
     def solve(self, position: Floats, pressing: Floats | None = None) -> Capacitance:
         """The field under the pad at `position` (P, 2); the last solutions are remembered."""
-        x, levels = self.outline(position, self.seen(position), pressing)
-        key = x.tobytes() + levels.tobytes()
+        found = self._remembered(position, pressing)[0]
+        assert found is not None
+        return found
+
+    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
+        """Forces (P, 2) of the field at 1 V."""
+        return self._remembered(position, pressing)[1]
+
+    def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
+        """Field and forces, anew where they are not among the last `KEPT`."""
+        key = position.tobytes()
+        if self.roughness is not None and pressing is not None:
+            key += pressing.tobytes()
         found = self.solved.get(key)
         if found is None:
-            found = self._columns.solve(x, levels, self._electrodes, self.floating)
-            self.solved[key] = found
+            lines = self.seen(position)
+            x, levels = self.outline(position, lines, pressing)
+            field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope)
+            self.solved[key] = found = (field, np.asarray(lines.T @ forces))
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
         return found
+
+    def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
+        """The field of an outline and its forces (L, 2) on the lines at 1 V, above a surface of that
+        slope (L,).
+        """
+        found = self._columns.solve(x, levels, self._electrodes, self.floating)
+        along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
+        return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
 
     @property
     def _electrodes(self) -> Floats | None:
@@ -247,11 +268,13 @@ class FieldAttraction(Attraction):
         """The lines (sparse, L x P) at which columns stand: between two that stand one above the other,
         or nearly so, the higher one is behind an overhang, or deep in a groove.
         """
-        x, y = (self._lines @ position).T
-        if np.all(np.diff(x) >= np.abs(np.diff(y)) / STEEP):
+        place = self._lines @ position
+        apart, rise = np.diff(place, axis=0).T
+        if np.all(apart >= np.abs(rise) / STEEP):
             return self._lines
+        x, y = place.T.tolist()
         kept: list[int] = []
-        for k in range(x.size):
+        for k in range(len(x)):
             while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:
                 kept.pop()
             if not kept or x[k] - x[kept[-1]] > max(0.0, (y[k] - y[kept[-1]]) / STEEP):
@@ -273,14 +296,6 @@ class FieldAttraction(Attraction):
         if len(self._columns.eps_r) == 3:
             levels.append(ground + gap + lines @ self.skin.thickness)
         return place[:, 0], np.stack(levels)
-
-    def _unit_forces(self, position: Floats, pressing: Floats | None) -> Floats:
-        """Forces (P, 2) of the field at 1 V."""
-        found, lines = self.solve(position, pressing), self.seen(position)
-        slope = surface_state(self.surface, lines @ position).slope
-        along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
-        up = found.by_level[2:].sum(axis=0)
-        return np.asarray(0.5 * (lines.T @ np.stack([along, up], axis=1)))
 
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""

@@ -153,14 +153,14 @@ class Cells:
             diagonal, beside = strips.matrix()
             band[0, :, 0] += diagonal
             band[self.per_line, :-1, 0] += beside
-        flat = band.reshape(width, -1)
         for row in held:  # what is known drops out
-            known = np.arange(self.lines) * self.per_line + row
-            flat[:, known] = 0.0
-            for k in range(1, width):
-                flat[k, known[known >= k] - k] = 0.0
-            flat[0, known] = 1.0
-        return flat
+            band[:, :, row] = 0.0
+            for k in range(1, row + 1):
+                band[k, :, row - k] = 0.0
+            for k in range(row + 1, min(width, row + self.per_line + 1)):
+                band[k, :-1, row + self.per_line - k] = 0.0
+            band[0, :, row] = 1.0
+        return band.reshape(width, -1)
 
     def squares(self, phi: Any) -> Squares:
         """The products that the forces of a potential (L, rows), real or complex, are made of."""

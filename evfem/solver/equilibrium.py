@@ -31,13 +31,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
-    ASTRAY,
     FALLING,
     GROWTH_GRACE,
     GROWTH_LIMIT,
     MORE,
     SMALLEST_FORCE,
-    STALLED,
     STUCK,
 )
 from evfem.contact.attraction import Attraction
@@ -301,8 +299,7 @@ class Equilibrium(Statics):
         """Whether the last residuals (i,) are hardly below those before: iterations that go to and
         fro, of which more are in vain where a shorter part ends soon.
         """
-        last, least = (ASTRAY, 5 * ASTRAY // 3) if min(history) > STALLED else (STUCK, 2 * STUCK + 1)
-        return len(history) >= least and min(history[-last:]) >= FALLING * min(history[:-last])
+        return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])
 
     def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)

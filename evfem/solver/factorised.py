@@ -36,9 +36,6 @@ from evfem.common.constants import (
     LARGEST_BONE_INCREMENT,
     LOST,
     REACH,
-    SEARCH_END,
-    SEARCH_LIMIT,
-    SEARCH_START,
     SHORTEST_FRACTION,
     SLOW,
     SMALLEST_FORCE,
@@ -47,7 +44,6 @@ from evfem.common.constants import (
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
-from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved
 from evfem.contact.stability import Verge, verge
 from evfem.solver.anderson import Anderson
@@ -57,6 +53,7 @@ from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
 from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Record, Reusable, State, StepFailed
+from evfem.solver.travel import Travel
 from evfem.tissue.body import Body
 
 #: whether a travel of the bone is searched for that the contact problem does not settle
@@ -97,7 +94,8 @@ class FactorisedBody:
         self.linearisation = Linearisation(body, interface, attraction, limits, record)
         self.pressure = Pressure(body.tissue, self.linearisation)
         self.record = self.linearisation.record
-        self.largest_bone_increment = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        longest = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))
+        self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
         self._scaled_down = 0
@@ -181,11 +179,12 @@ class FactorisedBody:
         return float(free / largest)
 
     def _rounding(self, state: State) -> float:
-        """Forces (N/mm) below which the balance is rounding of displacements that contain the
-        bone's travel.
+        """Forces (N/mm) below which the balance is rounding: of displacements that contain the
+        bone's travel, and of the stresses of the stiffest cells.
         """
         epsilon = float(np.finfo(float).eps)
-        return 4.0 * epsilon * self.linearisation.stiffest * float(np.abs(state.bone).max())
+        travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
+        return epsilon * self.linearisation.stiffest * travel
 
     # -- one outer iteration
 
@@ -250,11 +249,11 @@ class FactorisedBody:
             if search == "only":
                 raise ContactNotSolved("known from the same linear step")
             driven = self._driven(step, state, target)
-            found, bone = self._limited(step, driven.solution, state, target)
+            found, bone = self.travel.limited(step, driven.solution, state, target)
         except ContactNotSolved:
             if search == "never" or not step.unknowns:
                 raise
-            found, bone = self._searched(step)
+            found, bone = self.travel.searched(step)
             driven = DrivenStep(found)
         if driven.change:
             saved = saved + driven.change * driven.unit
@@ -314,70 +313,6 @@ class FactorisedBody:
 
         squared = (state.voltage / KILOVOLT) ** 2
         return target.drive.solve(step, VoltageProblem(squared, self._solve, unit))
-
-    def _limited(
-        self, step: LinearContactStep, found: StepSolution, state: State, target: Target
-    ) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,), shortened where it is too long for a linear
-        step.
-        """
-        if not step.unknowns:
-            return found, step.bone
-        bone = step.bone.copy()
-        for unknown, travel in zip(step.unknowns, found.extra.tolist(), strict=False):
-            bone[unknown.axis] += travel
-        if not target.height.free:
-            return found, bone
-        missing = target.height.missing(float(state.bone[1]), state.reaction)
-        flies = not found.status.any() and bone[1] * missing < 0.0
-        if abs(bone[1]) > self.largest_bone_increment or flies:
-            # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
-            # part of the way, the way the missing force pushes
-            longest = self._longest_flight(state) if flies else self.largest_bone_increment
-            bone[1] = np.copysign(longest, missing if flies else bone[1])
-            found = self._solve(replace(step, bone=bone, unknowns=()))
-        return found, bone
-
-    def _longest_flight(self, state: State) -> float:
-        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as
-        far again, at least a small fraction of the largest increment.
-        """
-        gap = float(surface_state(self.interface.surface, self.interface.positions(state.u)).gap.min())
-        least = SEARCH_START * self.largest_bone_increment
-        return float(np.clip(2.0 * gap, least, self.largest_bone_increment))
-
-    def _searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
-        travel settles it: an attraction that is extrapolated over a long way has none, for
-        example.
-
-        The travel grows towards the lacking force, twice as far each time, and is halved where
-        that overshoots.
-        """
-
-        def at(travel: float) -> tuple[float, StepSolution, Floats]:
-            bone = step.bone.copy()
-            bone[step.unknowns[0].axis] += travel
-            found = self._solve(replace(step, bone=bone, unknowns=()))
-            return step.lacking(found, travel), found, bone
-
-        first = best = at(0.0)
-        travel = 0.0
-        way = float(np.copysign(SEARCH_START * self.largest_bone_increment, first[0]))
-        for _ in range(SEARCH_LIMIT):
-            try:
-                new = at(travel + way)
-            except ContactNotSolved:
-                way *= 0.5
-                continue
-            if abs(new[0]) >= abs(best[0]):
-                way *= 0.5
-                continue
-            way = -0.5 * way if new[0] * best[0] < 0.0 else 2.0 * way
-            best, travel = new, travel + (new[2] - best[2])[step.unknowns[0].axis]
-            if abs(best[0]) < SEARCH_END * abs(first[0]):
-                break
-        return best[1], best[2]
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""

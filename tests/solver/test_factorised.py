@@ -6,14 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import finger
+from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
-from evfem.scene.motion import Press
-from evfem.scene.scene import Scene
+from evfem.scene.motion import Hover, Press
+from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
+from evfem.simulation.run import simulate
 from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
 from evfem.solver.factorised import to_and_fro
 from evfem.solver.state import StepFailed
@@ -122,3 +123,25 @@ def test_new_tangents_that_gain_little_are_known_from_the_residuals():
     assert not to_and_fro([1e-2, 8e-3, 1e-2, 7e-3])
     assert not to_and_fro([1.0, 1e-2, 8e-3, 1e-2, 3e-3])
     assert not to_and_fro([1.0, 0.4, 0.2, 0.08, 0.03])
+
+
+@pytest.mark.filterwarnings("ignore:a finger of")
+def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
+    """A nail of 200 MPa above a finger that hovers: iterations that went on would shuffle its last
+    digits.
+    """
+    results = [
+        simulate(
+            Scene(
+                coarse_pad(),
+                Display(),
+                Kaczmarek(),
+                50.0,
+                [Hover(0.01, steps=1)],
+                solver=Solver(tolerance=tolerance),
+            )
+        )
+        for tolerance in (1e-8, 1e-11)
+    ]
+    assert results[1].newton_iterations.tolist() == [3]
+    assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)

@@ -1,0 +1,93 @@
+"""How far the bone travels in one linear step: as far as the contact problem says, shortened where
+that is too long for a linear step, or searched for where no travel settles the problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.constants import SEARCH_END, SEARCH_LIMIT, SEARCH_START
+from evfem.contact.condensed import LinearContactStep, StepSolution
+from evfem.contact.signorini import ContactNotSolved
+from evfem.solver.control import Target
+from evfem.solver.interface import Interface
+from evfem.solver.state import State
+
+
+@dataclass(frozen=True)
+class Travel:
+    """The bone's increment (dim,) with the solution of the contact problem there: `solve` solves
+    one, `longest` is the longest increment (mm) of a linear step.
+    """
+
+    interface: Interface
+    solve: Callable[[LinearContactStep], StepSolution]
+    longest: float
+
+    def limited(
+        self, step: LinearContactStep, found: StepSolution, state: State, target: Target
+    ) -> tuple[StepSolution, Floats]:
+        """The solution and the bone's increment (dim,), shortened where it is too long for a linear
+        step.
+        """
+        if not step.unknowns:
+            return found, step.bone
+        bone = step.bone.copy()
+        for unknown, travel in zip(step.unknowns, found.extra.tolist(), strict=False):
+            bone[unknown.axis] += travel
+        if not target.height.free:
+            return found, bone
+        missing = target.height.missing(float(state.bone[1]), state.reaction)
+        flies = not found.status.any() and bone[1] * missing < 0.0
+        if abs(bone[1]) > self.longest or flies:
+            # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
+            # part of the way, the way the missing force pushes
+            longest = self._longest_flight(state) if flies else self.longest
+            bone[1] = np.copysign(longest, missing if flies else bone[1])
+            found = self.solve(replace(step, bone=bone, unknowns=()))
+        return found, bone
+
+    def _longest_flight(self, state: State) -> float:
+        """How far (mm) a body that touches nothing moves in one iteration: to the surface and as
+        far again, at least a small fraction of the largest increment.
+        """
+        gap = float(self.interface.surface_at(state).gap.min())
+        least = SEARCH_START * self.longest
+        return float(np.clip(2.0 * gap, least, self.longest))
+
+    def searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
+        """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
+        travel settles it: an attraction that is extrapolated over a long way has none, for
+        example.
+
+        The travel grows towards the lacking force, twice as far each time, and is halved where
+        that overshoots.
+        """
+
+        def at(travel: float) -> tuple[float, StepSolution, Floats]:
+            bone = step.bone.copy()
+            bone[step.unknowns[0].axis] += travel
+            found = self.solve(replace(step, bone=bone, unknowns=()))
+            return step.lacking(found, travel), found, bone
+
+        first = best = at(0.0)
+        travel = 0.0
+        way = float(np.copysign(SEARCH_START * self.longest, first[0]))
+        for _ in range(SEARCH_LIMIT):
+            try:
+                new = at(travel + way)
+            except ContactNotSolved:
+                way *= 0.5
+                continue
+            if abs(new[0]) >= abs(best[0]):
+                way *= 0.5
+                continue
+            way = -0.5 * way if new[0] * best[0] < 0.0 else 2.0 * way
+            best, travel = new, travel + (new[2] - best[2])[step.unknowns[0].axis]
+            if abs(best[0]) < SEARCH_END * abs(first[0]):
+                break
+        return best[1], best[2]
