@@ -8,8 +8,9 @@ the energy, which cost no solution.
 
 Skin. On a touchscreen half of the voltage falls across the stratum corneum, 0.38 mm thick, wider
 than a ridge: the field spreads in it from the contact on. Grooves of 0.1 mm, 30 % of the surface in
-contact, smooth and with gaps of 1 and 5 um between rough faces. Expected: far more than the
-columns' pull where the faces are smooth, a few per cent where they are rough.
+contact, smooth and with gaps of 1 and 5 um between rough faces; the layer follows the grooves, or
+fills the ridges and ends flat. Expected: far more than the columns' pull where the faces are
+smooth, a few per cent where they are rough.
 
 Fingers. The hovering finger of Table 1 and the pressed one of Fig. 11, with and without ridges.
 Expected: the ridged finger gains more than the smooth one, so the share of its ridges rises, and so
@@ -57,7 +58,8 @@ ROUGH = {"smooth": 0.0, "1um": 1e-3, "5um": 5e-3}
 LOAD = 0.05
 ASSUMPTIONS = {
     "ridges": "conducting, rigid, endless; the law is Strong and Troxel's, the columns' exact limit",
-    "skin": "a layer of constant thickness over living tissue at ground, walls of slope 5",
+    "skin": "a layer of constant thickness over living tissue at ground, walls of slope 5; filled: a layer "
+    "that ends flat, thicker by the depth of the grooves between them",
     "participants": "rigid; cross-section held horizontally, the ridges of Table 2 on every finger",
     "air share": "of the nodes that do not touch, in the total attraction; Strong and Troxel's law, whose "
     "share is smaller than that of Kaczmarek's in Fig. 11",
@@ -85,8 +87,10 @@ def ridge_error(shape: str, insulator: str, gap: float, number: int) -> dict[str
     return {"force_N_per_mm": full.force, "columns_percent": error, "low_percent": low, "high_percent": high}
 
 
-def spreading(rough: float) -> float:
-    """Pull of the full field over that of the columns, skin with grooves on a touchscreen."""
+def spreading(rough: float, filled: bool = False) -> float:
+    """Pull of the full field over that of the columns, skin with grooves on a touchscreen; the layer
+    follows the grooves, or, `filled`, is that much thicker between them and ends flat.
+    """
     half = 0.5 * CONTACT * PITCH
     end, smallest = half + GROOVE / WALL, 1e-5
     pieces = ((0.0, half, np.inf, smallest), (half, end, smallest, np.inf), (end, PITCH / 2.0, 2e-3, np.inf))
@@ -98,9 +102,10 @@ def spreading(rough: float) -> float:
     skin = np.append(0.0, np.geomspace(1e-3, 1.0, 12))
     columns = Columns((insulator.eps_r, 1.0, SKIN.eps_r), (rows, rows, skin))
     level = 0.0 * x
-    found = columns.solve(x, np.stack([level - insulator.thickness, level, gap, gap + SKIN.thickness]))
+    skin_thickness = SKIN.thickness + (gap.max() - gap if filled else level)
+    found = columns.solve(x, np.stack([level - insulator.thickness, level, gap, gap + skin_thickness]))
     pull = -0.5 * float(found.by_level[2:].sum())
-    distance = gap + reduced + SKIN.thickness / SKIN.eps_r
+    distance = gap + reduced + skin_thickness / SKIN.eps_r
     return pull / (0.5 * ev.eps_0 * float(np.sum(np.diff(x) / (distance[1:] * distance[:-1]))))
 
 
@@ -134,6 +139,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
                 name = f"{shape} {insulator} {key.removesuffix('_percent')}"
                 series.append(Series(name, gaps, [one[key] for one in found], "% over mm"))
     numbers |= {f"spreading.{name}": spreading(rough) for name, rough in ROUGH.items()}
+    numbers |= {f"spreading.filled.{name}": spreading(rough, True) for name, rough in ROUGH.items()}
     numbers |= finger_numbers(quick)
     numbers |= participant_numbers(quick)
     on_electrodes, over_edge = electrode_numbers(quick)

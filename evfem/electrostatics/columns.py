@@ -116,8 +116,9 @@ class Strips:
         whole = self.width * (1.0 - 2.0 / 3.0 * share.sum(axis=(0, 2)))
         self.along = eps_r * depth * whole / self.width**2  # (E,)
         every = np.arange(begin.size)
-        lines = self.over(np.broadcast_to(x, (begin.size, x.size))[..., None], every).sum(axis=(0, 2))
-        self.at_lines = eps_r * depth * (1.0 - 2.0 / 3.0 * lines)  # (L,)
+        lines = self.over(np.broadcast_to(x, (begin.size, x.size))[..., None], every)[..., 0]  # (K, L)
+        self.at_lines = eps_r * depth * (1.0 - 2.0 / 3.0 * lines.sum(axis=0))  # (L,)
+        self.at_ends = eps_r / depth * lines[:, [0, -1]]
 
     def over(self, x: Floats, electrode: Ints) -> Floats:
         """The share within the depth to either side of places (k, ..., q) that is electrode k."""
@@ -149,4 +150,7 @@ class Strips:
         slope, longer = (rise / self.width) ** 2, 2.0 * self.along * rise**2 / self.width
         rate[0] += longer - slope * self.at_lines[:-1]
         rate[1] += slope * self.at_lines[1:] - longer
-        return float(value), np.append(rate[0], 0.0) + np.append(0.0, rate[1])
+        by_x = np.append(rate[0], 0.0) + np.append(0.0, rate[1])
+        beyond_ends = self.at_ends * (phi[[0, -1]] - self.pieces[:, 2:]) ** 2  # (K, 2): the area moves along
+        by_x[[0, -1]] += np.array([-1.0, 1.0]) * beyond_ends.sum(axis=0)
+        return float(value), by_x

@@ -90,7 +90,10 @@ def _median(ax: Axes, ends: list[Ending], slowness: Floats) -> None:
     if not points:
         return
     steps, medians = np.array(points).T
-    for factor, style, text in ((1.0, "-", "median"), (SLOW, "--", f"{SLOW:g} times the median")):
+    for factor, style, text in ((1.0, "-", "median"), (SLOW, "--", f"{SLOW:g} times\nthe median")):
         ax.plot(steps, factor * medians, style, color="black", linewidth=1.0)
-        at = (steps[-1], factor * medians[-1])
-        ax.annotate(text, at, (0, 4), textcoords="offset points", fontsize=8, ha="right")
+        at = factor * medians[-1]
+        # beside the panel, where no scene is
+        ax.annotate(
+            text, (1.0, at), (4, 0), ("axes fraction", "data"), "offset points", fontsize=8, va="center"
+        )

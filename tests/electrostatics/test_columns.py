@@ -127,7 +127,7 @@ def test_derivatives_with_electrodes_that_end(floating):
     rng = np.random.default_rng(5)
     x, levels = wave(17, 0.05)
     dx, rise = rng.normal(size=x.shape), rng.normal(size=levels.shape)
-    dx[[0, -1]], rise[:2] = 0.0, 0.1
+    rise[:2] = 0.1
 
     def energy(s):
         return FILM_AND_AIR.solve(x + s * dx, levels + s * rise, halves(-0.5), floating).value

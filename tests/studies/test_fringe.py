@@ -30,6 +30,12 @@ def test_a_field_spreads_in_the_skin_from_smooth_contacts(numbers):
     assert 1.0 < numbers["spreading.5um"] < numbers["spreading.1um"] < 1.25
 
 
+@pytest.mark.parametrize(("faces", "expected"), [("smooth", 1.95), ("1um", 1.22), ("5um", 1.05)])
+def test_a_layer_that_fills_the_ridges_spreads_as_computed_elsewhere(numbers, faces, expected):
+    """Walls of another slope: within 4 %."""
+    assert numbers[f"spreading.filled.{faces}"] == pytest.approx(expected, rel=0.04)
+
+
 def test_ridged_fingers_gain_more_than_smooth_ones(numbers):
     for case in ("HVHD", "HVLD", "LVLD", "pressed"):
         ridged, smooth = (numbers[f"finger.{name}.{case}.full_over_local"] for name in ("ridged", "smooth"))
