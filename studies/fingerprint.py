@@ -156,7 +156,7 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
     axes = figure.subplots(2, 3)
     shown = patterns[-3:]
     for ax, one, letter in zip(axes[0], shown, "abc", strict=False):
-        footprint(found[one, "x"].result, "contact_pressure", PRESSED, ax, near=(-5.0, 5.0, -6.0, 6.0))
+        footprint(found[one, "x"].result, "contact_pressure", PRESSED, ax, near=(-3.0, 3.0, -4.2, 4.2))
         ax.set_title(one, fontsize="medium")
         panel_letter(ax, letter)
     for ax in axes[0, len(shown) :]:

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PADS = {"smooth": (COLOURS["kaczmarek"], "o"), "ridged": (COLOURS["fe"], "s")}
+#: how curves are drawn that nearly coincide: the second one open and dashed
+LINES: Mapping[str, Mapping[str, Any]] = {
+    "smooth": {"markersize": 4},
+    "ridged": {"markersize": 7, "markerfacecolor": "none", "linestyle": "--"},
+}
 
 
 def draw(
@@ -43,7 +48,7 @@ def _depth(ax: Axes, named: Mapping[str, Series]) -> None:
     for pad, (colour, marker) in PADS.items():
         if f"{pad} depth_mm" in named:
             one = named[f"{pad} depth_mm"]
-            ax.plot(one.y, one.x, marker=marker, color=colour, markersize=4, label=pad)
+            ax.plot(one.y, one.x, marker=marker, color=colour, label=pad, **LINES[pad])
     ax.set(xlabel="depth (mm)", ylabel="load (N)", xlim=(0, None), ylim=(0, None))
     ax.legend(fontsize="small")
 
@@ -59,7 +64,7 @@ def _areas(ax: Axes, named: Mapping[str, Series], adams: Mapping[str, Any]) -> N
         if pad == "smooth":
             ax.loglog(gross.x, gross.y, marker=marker, color=colour, markersize=4, label="smooth")
             continue
-        ax.errorbar(gross.x, gross.y, error, marker=marker, color=colour, markersize=4, label="ridged, gross")
+        ax.errorbar(gross.x, gross.y, error, marker=marker, color=colour, label="ridged, gross", **LINES[pad])
         real = named[f"{pad} real_mm2"]
         ax.loglog(real.x, real.y, ":", marker=marker, color=colour, markersize=4, label="ridged, ridges")
     ax.set(xlabel="load (N)", ylabel="contact area (mm²)")
@@ -82,7 +87,7 @@ def _widths(ax: Axes, named: Mapping[str, Series]) -> None:
     for pad, (colour, marker) in PADS.items():
         if f"width {pad}" in named:
             one = named[f"width {pad}"]
-            ax.plot(one.x, one.y, marker=marker, color=colour, markersize=4, label=pad)
+            ax.plot(one.x, one.y, marker=marker, color=colour, label=pad, **LINES[pad])
     ax.set(xlabel="load (N)", ylabel="width of the cross-section (mm)", ylim=(0, None))
     ax.legend(fontsize="small")
 
