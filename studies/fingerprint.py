@@ -153,12 +153,15 @@ def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
     from evfem.plotting.footprint import footprint
 
     figure = new_figure(6.2, 9.5)
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 0.97, 1.0))  # labels of bars stand beside the panels
     axes = figure.subplots(2, 3)
     shown = patterns[-3:]
     for ax, one, letter in zip(axes[0], shown, "abc", strict=False):
         footprint(found[one, "x"].result, "contact_pressure", PRESSED, ax, near=(-3.0, 3.0, -4.2, 4.2))
         ax.set_title(one, fontsize="medium")
         panel_letter(ax, letter)
+    for ax in axes[0, 1:]:
+        ax.set_ylabel("")  # as at the first
     for ax in axes[0, len(shown) :]:
         ax.set_visible(False)
     _bars(axes[1, 0], patterns, {way: [found[one, way].onset for one in patterns] for way in DIRECTIONS})

@@ -202,20 +202,32 @@ class Interface:
         return known if self.law is None else self._obeying(self.law, known, old, state, c)
 
     def _obeying(self, law: FrictionLaw, known: Candidates, old: State, state: State, c: Ints) -> Candidates:
-        """The candidates c under a law of friction other than Coulomb's."""
-        slip = np.where(known.status >= FORWARD, known.slip, 0.0)
+        """The candidates c under a law of friction other than Coulomb's.
+
+        Where the interface yields by C, a node that slips under the largest shear F(s) and is displaced
+        by dx slips by ds = dx - C dF: with K = dF/ds friction grows by K dx / (1 + K C), law and
+        interface in series. The contact problem knows the part of F that does not grow with dx; seen
+        with that, slip and yielding are (1 + K C) times as large.
+        """
+        slips, give = known.status >= FORWARD, known.interface_compliance[:, 1]
+        slip = np.where(slips, known.slip + give * known.force[:, 1], 0.0)
         moving = self._slipping(old, state, c, known.friction, slip)
         found = moving.linearised(law)
         self._returned.watch(c, known.status)
         by_speed = np.where(self._returned.nodes[c], moving.chord(law), found.by_speed)
+        by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
+        yielding = np.where(slips, np.maximum(by_slip, 0.0) * give, 0.0)
+        series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
         return replace(
             known,
-            friction=found.slope,
-            cohesion=found.offset,
-            slip_stiffness=by_speed / self.duration if self.duration > 0.0 else None,
-            friction_slope=known.friction_slope * by_place,
+            slip=known.slip / series,
+            interface_compliance=known.interface_compliance / np.column_stack([np.ones_like(series), series]),
+            friction=series * found.slope,
+            cohesion=series * (found.offset + yielding * np.abs(known.force[:, 1])),
+            slip_stiffness=series * by_slip if self.duration > 0.0 else None,
+            friction_slope=series * known.friction_slope * by_place,
         )
 
     def _slipping(self, old: State, state: State, nodes: Ints, mu: Floats, slip: Floats) -> Slipping:

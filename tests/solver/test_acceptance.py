@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tools.meshes import block
 
+from evfem.contact.friction import RateFriction
 from evfem.contact.pad import make_pad
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.surfaces import Flat, Sinusoid
@@ -306,6 +307,46 @@ def test_a_yielding_interface_is_held_to_its_own_law():
         shifted(good, node(BACKWARD), SLIP + 2.0 * TOLERANCE, 0),
     ):
         assert accepted(interface, old, [broken, good])[0] == 1
+
+
+def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
+    """Displaced by dx, a node that slips at F(s), s = s0 + dx - C (F - F0), has dF/dx = F' / (1 + C
+    F'); and what holds it at rest is the law's tangent there, however much the interface yields.
+    """
+    interface, old, new = legal(SURFACES[0], PenaltyInterface)
+    interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=0.7)
+    interface.law, interface.duration = law, 2e-3
+    old = replace(old, age=np.zeros(PAD.nodes.size))
+    k = node(FORWARD)
+    normal, shear = new.contact_force[k]
+    length, give = PAD.length(MESH.points[PAD.nodes, 0])[k], interface.compliance(old)[k, 1]
+    slip = SLIP + give * shear  # the node has moved by SLIP, and the interface gives way
+
+    def bound(s):
+        return law.bound(normal / length, MU, s / interface.duration, 0.0) * length
+
+    def force(dx):  # F = F(s)
+        low, high = 0.0, 10.0 * abs(shear)
+        for _ in range(200):
+            middle = 0.5 * (low + high)
+            s = slip + dx - give * (middle - abs(shear))
+            low, high = (middle, high) if s > 0.0 and middle < bound(s) else (low, middle)
+        return low
+
+    nothing = np.zeros(PAD.nodes.size)
+    found = interface.candidates(old, new, np.arange(PAD.nodes.size), nothing, nothing)
+    steep = (bound(slip * (1.0 + 1e-6)) - bound(slip * (1.0 - 1e-6))) / (2e-6 * slip)
+    held = found.friction[k] * normal + found.cohesion[k]
+    series = steep / (1.0 + give * steep)
+    assert give * steep > 0.1
+    assert found.slip_stiffness[k] == pytest.approx(series, rel=1e-4)
+    # one step of Newton's method from the iterate, whose force is not the law's
+    assert held == pytest.approx((bound(slip) + give * steep * abs(shear)) / (1.0 + give * steep), rel=1e-6)
+    at = force(0.0)
+    assert held == pytest.approx(at, abs=0.2 * abs(abs(shear) - at))
+    # the motion by which the contact problem has the node at rest, and its whole force then
+    dx = -(found.slip[k] - found.interface_compliance[k, 1] * held)
+    assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
 
 
 def test_iterations_go_on_only_where_their_fall_promises_the_end():
