@@ -173,7 +173,7 @@ class Cells:
         return Squares(along, 2.0 * weight * (by_xi * by_eta.conj()).real, across)
 
     def energy(self, found: Squares) -> float:
-        """The integral of eps |grad phi|^2."""
+        """The integral of `eps |grad phi|^2`."""
         X, Y, h = self.X, self.Y, self.height[:, None]
         parts = h / X * found.along - Y / X * found.mixed + (X + Y**2 / X) / h * found.across
         return float(np.sum(parts))
