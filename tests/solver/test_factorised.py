@@ -143,5 +143,5 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
         )
         for tolerance in (1e-8, 1e-11)
     ]
-    assert results[1].newton_iterations.tolist() == [3]
+    assert results[1].newton_iterations[0] <= 3
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
