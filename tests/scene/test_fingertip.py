@@ -1,5 +1,6 @@
 """A whole pad in scene files: the kind, its keys, paths, participants, and back to the file."""
 
+import meshio
 import numpy as np
 import pytest
 
@@ -107,11 +108,10 @@ def test_a_run_leaves_what_can_be_loaded(tmp_path, capsys):
     assert result["contact_area"][-1] > 1.0
     assert result.frames[-1].displacement.shape == (len(result.mesh.points), 3)
     assert result.normal_force[-1] == pytest.approx(result.applied_force[-1], rel=1e-6)
-    import pyvista
-
-    skin = pyvista.read(folder / "skin_00001.vtu")
-    assert skin.n_points == len(result.mesh.node_sets["pad"])
-    assert float(np.nanmax(skin["contact_pressure"])) == np.nanmax(result.frames[-1].contact_pressure)
+    skin = meshio.read(folder / "skin_00001.vtu")
+    assert len(skin.points) == len(result.mesh.node_sets["pad"])
+    pressure = skin.point_data["contact_pressure"]
+    assert float(np.nanmax(pressure)) == np.nanmax(result.frames[-1].contact_pressure)
     names = (folder / ".evfem-files").read_text().split()
     assert {"skin.pvd", "skin_00001.vtu", "fields.pvd"} <= set(names)
 
