@@ -108,7 +108,7 @@ class Linearisation:
         if the present set does not do, and at once those that the scene's deepest press may reach.
         """
         position = self.interface.positions(state.u)
-        gap = np.where(self.pad.free, surface_state(self.interface.surface, position).gap, np.inf)
+        gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
         if self.interface.follows:
             self._follow(state, gap, weakening > TAKEN * self.softest * self.pad.tributary(position))

@@ -39,7 +39,8 @@ def job(ridges: str, load: float, *slides: ev.Slide) -> Callable[[], float]:
         motion = [ev.Press(force=load, steps=8), *slides]
         finger = ev.Fingertip(ridges=ridges, resolution="coarse")
         scene = ev.Scene(finger, ev.Display(friction=0.3), ev.Kaczmarek(), 1000.0, motion)
-        return float(np.hypot(*(ev.simulate(scene)[f"tangential_force{a}"][-1] for a in ("", "_z"))))
+        result = ev.simulate(scene)
+        return float(np.hypot(result["tangential_force"][-1], result["tangential_force_z"][-1]))
 
     return run
 
