@@ -144,12 +144,15 @@ def test_turning_forces_are_part_of_the_body():
 
 # -- candidates follow the contact
 
+TISSUE = ev.NeoHookean(E=0.1, nu=0.45)
 
-def at_rest(voltage=0.0, surface=None, divisions=(12, 2, 12)):
+
+def at_rest(voltage=0.0, surface=None, divisions=(12, 2, 12), tissue=TISSUE):
     """Solver, model and state of a dome of many nodes just above the surface."""
     law = ev.Kaczmarek() if voltage else None
     given = {"surface": surface or ev.Flat(friction=0.3), "law": law, "voltage": voltage}
-    model = make_model(dome_scene(ev.Press(force=0.1), finger=Dome(shape=dome(divisions)), **given))
+    finger = Dome(shape=dome(divisions), law=tissue)
+    model = make_model(dome_scene(ev.Press(force=0.1), finger=finger, **given))
     state = model.equilibrium.rest(model.bone(0.0, 0.0), voltage)
     return model.equilibrium.body, model, state
 
@@ -200,6 +203,21 @@ def test_what_sinks_in_on_a_linear_step_is_a_candidate_of_the_next():
     deep = np.flatnonzero(model.pad.free & (gap < -1e-6))
     assert body.linearisation.candidates.size > known.size
     assert set(deep) <= set(body.linearisation.candidates)
+
+
+@pytest.mark.parametrize(("stiff", "many"), [(0.1, False), (1e-3, True)])
+def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
+    """Ten times the shear modulus over the height, 2 mm, on a node's area."""
+    display = ev.Display(y=-0.005, insulator=ev.Layer(thickness=0.01, eps_r=3.35), friction=0.3)
+    body, model, state = at_rest(2500.0, display, tissue=ev.NeoHookean(E=stiff, nu=0.45))
+    linear = body.linearisation
+    linear.begin(state, False)
+    linear.choose_candidates(state, 0.0)
+    area = model.pad.tributary(model.equilibrium.positions(state.u))
+    most = 10.0 * model.scene.finger.law.shear_modulus / 2.0 * area
+    steep = np.flatnonzero(model.pad.free & (linear.negative_stiffness(state) > most))
+    assert set(steep) <= set(linear.candidates)
+    assert (steep.size > 0.2 * model.pad.free.sum()) == many
 
 
 class Kept:
