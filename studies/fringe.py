@@ -298,9 +298,15 @@ def _draw_gains(axis: Any, numbers: dict[str, float]) -> None:
     keys = [key for key in numbers if key.startswith("finger.") and key.endswith("full_over_local")]
     bars = [100.0 * (numbers[key] - 1.0) for key in keys]
     labels = [" ".join(key.split(".")[1:3]) for key in keys]
-    labels += [f"grooved skin, {1e3 * gap:g} um gap" for gap in ROUGH.values()]
-    bars += [100.0 * (numbers[f"spreading.{name}"] - 1.0) for name in ROUGH]
-    axis.barh(labels, bars, color=[COLOURS["kaczmarek"]] * len(keys) + [COLOURS["fe"]] * len(ROUGH))
+    colours = [COLOURS["kaczmarek"]] * len(keys)
+    for kind, skin, colour in (
+        ("", "grooved", COLOURS["fe"]),
+        ("filled.", "filled", COLOURS["strong_troxel"]),
+    ):
+        labels += [f"{skin} skin, {1e3 * gap:g} um gap" for gap in ROUGH.values()]
+        bars += [100.0 * (numbers[f"spreading.{kind}{name}"] - 1.0) for name in ROUGH]
+        colours += [colour] * len(ROUGH)
+    axis.barh(labels, bars, color=colours)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)
     axis.set_xlabel("full field, more pull (%)")
