@@ -66,6 +66,8 @@ DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations 
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
 DISC_FALL               where they come again, a step after which the forces miss the laws by     discs
                         more than this fraction of before is shortened
+DISC_OWN                a node's own compliance counts as no less than this fraction of the mean  attraction
+DIVERGED                forces grown by this factor in sweeps are those of no body                attraction
 DISC_ROUNDS             so often before the contact problem is given up                           discs
 DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
 FEW_SOLVES              solves of an active set after which the drops of the attraction are       attraction
@@ -143,6 +145,7 @@ ACTIVE_SET_LIMIT = 60
 FEW_SOLVES = 8
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
+DISC_OWN, DIVERGED = 0.1, 1e6
 STABLE = 0.9
 LOST = 3
 ROUNDING = 1e-12

@@ -9,7 +9,9 @@ the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb's disc ask, 
 .. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
           p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
 
-the same for all positive r; taken is the inverse of the node's own compliance. A node is open if
+the same for all positive r; taken is the inverse of the node's own compliance. Where the attraction
+grows with areas that follow the nodes, that may vanish or be negative: r is then bounded by what is
+usual among the nodes, and g = 0 to rounding stays a small p. A node is open if
 :math:`p \le 0`, sticks if :math:`|z| \le \mu p`, and slips else. A law of friction other than Coulomb's,
 linearised (`evfem.contact.friction`), makes the disc of a closed node :math:`\mu\lambda_n + c` wide, with
 a `cohesion` c. The attraction of an open node
@@ -19,11 +21,13 @@ weakens with its gap; its drop is a force of its own, as in `evfem.contact.signo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import DISC_OWN
 from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ExtraUnknowns
 
 #: status of a node that slips in any direction
@@ -59,17 +63,18 @@ class DiscProblem:
         """Which nodes have friction (k,) bool."""
         return self.friction > 0.0 if self.cohesion is None else (self.friction > 0.0) | (self.cohesion > 0.0)
 
-    @property
+    @cached_property
     def own(self) -> tuple[Floats, Floats]:
-        """Each node's own compliance along the normal and, the larger one, along the tangents,
-        (k,).
+        """Size of each node's own compliance along the normal and, the larger one, along the tangents,
+        (k,), nowhere less than the fraction `DISC_OWN` of the mean.
         """
         i = 3 * np.arange(self.size)
         C = self.compliance
         a, b = C[i + 1, i + 1], C[i + 2, i + 2]
         c = 0.5 * (C[i + 1, i + 2] + C[i + 2, i + 1])
         shear = 0.5 * np.abs(a + b) + np.hypot(0.5 * (a - b), c)
-        return np.maximum(np.abs(C[i, i]), 1e-300), np.maximum(shear, 1e-300)
+        normal, shear = (np.maximum(a, max(DISC_OWN * a.mean(), 1e-300)) for a in (np.abs(C[i, i]), shear))
+        return normal, shear
 
     def state(self, forces: Forces) -> Floats:
         """Gaps and slips (3 k,) under these forces."""
@@ -122,7 +127,8 @@ def projected(problem: DiscProblem, forces: Forces, state: Floats) -> Projected:
     z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
     limit, size = problem.limit(p), np.hypot(*z.T)
     status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.holds, STICK, SLIP))
-    shear = z * np.where(status == STICK, 1.0, limit / np.maximum(size, 1e-300))[:, None]
+    part = limit / np.maximum(size, np.maximum(limit, 1e-300))
+    shear = z * np.where(status == STICK, 1.0, part)[:, None]
     shear[status == OPEN] = 0.0
     wanted = np.column_stack([np.maximum(p, 0.0), shear])
     drop = _drop(problem, status, v[:, 0]) - forces.drop[::3]

@@ -51,7 +51,8 @@ class SpatialCandidates(Candidates):
         slips = (self.status == SLIP) & (shear > 0.0)
         along = np.where(slips[:, None], force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
         growth = self.friction_slope * force[:, 0]
-        growth = np.where(growth * along[:, 0] * own < STABLE, growth, 0.0)
+        steep = growth * along[:, 0]  # a node of negative compliance is held by the others alone
+        growth = np.where((steep <= 0.0) | (steep * own < STABLE), growth, 0.0)
         return turned + growth[:, None] * np.einsum("ca,cak->ck", along, axes[:, 1:])
 
 

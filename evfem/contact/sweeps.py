@@ -3,7 +3,8 @@ r"""Sweeps over the nodes of a contact problem in three dimensions: block Gauss-
 Every node in turn takes the forces that its own laws ask for while all others stay: a contact force
 projected with the node's own compliance (`evfem.contact.coulomb`), or a gap with what its attraction
 is there. Sweeps alone converge in 500 to 1,500 rounds; a few lead Newton's method to its start
-(`evfem.contact.disc`).
+(`evfem.contact.disc`). Where the attraction makes a node's own compliance negative, pressing it
+opens no gap, and sweeps cannot begin; where it makes the compliance indefinite, they diverge.
 
 Source: M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235,
 doi:10.1016/S0045-7825(98)00383-1 (non-smooth contact dynamics).
@@ -16,18 +17,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import STABLE
+from evfem.common.constants import DIVERGED, STABLE
 from evfem.contact.coulomb import DiscProblem, Forces
+from evfem.contact.signorini import ContactNotSolved
 
 
 def sweeps(problem: DiscProblem, forces: Forces, count: int) -> Forces:
-    """Forces after so many sweeps of block Gauss-Seidel; the extra unknowns stay."""
+    """Forces after so many sweeps of block Gauss-Seidel; the extra unknowns stay.
+
+    Raises `ContactNotSolved` where a node's own compliance is not positive, and when forces diverge.
+    """
+    if not (np.diagonal(problem.compliance) > 0.0).all():
+        raise ContactNotSolved("nodes give way against their own forces")
     start = problem.start
     if problem.extra_unknowns is not None:
         start = start + problem.extra_unknowns.columns @ forces.extra
     nodes = [_Node.of(problem, i, start) for i in range(problem.size)]
     contact, drop = forces.contact.copy(), forces.drop.copy()
     total = contact + drop
+    most = DIVERGED * max(np.abs(total).max(), (np.abs(start) / np.diagonal(problem.compliance)).max())
     for _ in range(count):
         for node in nodes:
             own = node.place
@@ -36,6 +44,8 @@ def sweeps(problem: DiscProblem, forces: Forces, count: int) -> Forces:
             contact[own], drop[own.start] = new, fallen
             total[own] = new
             total[own.start] += fallen
+        if not np.abs(total).max() <= most:
+            raise ContactNotSolved("sweeps diverge")
     return Forces(contact, drop, forces.extra)
 
 

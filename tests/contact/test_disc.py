@@ -42,6 +42,24 @@ def half_space(n, friction, shift=(0.0, 0.0), twist=0.0, push=0.3, nu=0.45):
     return DiscProblem(start.ravel(), C.reshape(3 * k, 3 * k) / (2 * np.pi), np.full(k, friction)), place
 
 
+def squeezed(seed, n, friction=0.7, pressure=100.0):
+    """n x n nodes of the same half space below an attraction of this `pressure` on closed gaps, which
+    grows with the areas between the nodes, and forces (k, 3) under which all of them stick.
+    """
+    plane, _ = half_space(n, friction)
+    k, spacing, index = n * n, 2.0 / (n - 1), np.arange(n * n).reshape(n, n)
+    growth = np.zeros((k, 3, k, 3))
+    for a, rows in ((1, index.T), (2, index)):  # central differences of the displacements
+        for i in range(n):
+            growth[rows[i], 0, rows[min(i + 1, n - 1)], a] -= 0.5 * pressure * spacing
+            growth[rows[i], 0, rows[max(i - 1, 0)], a] += 0.5 * pressure * spacing
+    C = np.linalg.inv(np.linalg.inv(plane.compliance) - growth.reshape(3 * k, 3 * k))
+    rng = np.random.default_rng(seed)
+    held = np.column_stack([np.ones(k), 0.5 * friction * rng.uniform(-1, 1, (k, 2))])
+    held *= pressure * spacing**2 * rng.uniform(0.5, 1.5, (k, 1))
+    return DiscProblem(-C @ held.ravel(), C, plane.friction), held
+
+
 def missed(problem, found):
     """By how much forces, gaps and slips miss the laws of Signorini and Coulomb, without any
     projection: sizes of what must be positive, zero or opposite.
@@ -124,6 +142,45 @@ def test_sweeps_alone_come_to_the_same_forces(cohesion):
     nothing = np.zeros(3 * problem.size)
     swept = sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 400)
     assert_allclose(swept.contact, solve_disc(problem, nothing).force, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [4, 6])
+@pytest.mark.parametrize("seed", range(6))
+def test_areas_that_follow_the_nodes_under_a_strong_attraction(seed, n):
+    """The pressure is 100 shear moduli: some of the nodes' own compliances are negative. Half of the
+    nodes touched before, without friction.
+    """
+    problem, held = squeezed(seed, n)
+    assert np.diagonal(problem.compliance)[::3].min() < 0.0
+    before = np.zeros_like(held)
+    before[:, 0] = np.where(np.random.default_rng(seed).uniform(size=n * n) < 0.5, held[:, 0], 0.0)
+    assert missed(problem, solve_disc(problem, before.ravel())) < 1e-11 * held.max()
+
+
+def test_nodes_of_no_compliance_of_their_own_are_closed_to_rounding():
+    """Eight of nine nodes open each other's gaps alone, skew-symmetrically: a gap of rounding would be
+    a force of any size in terms of what a node gives way itself.
+    """
+    rng = np.random.default_rng(5)
+    C, normal, held = np.eye(27), rng.normal(size=(8, 8)), np.zeros(27)
+    C[:24:3, :24:3] = normal - normal.T + 1e-9 * np.eye(8)
+    held[::3] = rng.uniform(1.0, 2.0, 9)
+    found = solve_disc(DiscProblem(-C @ held, C, np.full(9, 0.3)), 0.9 * held)
+    assert found.status.tolist() == [STICK] * 9
+    assert_allclose(found.force, held, atol=1e-12)
+
+
+def test_sweeps_say_where_they_lead_nowhere():
+    """Two nodes, of which each closes the other's gap more than it opens its own; and one that comes
+    when it is pressed.
+    """
+    nothing = np.zeros(6)
+    for normal, reason in (([[1.0, -3.0], [-3.0, 1.0]], "diverge"), ([[-1.0, 0.0], [0.0, 1.0]], "give way")):
+        C = np.eye(6)
+        C[np.ix_([0, 3], [0, 3])] = normal
+        problem = DiscProblem(np.array([-1.0, 0.0, 0.0, -1.0, 0.0, 0.0]), C, np.zeros(2))
+        with pytest.raises(ContactNotSolved, match=reason):
+            sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 100)
 
 
 def test_turned_tangents_turn_the_answer():

@@ -119,6 +119,21 @@ def test_a_force_turns_with_its_node_and_grows_with_friction():
     assert_allclose(found, (force(at + h) - force(at - h)) / (2 * h), atol=1e-8)
 
 
+def test_friction_that_grows_against_the_force_never_pushes_a_node_on():
+    """Friction that pushes ahead and grows by 0.12 N/mm takes a compliance of 100 mm/N away; one that
+    holds is a spring, also for a node that only its neighbours hold: its own compliance is negative.
+    """
+    for ahead, own, kept in (
+        (0.6, 100.0, False),
+        (0.6, 1.0, True),
+        (-0.6, 100.0, True),
+        (-0.6, -100.0, True),
+    ):
+        force = [2.0, ahead, 0.8]
+        free, found = (known(0.7, force).follower_rate(np.array([c]))[0] for c in (0.0, own))
+        assert (found == free).all() == kept
+
+
 def test_turning_forces_are_part_of_the_body():
     """u = C (f + T u) for the compliance that comes back, and for motions that come from outside."""
     rng = np.random.default_rng(3)
