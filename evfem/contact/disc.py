@@ -23,7 +23,7 @@ Algorithm (`solve_disc`)::
         (`evfem.contact.sweeps`) where there are none
     Newton's method from the nodes that touched, sticking; then from all nodes, sticking
     repeat
-        sweeps, twice as many each time; given up where they diverge
+        sweeps, twice as many each time; where they diverge, no more of them, and this is the last time
         Newton's method, with steps shortened where the laws are missed by more
     done, at each of these, where forces, gaps and slips obey the laws to rounding
 
@@ -60,26 +60,28 @@ def solve_disc(problem: DiscProblem, force: Floats) -> DiscSolution:
     """
     count = 0 if problem.extra_unknowns is None else problem.extra_unknowns.right.size
     given = Forces(force.copy(), np.zeros_like(force), np.zeros(count))
-    ends, solves = [], 0
+    best, miss, solves, nowhere = given, np.inf, 0, ""
     for forces, found in _starts(problem, given):
         forces, after, tries = _newton(problem, forces, found)
         solves += tries
         if after.miss <= DISC_ROUNDING:
             return _solution(problem, forces, after, solves)
-        ends.append((after.miss, forces))
-    miss, forces = min(ends, key=lambda end: end[0])
+        if after.miss < miss:
+            best, miss = forces, after.miss
     for attempt in range(1, DISC_ROUNDS):
         try:
-            forces = sweeps(problem, forces, DISC_SWEEPS << attempt)
-        except ContactNotSolved as diverged:
-            raise ContactNotSolved(f"forces miss the laws by {miss:.1e}, {diverged}") from None
-        found = projected(problem, forces, problem.state(forces))
-        forces, after, tries = _newton(problem, forces, found, damped=True)
+            best = sweeps(problem, best, DISC_SWEEPS << attempt)
+        except ContactNotSolved as error:
+            nowhere = f", {error}"
+        found = projected(problem, best, problem.state(best))
+        best, after, tries = _newton(problem, best, found, damped=True)
         solves += tries
         if after.miss <= DISC_ROUNDING:
-            return _solution(problem, forces, after, solves)
+            return _solution(problem, best, after, solves)
         miss = min(miss, after.miss)
-    raise ContactNotSolved(f"forces miss the laws by {miss:.1e}")
+        if nowhere:
+            break
+    raise ContactNotSolved(f"forces miss the laws by {miss:.1e}{nowhere}")
 
 
 def _starts(problem: DiscProblem, given: Forces) -> Iterator[tuple[Forces, Projected]]:

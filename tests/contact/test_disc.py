@@ -157,6 +157,20 @@ def test_areas_that_follow_the_nodes_under_a_strong_attraction(seed, n):
     assert missed(problem, solve_disc(problem, before.ravel())) < 1e-11 * held.max()
 
 
+def test_where_sweeps_cannot_begin_shortened_steps_follow_at_once():
+    """Forces beyond what friction holds, from nodes that touched without it."""
+    problem, held = squeezed(17, 5, 0.3, 30.0)
+    assert np.diagonal(problem.compliance).min() < 0.0
+    rng = np.random.default_rng(17)
+    pushed = held * np.array([1.0, *2 * [rng.uniform(0, 4)]])
+    problem = replace(problem, start=-problem.compliance @ pushed.ravel())
+    before = np.zeros_like(held)
+    before[:, 0] = np.where(rng.uniform(size=25) < 0.5, held[:, 0], 0.0)
+    found = solve_disc(problem, before.ravel())
+    assert missed(problem, found) < 1e-11 * held.max()
+    assert 3 * DISC_NEWTON < found.solves < 5 * DISC_NEWTON
+
+
 def test_nodes_of_no_compliance_of_their_own_are_closed_to_rounding():
     """Eight of nine nodes open each other's gaps alone, skew-symmetrically: a gap of rounding would be
     a force of any size in terms of what a node gives way itself.
