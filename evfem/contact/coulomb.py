@@ -64,6 +64,11 @@ class DiscProblem:
         return self.friction > 0.0 if self.cohesion is None else (self.friction > 0.0) | (self.cohesion > 0.0)
 
     @cached_property
+    def yields(self) -> bool:
+        """Whether every node gives way to forces of its own, in their direction."""
+        return bool((np.diagonal(self.compliance) > 0.0).all())
+
+    @cached_property
     def own(self) -> tuple[Floats, Floats]:
         """Size of each node's own compliance along the normal and, the larger one, along the tangents,
         (k,), nowhere less than the fraction `DISC_OWN` of the mean.

@@ -19,8 +19,9 @@ open node's attraction, and one more row for every extra unknown.
 
 Algorithm (`solve_disc`)::
 
-    Newton's method from the forces of the last iteration, or from sweeps of block Gauss-Seidel
-        (`evfem.contact.sweeps`) where there are none
+    Newton's method from what the laws make of the last iteration's forces after the motion, and from
+        their statuses as they are: these first where some node's own compliance is negative;
+        where there are none, from sweeps of block Gauss-Seidel (`evfem.contact.sweeps`)
     Newton's method from the nodes that touched, sticking; then from all nodes, sticking
     repeat
         sweeps, twice as many each time; where they diverge, no more of them, and this is the last time
@@ -47,7 +48,15 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import DISC_FALL, DISC_NEWTON, DISC_ROUNDING, DISC_ROUNDS, DISC_SWEEPS, STABLE
+from evfem.common.constants import (
+    DISC_FALL,
+    DISC_NEWTON,
+    DISC_ROUNDING,
+    DISC_ROUNDS,
+    DISC_SWEEPS,
+    ROUNDING,
+    STABLE,
+)
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution, Forces, Projected, projected
 from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved
 from evfem.contact.sweeps import sweeps
@@ -88,15 +97,27 @@ def _starts(problem: DiscProblem, given: Forces) -> Iterator[tuple[Forces, Proje
     """Where Newton's method starts, one after the other until it ends: forces, and what the laws make
     of them.
     """
-    swept = given
-    if not given.contact.any():
-        with suppress(ContactNotSolved):
-            swept = sweeps(problem, given, DISC_SWEEPS)
-    yield swept, projected(problem, swept, problem.state(swept))
     touched = given.contact[::3] > 0.0
+    if not touched.any():
+        with suppress(ContactNotSolved):
+            given = sweeps(problem, given, DISC_SWEEPS)
+    if problem.yields:
+        yield given, projected(problem, given, problem.state(given))
+    if touched.any():
+        yield given, _as_they_are(problem, given)
+    if not problem.yields:
+        yield given, projected(problem, given, problem.state(given))
     if touched.any():
         yield given, _sticking(problem, touched)
     yield given, _sticking(problem, np.ones_like(touched))
+
+
+def _as_they_are(problem: DiscProblem, given: Forces) -> Projected:
+    """The statuses that forces at hand have by themselves, whatever moves now."""
+    force = given.contact.reshape(-1, 3)
+    p, z = force[:, 0], force[:, 1:]
+    held = (np.hypot(*z.T) < (1.0 - ROUNDING) * problem.limit(p)) & problem.holds
+    return Projected(p, z, np.where(p > 0.0, np.where(held, STICK, SLIP), OPEN), np.inf)
 
 
 def _sticking(problem: DiscProblem, closed: Any) -> Projected:

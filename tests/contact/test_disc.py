@@ -157,6 +157,13 @@ def test_areas_that_follow_the_nodes_under_a_strong_attraction(seed, n):
     assert missed(problem, solve_disc(problem, before.ravel())) < 1e-11 * held.max()
 
 
+def test_statuses_at_hand_are_taken_first_where_compliances_are_negative():
+    """All nodes stuck, and stick again: one solve."""
+    for seed in range(6):
+        problem, held = squeezed(seed, 6)
+        assert solve_disc(problem, 0.9 * held.ravel()).solves == 1
+
+
 def test_where_sweeps_cannot_begin_shortened_steps_follow_at_once():
     """Forces beyond what friction holds, from nodes that touched without it."""
     problem, held = squeezed(17, 5, 0.3, 30.0)
