@@ -18,7 +18,7 @@ step in which the finger snaps again and again comes to its end.
 
 Staggered rounds have the same equilibria as the monolithic coupling, but may not come to them: the
 attraction of one round, frozen, can pull a node down the slope of a texture. Where they do not
-settle, the part is solved all at once.
+settle, the part is solved all at once, and so is the rest of the step.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
+from evfem.solver.strategy import stuck
 from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
 
@@ -49,8 +50,9 @@ Parts = list[tuple[Target, State]]
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
     that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `unsettled` counts the parts whose staggered rounds did not settle. Where the error
-    of the path of a part is limited it is at most `allowed`, and `path_error` the largest accepted.
+    step fails. `unsettled` counts the parts that were solved all at once because staggered rounds
+    did not settle, `together` says that those of this step do not. Where the error of the path of a
+    part is limited it is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: StepSolver
@@ -60,6 +62,7 @@ class Stepper:
     body: Body | None = None
     relaxations: int = 0
     unsettled: int = 0
+    together: bool = False
     allowed: float | None = None
     path_error: float = 0.0
 
@@ -75,7 +78,7 @@ class Stepper:
         accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
-        least, trusted = strategy.smallest_part, self.substep
+        least, trusted, self.together = strategy.smallest_part, self.substep, False
         while done < 1.0:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
@@ -217,19 +220,23 @@ class Stepper:
             frozen = equilibrium.attraction_at(state, state, target.drive.voltage)
             return equilibrium.step(state, target, frozen)
         try:
-            return self._settled(state, target)
+            if not self.together:
+                return self._settled(state, target)
         except StepFailed:
-            new = equilibrium.step(state, target)
-            self.unsettled += 1
-            return new
+            self.together = True
+        new = equilibrium.step(state, target, start=start)
+        self.unsettled += 1
+        return new
 
     def _settled(self, state: State, target: Target) -> State:
         """Rounds of mechanics under the attraction of the round before, until it no longer changes."""
         equilibrium, new = self.equilibrium, state
-        for done in range(STAGGERED_LIMIT):
+        changes: list[float] = []
+        while len(changes) < STAGGERED_LIMIT and not stuck(changes):
             frozen = equilibrium.attraction_at(state, new, target.drive.voltage)
-            change = np.abs(frozen - new.attraction).max()
-            if done and change <= equilibrium.tolerance * max(np.abs(new.reaction).max(), SMALLEST_FORCE):
+            changes.append(float(np.abs(frozen - new.attraction).max()))
+            done, allowed = len(changes) > 1, max(np.abs(new.reaction).max(), SMALLEST_FORCE)
+            if done and changes[-1] <= equilibrium.tolerance * allowed:
                 return new
             new = equilibrium.step(state, target, frozen, start=new if done else None)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

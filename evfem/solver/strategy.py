@@ -14,9 +14,11 @@ With steps "auto" the parts are as long as the error of the path allows (`evfem.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
+from evfem.common.constants import FALLING, STUCK
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -58,3 +60,15 @@ class Strategy:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+def stuck(history: Sequence[float]) -> bool:
+    """Whether the last residuals or changes (i,) are hardly below those before: iterations that go
+    to and fro, of which more are in vain where a shorter part ends soon.
+
+    >>> stuck([1e-3, 2e-4] * 12), stuck([0.5**i for i in range(30)])
+    (False, False)
+    >>> stuck([1e-3, 2e-4] * 13)
+    True
+    """
+    return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])

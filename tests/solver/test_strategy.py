@@ -8,7 +8,7 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.common.constants import STAGGERED_LIMIT
+from evfem.common.constants import STUCK
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
@@ -199,7 +199,10 @@ def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails
     stepper = Stepper(solver, "staggered")
     assert stepper.solve(rest, target).together
     assert stepper.unsettled == 1
-    assert solver.rounds == (1 if fails else STAGGERED_LIMIT)
+    assert solver.rounds == (1 if fails else 2 * STUCK + 1)
+    # the rest of the step is not asked again
+    assert stepper.solve(rest, target).together
+    assert (stepper.unsettled, solver.rounds) == (2, 1 if fails else 2 * STUCK + 1)
 
 
 def test_one_round_is_all_there_is_where_one_was_asked_for():
