@@ -5,8 +5,9 @@ Algorithm (`Stepper.follow`)::
     substep <- the one that worked last
     repeat until the end of the path
         solve one equilibrium at `done + substep`
-        if it failed: halve the substep; at the strategy's smallest release the body, which comes to rest
-            at another equilibrium (`evfem.solver.relaxation`), or give up where it does not
+        if it failed: halve the substep; below `RELEASED` of a step, release the body, which comes to
+            rest at another equilibrium (`evfem.solver.relaxation`); where it does not, halve on, and
+            give up at the strategy's smallest
         else: accept; if it took few iterations, let the next substep grow
 
 Where the error of the path is limited, a part is solved as two halves and accepted where one whole
@@ -25,10 +26,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from evfem.common.constants import COARSER, PATH_FIRST, SMALLEST_FORCE, STAGGERED_LIMIT
+from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.solver.control import GivenVoltage, KeptCharge, Target
@@ -44,6 +46,40 @@ from evfem.tissue.body import Body
 Path = Callable[[float, float], Target]
 #: steps that were solved one after the other: their targets and ends
 Parts = list[tuple[Target, State]]
+
+
+class Accounts(Protocol):
+    """Who keeps account of the parts that were accepted."""
+
+    def accept(self, old: State, new: State) -> None:
+        """A part was accepted, from `old` to `new`."""
+
+    def mark(self) -> Any:
+        """Where the accounts stand."""
+
+    def back(self, mark: Any) -> None:
+        """What was accepted since `mark` led nowhere."""
+
+
+class Unbooked:
+    """Accounts that keep nothing."""
+
+    def accept(self, old: State, new: State) -> None:
+        """A part was accepted."""
+
+    def mark(self) -> None:
+        """Where the accounts stand: nowhere."""
+
+    def back(self, mark: None) -> None:
+        """Nothing was kept."""
+
+
+@dataclass
+class Release:
+    """Below which part of the present step the body is released, and the part that worked last."""
+
+    least: float
+    trusted: float
 
 
 @dataclass
@@ -67,39 +103,36 @@ class Stepper:
     path_error: float = 0.0
 
     def __post_init__(self) -> None:
+        self._release = Release(RELEASED, self.substep)
         if self.allowed is not None:
             self.substep = PATH_FIRST
 
-    def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
-        """From `state` to the end of `path`; `accept(old, new)` sees every converged substep.
-        Returns the end and the number of substeps.
+    def follow(self, state: State, path: Path, accounts: Accounts) -> tuple[State, int]:
+        """From `state` to the end of `path`; the accounts see every converged substep. Returns the end
+        and the number of substeps.
 
         Raises `StepFailed` when the smallest substep fails; what was accepted before stays
         accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
-        least, trusted, self.together = strategy.smallest_part, self.substep, False
+        self.together, self._release = False, Release(max(RELEASED, strategy.smallest_part), self.substep)
         while done < 1.0:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                self.cuts += 1
-                self.substep = 0.5 * (fraction - done)
-                if self.substep >= least:
-                    continue
-                state = self._released(state, path(done, fraction), accept, failed)
-                done, substeps = fraction, substeps + 1
-                self.substep, least = min(1.0, max(trusted, least)), COARSER * least
+                rest = self._shortened(state, path(done, fraction), accounts, fraction - done, failed)
+                if rest is not None:
+                    state, done, substeps = rest, fraction, substeps + 1
                 continue
             if not self._keeps(error, fraction - done):
                 continue
-            trusted = self.substep
+            self._release.trusted = self.substep
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
-                accept(state, new)
+                accounts.accept(state, new)
                 state, substeps = new, substeps + 1
             if self.allowed is not None:
                 self._set_length(error, fraction - done)
@@ -107,6 +140,27 @@ class Stepper:
                 self.substep = min(1.0, strategy.growth * self.substep)
             done = fraction
         return state, substeps
+
+    def _shortened(
+        self, state: State, target: Target, accounts: Accounts, part: float, failed: StepFailed
+    ) -> State | None:
+        """Halve the part that failed, or release the body at one that is short enough: its rest is
+        returned, and the part that worked before is tried next. Raises `failed` at the smallest part.
+        """
+        release, least = self._release, self.equilibrium.strategy.smallest_part
+        self.cuts += 1
+        self.substep = half = 0.5 * part
+        if half >= release.least:
+            return None
+        rest = self._released(state, target, accounts, failed)
+        if rest is None:
+            if half < least:
+                raise failed
+            self.substep, release.least = half, least
+            return None
+        self.substep = min(1.0, max(release.trusted, release.least))
+        release.least *= COARSER
+        return rest
 
     def _keeps(self, error: float, part: float) -> bool:
         """Whether a part with this error of its path is accepted; if not, the next one is shorter."""
@@ -147,28 +201,27 @@ class Stepper:
         if self.body is not None and self.body.dynamics is not None:
             self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
-    def _released(
-        self, state: State, target: Target, accept: Callable[[State, State], None], failed: StepFailed
-    ) -> State:
-        """The equilibrium to which the body snaps from `state`; raises `failed` where there is
-        none.
+    def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
+        """The equilibrium to which the body snaps from `state`, None where it comes to none; raises
+        `Folded` or `LiftedOff` where there can be none.
         """
         self.substep, failed.last = 1.0, (state, target)
         if self.body is None or not self.equilibrium.strategy.relaxation:
-            raise failed
+            return None
         relaxation = Relaxation(self.body, self.solve)
-        if isinstance(failed, Folded) or not relaxation.applies(target):
+        if isinstance(failed, Folded):
             raise failed
-        failed.released = True
+        if not relaxation.applies(target):
+            return None
+        failed.released, mark = True, accounts.mark()
         try:
-            rest = relaxation.follow(state, target, accept)
-        except Folded:
-            raise
-        except LiftedOff as lifted:
-            lifted.last = failed.last
-            raise
-        except StepFailed:
-            raise failed from None
+            rest = relaxation.follow(state, target, accounts.accept)
+        except StepFailed as error:
+            accounts.back(mark)
+            if isinstance(error, Folded | LiftedOff):
+                error.last = failed.last
+                raise
+            return None
         self.relaxations += 1
         return rest
 

@@ -4,9 +4,9 @@ A step is one equilibrium from one accepted state to the next. It is tried whole
 fails, it is cut into parts: half as long after each failure, longer again after easy ones. What
 makes the iterations of one part hold is not a choice: contact is solved exactly in each of them,
 cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
-and under a force the bone moves by limited strides. Where the smallest part fails too, stability
-is lost: the finger is released and comes to rest at another equilibrium, if there is one
-(`evfem.solver.relaxation`). What happens on the way needs physics instead: `dynamics` "viscous" or
+and under a force the bone moves by limited strides. Where short parts fail too, stability is lost:
+the finger is released and comes to rest at another equilibrium (`evfem.solver.relaxation`); if it
+does not, still shorter parts are tried. What happens on the way needs physics instead: `dynamics` "viscous" or
 "inertial" with a speed.
 
 With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
-from evfem.common.constants import FALLING, STUCK
+from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -36,8 +36,8 @@ class Strategy:
     `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
     so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
     most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
-    where even the smallest part fails, and takes no time, the finger is released and comes to rest
-    at another equilibrium; `steps`: "given", each requested step is one part unless that fails,
+    where short parts fail, and take no time, the finger is released and comes to rest at another
+    equilibrium; `steps`: "given", each requested step is one part unless that fails,
     or "auto", where friction or time remember the way each is cut into parts whose error of the
     path is at most `path_error` of the force.
 
@@ -63,12 +63,23 @@ class Strategy:
 
 
 def stuck(history: Sequence[float]) -> bool:
-    """Whether the last residuals or changes (i,) are hardly below those before: iterations that go
-    to and fro, of which more are in vain where a shorter part ends soon.
+    """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
+    ends soon: they come round in a circle, or the last ones are hardly below those before.
 
-    >>> stuck([1e-3, 2e-4] * 12), stuck([0.5**i for i in range(30)])
+    >>> stuck([1e-3, 2e-4] * 2), stuck([0.5**i for i in range(30)])
     (False, False)
-    >>> stuck([1e-3, 2e-4] * 13)
-    True
+    >>> stuck([1e-3, 2e-4] * 3), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
+    (True, True)
     """
+    if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
+        return True
     return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])
+
+
+def _circle(history: Sequence[float], period: int) -> bool:
+    """Whether the last residuals (i,), at least four of them, are those one period before."""
+    count = max(2 * period, 4)
+    if len(history) < count + period:
+        return False
+    last, before = history[-count:], history[-count - period : -period]
+    return all(abs(a - b) <= SAME * a for a, b in zip(last, before, strict=True))
