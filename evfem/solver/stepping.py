@@ -74,6 +74,15 @@ class Unbooked:
         """Nothing was kept."""
 
 
+@dataclass(frozen=True)
+class Part:
+    """A part of a step, from `begin` to `end` (0 to 1), and the target there."""
+
+    begin: float
+    end: float
+    target: Target
+
+
 @dataclass
 class Release:
     """Below which part of the present step the body is released, and the part that worked last."""
@@ -122,7 +131,8 @@ class Stepper:
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                rest = self._shortened(state, path(done, fraction), accounts, fraction - done, failed)
+                part = Part(done, fraction, path(done, fraction))
+                rest = self._shortened(state, part, accounts, failed)
                 if rest is not None:
                     state, done, substeps = rest, fraction, substeps + 1
                 continue
@@ -141,22 +151,21 @@ class Stepper:
             done = fraction
         return state, substeps
 
-    def _shortened(
-        self, state: State, target: Target, accounts: Accounts, part: float, failed: StepFailed
-    ) -> State | None:
+    def _shortened(self, state: State, part: Part, accounts: Accounts, failed: StepFailed) -> State | None:
         """Halve the part that failed, or release the body at one that is short enough: its rest is
-        returned, and the part that worked before is tried next. Raises `failed` at the smallest part.
+        returned, and the part that worked before is tried next. Raises `failed` at the smallest part
+        of what was left of the step.
         """
         release, least = self._release, self.equilibrium.strategy.smallest_part
         self.cuts += 1
-        self.substep = half = 0.5 * part
+        self.substep = half = 0.5 * (part.end - part.begin)
         if half >= release.least:
             return None
-        rest = self._released(state, target, accounts, failed)
+        rest = self._released(state, part.target, accounts, failed)
         if rest is None:
-            if half < least:
+            if half < least * (1.0 - part.begin):
                 raise failed
-            self.substep, release.least = half, least
+            self.substep, release.least = half, least * (1.0 - part.begin)
             return None
         self.substep = min(1.0, max(release.trusted, release.least))
         release.least *= COARSER

@@ -6,8 +6,8 @@ makes the iterations of one part hold is not a choice: contact is solved exactly
 cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
 and under a force the bone moves by limited strides. Where short parts fail too, stability is lost:
 the finger is released and comes to rest at another equilibrium (`evfem.solver.relaxation`); if it
-does not, still shorter parts are tried. What happens on the way needs physics instead: `dynamics` "viscous" or
-"inertial" with a speed.
+does not, still shorter parts are tried. What happens on the way needs physics instead: `dynamics`
+"viscous" or "inertial" with a speed.
 
 With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
 """
@@ -33,9 +33,9 @@ class Strategy:
 
     `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
     the factorisation when more iterations than this would be left with the old one;
-    `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
-    so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
-    most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
+    `smallest_part`: of what is left of a requested step, before it counts as not converged;
+    `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`: a
+    part begins at most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
     where short parts fail, and take no time, the finger is released and comes to rest at another
     equilibrium; `steps`: "given", each requested step is one part unless that fails,
     or "auto", where friction or time remember the way each is cut into parts whose error of the
@@ -66,9 +66,9 @@ def stuck(history: Sequence[float]) -> bool:
     """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
     ends soon: they come round in a circle, or the last ones are hardly below those before.
 
-    >>> stuck([1e-3, 2e-4] * 2), stuck([0.5**i for i in range(30)])
+    >>> stuck([1e-3, 2e-4] * 4), stuck([0.5**i for i in range(30)])
     (False, False)
-    >>> stuck([1e-3, 2e-4] * 3), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
+    >>> stuck([1e-3, 2e-4] * 5), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
     (True, True)
     """
     if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
@@ -77,9 +77,11 @@ def stuck(history: Sequence[float]) -> bool:
 
 
 def _circle(history: Sequence[float], period: int) -> bool:
-    """Whether the last residuals (i,), at least four of them, are those one period before."""
-    count = max(2 * period, 4)
+    """Whether the last residuals (i,), at least `STUCK`, are those one period before; a bone that is
+    still on its way, 1 or more, is none.
+    """
+    count = max(2 * period, STUCK)
     if len(history) < count + period:
         return False
     last, before = history[-count:], history[-count - period : -period]
-    return all(abs(a - b) <= SAME * a for a, b in zip(last, before, strict=True))
+    return all(b < 1.0 and abs(a - b) <= SAME * a for a, b in zip(last, before, strict=True))
