@@ -15,7 +15,8 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`)
+    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless the
+        attraction's negative stiffness had to be scaled down
 
 Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
 """
@@ -207,6 +208,9 @@ class FactorisedBody:
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
         after = self._grown(old, state, target, balance, after)
+        if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
+            self._anderson.reset()
+            return after
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         bone = after.bone.copy()

@@ -15,8 +15,9 @@ from evfem.scene.motion import Hover, Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
+from evfem.solver.anderson import Anderson
 from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
-from evfem.solver.factorised import to_and_fro
+from evfem.solver.factorised import FactorisedBody, to_and_fro
 from evfem.solver.state import StepFailed
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -145,3 +146,24 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     ]
     assert results[1].newton_iterations[0] <= 3
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
+
+
+def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
+    """It is a part of the way to where it leads, and its residual no step of the map that is mixed."""
+    mix, solve, scaled, mixed = Anderson.next_iterate, FactorisedBody._solve, [], []
+
+    def solved(self, step):
+        found = solve(self, step)
+        scaled.append(found.reduced)
+        return found
+
+    def next_iterate(self, before, after):
+        mixed.append(scaled[-1])
+        return mix(self, before, after)
+
+    monkeypatch.setattr(FactorisedBody, "_solve", solved)
+    monkeypatch.setattr(Anderson, "next_iterate", next_iterate)
+    simulate(Scene(ROUND, Display(), Kaczmarek(), 6000.0, [Hover(gap=0.005)]))
+    assert any(scaled)
+    assert mixed
+    assert not any(mixed)
