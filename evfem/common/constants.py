@@ -60,6 +60,7 @@ FALLING                 this fraction of those before
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
+TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
@@ -139,6 +140,7 @@ STUCK = 12
 FALLING = 0.9
 MORE = 1.5
 ANDERSON_DEPTH = 3
+TURNED_BACK = 1.0 / 8.0
 ACTIVE_SET_LIMIT = 60
 FEW_SOLVES = 8
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7

@@ -9,6 +9,8 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
+from evfem.common.constants import TURNED_BACK
+from evfem.contact.signorini import OPEN
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Hover, Press
@@ -167,3 +169,24 @@ def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
     assert any(scaled)
     assert mixed
     assert not any(mixed)
+
+
+def test_iterations_in_which_a_node_opens_and_closes_by_turns_go_a_part_of_their_way(pressed, monkeypatch):
+    body, state, target = pressed
+    node = int(np.flatnonzero(state.touching)[0])
+    status = state.status.copy()
+    status[node] = OPEN
+    closed, opened = state, replace(state, status=status, u=state.u + 1e-3)
+    monkeypatch.setattr(
+        body, "_linear_step", lambda old, now, *_: closed if now.status[node] == OPEN else opened
+    )
+    monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3] * 3)
+    balance = body.balance(state, state.attraction, target)[1]
+    body.begin(state, target, False, state)
+    after = state
+    for _ in range(2):
+        after = body.advance(state, after, target, balance)
+    assert after is not closed
+    np.testing.assert_allclose(after.u - state.u, (1.0 - TURNED_BACK) * 1e-3, rtol=1e-9)
+    assert after.status[node] == OPEN
+    assert after.voltage == state.voltage
