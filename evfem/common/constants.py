@@ -62,6 +62,7 @@ LONGEST_CIRCLE          come back to them after at most so many are given up    
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
+TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
@@ -144,6 +145,7 @@ FALLING = 0.9
 SAME, LONGEST_CIRCLE = 0.02, 5
 MORE = 1.5
 ANDERSON_DEPTH = 3
+TURNED_BACK = 1.0 / 8.0
 ACTIVE_SET_LIMIT = 60
 FEW_SOLVES = 8
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7

@@ -19,7 +19,8 @@ step in which the finger snaps again and again comes to its end.
 
 Staggered rounds have the same equilibria as the monolithic coupling, but may not come to them: the
 attraction of one round, frozen, can pull a node down the slope of a texture. Where they do not
-settle, the part is solved all at once, and so is the rest of the step.
+settle, the part is solved all at once, and so are the rest of the step and every step of a release:
+a body on its way needs many rounds for each of them.
 """
 
 from __future__ import annotations
@@ -276,7 +277,8 @@ class Stepper:
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
-        if self.coupling == "monolithic" or equilibrium.attraction is None:
+        at_once = self.coupling == "monolithic" or (self.coupling == "staggered" and self._dragged)
+        if at_once or equilibrium.attraction is None:
             return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
             frozen = equilibrium.attraction_at(state, state, target.drive.voltage)
@@ -289,6 +291,11 @@ class Stepper:
         new = equilibrium.step(state, target, start=start)
         self.unsettled += 1
         return new
+
+    @property
+    def _dragged(self) -> bool:
+        """Whether the body is on its way to another equilibrium, held back by drag."""
+        return self.body is not None and self.body.drag_rate > 0.0
 
     def _settled(self, state: State, target: Target) -> State:
         """Rounds of mechanics under the attraction of the round before, until it no longer changes."""

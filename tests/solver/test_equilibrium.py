@@ -185,8 +185,8 @@ def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
         return found
 
     monkeypatch.setattr(condensed.LinearContactStep, "solve", watched)
-    body, display = finger(block(16, 4, sag=0.1), E=0.05), Display(Layer(2e-3, 3.35))
-    for top in (300.0, 400.0):
+    for sag, top in ((0.05, 320.0), (0.2, 300.0)):
+        body, display = finger(block(16, 4, sag=sag), E=0.05), Display(Layer(2e-3, 3.35))
         model = make_model(Scene(body, display, StrongTroxel(), top, [Hover(0.02)]))
         bone = model.bone(0.0, -0.02)
         state = model.equilibrium.rest(bone, 0.0)

@@ -244,6 +244,16 @@ def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails
     assert (stepper.unsettled, solver.rounds) == (2, 1 if fails else 17)
 
 
+def test_a_released_body_goes_its_way_without_rounds():
+    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
+    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    solver = Unsettling(False)
+    stepper = Stepper(solver, "staggered", body=SimpleNamespace(drag_rate=0.5))
+    assert stepper.solve(rest, target).together
+    assert not solver.rounds
+    assert not stepper.unsettled
+
+
 def test_one_round_is_all_there_is_where_one_was_asked_for():
     rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
     target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
