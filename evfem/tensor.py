@@ -123,6 +123,8 @@ def symmetric_power(C: Array, exponent: float) -> Array:
     divided differences (a^e - b^e)/(a - b) of the eigenvalues a, b, which keeps the derivative
     exact for equal eigenvalues (Daleckii and Krein 1965).
     """
+    if len(C) == 2:
+        return _power_in_plane(C, exponent)
     values, vectors = np.linalg.eigh(np.moveaxis(np.real(C), (0, 1), (-2, -1)))
     adjoint = np.swapaxes(vectors, -2, -1)
     power = (vectors * values[..., None, :] ** exponent) @ adjoint
@@ -130,6 +132,33 @@ def symmetric_power(C: Array, exponent: float) -> Array:
         change = adjoint @ np.moveaxis(np.imag(C), (0, 1), (-2, -1)) @ vectors
         power = power + 1j * (vectors @ (_divided_difference(values, exponent) * change) @ adjoint)
     return np.moveaxis(power, (-2, -1), (0, 1))
+
+
+def _power_in_plane(C: Array, e: float) -> Array:
+    """The same in two dimensions, without a solver: C = m 1 + r [[c, s], [s, -c]] has the eigenvalues
+    m + r and m - r, and c and s turn into the eigenbasis and back.
+    """
+
+    def parts(A: Array) -> tuple[Array, Array, Array]:
+        return 0.5 * (A[0, 0] + A[1, 1]), 0.5 * (A[0, 0] - A[1, 1]), A[0, 1]
+
+    def whole(mean: Array, along: Array, across: Array) -> Array:
+        p, q = c * along - s * across, s * along + c * across
+        return np.stack([np.stack([mean + p, q]), np.stack([q, mean - p])])
+
+    m, p, q = parts(np.real(C))
+    r = np.hypot(p, q)
+    turned, scale = r > 0.0, np.where(r > 0.0, r, 1.0)
+    c, s = np.where(turned, p / scale, 1.0), q / scale
+    high, low = m + r, m - r
+    power = whole(0.5 * (high**e + low**e), 0.5 * (high**e - low**e), np.zeros_like(m))
+    if not np.iscomplexobj(C):
+        return power
+    m, p, q = parts(np.imag(C))
+    along, across = c * p + s * q, c * q - s * p
+    first, last = e * high ** (e - 1.0) * (m + along), e * low ** (e - 1.0) * (m - along)
+    by_pair = _divided_difference(np.stack([high, low], axis=-1), e)[..., 0, 1]
+    return power + 1j * whole(0.5 * (first + last), 0.5 * (first - last), by_pair * across)
 
 
 def _divided_difference(values: Array, e: float) -> Array:

@@ -57,9 +57,12 @@ ALIKE                   below this residual iterations with a new tangent each a
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
                         the last ones, have no residual below
 FALLING                 this fraction of those before
+SAME                    residuals that differ by so much less are the same, and iterations that
+LONGEST_CIRCLE          come back to them after at most so many are given up                        slides
 MORE                    so many times the iterations may be used where the residuals' fall        thin
                         promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
+TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
@@ -92,6 +95,8 @@ PATH_FIRST              where the error of the path decides, the first part of a
 PATH_CHANGE             a part is at most so many times as long as the one before where the
                         error of the path decides, or as much shorter; that part times
 PATH_SAFETY             this is tried
+RELEASED                a part of a step, so small and still failing, is the place of the first       snaps
+                        release
 COARSER                 after a release the next one within the same step comes at a part so      texture
                         many times as long
 DRAG_CHANGE             factor by which the rate of drag of a released body falls, and rises        snaps
@@ -137,10 +142,12 @@ WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
-STUCK = 12
+STUCK = 8
 FALLING = 0.9
+SAME, LONGEST_CIRCLE = 0.02, 5
 MORE = 1.5
 ANDERSON_DEPTH = 3
+TURNED_BACK = 1.0 / 8.0
 ACTIVE_SET_LIMIT = 60
 FEW_SOLVES = 8
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
@@ -156,11 +163,12 @@ SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3
 PATH_FIRST, PATH_CHANGE, PATH_SAFETY = 1.0 / 16.0, 4.0, 0.9
+RELEASED = 1.0 / 32.0
 COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 60
 PATIENT = 16
 VERGE = 0.9
-STAGGERED_LIMIT = 200
+STAGGERED_LIMIT = 60
 NAMED = 3

@@ -101,7 +101,8 @@ class Candidates:
         `own` (c,) is the compliance of each node along x. Where friction falls along the way
         faster than the tissue stiffens, a node snaps forward and has no equilibrium at the slope:
         its friction is then left at the present coefficient, and the iterations go the way of the
-        snap.
+        snap. Friction that rises along the way holds, whatever the body alone would do: the own
+        compliance of a squeezed pad, which only its contact holds, is negative.
         """
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
@@ -110,7 +111,7 @@ class Candidates:
         growth = sign * self.friction_slope * self.force[:, 0]
         if self.slip_stiffness is not None:
             growth = growth - (self.status >= FORWARD) * self.slip_stiffness * self.surface.stretch
-        growth = np.where(growth * own < STABLE, growth, 0.0)
+        growth = np.where((growth < 0.0) | (growth * own < STABLE), growth, 0.0)
         return turned + growth[:, None] * axes[:, 1]
 
 

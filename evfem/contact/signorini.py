@@ -62,6 +62,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -262,8 +263,9 @@ def solve_with_attraction(
 
     If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
     linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which goes the right way in small steps; with `snap` the nodes
-    that are being lost close instead.
+    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
+    closed nodes hold it, or where that does not do, of the much softer one without them. With
+    `snap` the nodes that are being lost close instead.
     """
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
         return solve_contact(problem, status)
@@ -279,11 +281,16 @@ def solve_with_attraction(
             continue
         if _feedback(problem, attraction, found.status)[0] < 1.0:
             return found
-    # the closed nodes hold a body whose own compliance the attraction has made negative
-    ways = (np.full(problem.size, OPEN), status)
-    fraction = STABLE / max(STABLE, *(_feedback(problem, attraction, way)[0] for way in ways))
-    scaled = replace(attraction, negative_stiffness=fraction * attraction.negative_stiffness)
-    return replace(solve_contact(replace(problem, attraction=scaled), status), reduced=True)
+    most = STABLE
+    for way in (status, np.full(problem.size, OPEN)):
+        most = max(most, _feedback(problem, attraction, way)[0])
+        scaled = replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
+        weaker = replace(problem, attraction=scaled)
+        with suppress(ContactNotSolved):
+            found = _active_set(weaker, status, ACTIVE_SET_LIMIT)
+            if _feedback(problem, scaled, found.status)[0] < 1.0:
+                return replace(found, reduced=True)
+    return replace(solve_contact(weaker, status), reduced=True)
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> tuple[float, Floats]:

@@ -43,6 +43,7 @@ from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
 from evfem.solver.state import State, StepFailed
+from evfem.solver.stepping import Unbooked
 from evfem.tissue.body import Body
 from evfem.tissue.space import make_space
 
@@ -99,7 +100,7 @@ class CorrectedRun(FastRun):
     def advance(self, request: Request) -> None:
         """Reach a request's target; raises `StepFailed`."""
         self.remembered.correct(self.beside[request.step - 1], self.near[request.step - 1])
-        self.state, _ = self.stepper.follow(self.state, request.path, lambda old, new: None)
+        self.state, _ = self.stepper.follow(self.state, request.path, Unbooked())
         self.time += request.duration
         state, model = self.state, self.model
         contact, pull = model.equilibrium.contact_forces(state).sum(axis=0), state.attraction.sum(axis=0)

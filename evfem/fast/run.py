@@ -92,7 +92,7 @@ class FastRun(Run):
         begin, record = clock.perf_counter(), self.model.equilibrium.record
         iterations = record.iterations
         try:
-            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
+            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
             advice = "; ".join(part for part in (error.reason, error.findings, ADVICE) if part)
             raise NotConverged(request.step, error.residuals, advice, self.result()) from error

@@ -38,6 +38,14 @@ class Ledger:
         for name, work in part.works(begin, self.end).items():
             self.sums[name] += work
 
+    def mark(self) -> tuple[dict[str, float], Books | None]:
+        """Where sums and books stand."""
+        return self.sums.copy(), self.end
+
+    def back(self, mark: tuple[dict[str, float], Books | None]) -> None:
+        """Take back what was booked since `mark`."""
+        self.sums, self.end = mark[0].copy(), mark[1]
+
     def row(self, state: State, step: int, motion_index: int, motion: str, time: float) -> dict[str, Any]:
         """The forces, widths and energies of a state; costs are added by the caller."""
         model, end = self.model, self.end

@@ -309,7 +309,7 @@ class Run:
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
         released = self.stepper.relaxations
         try:
-            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger.accept)
+            self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
             said = advice(self.scene, self.model, error)
             raise NotConverged(request.step, error.residuals, said, self.result()) from error

@@ -31,12 +31,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
-    FALLING,
     GROWTH_GRACE,
     GROWTH_LIMIT,
     MORE,
     SMALLEST_FORCE,
-    STUCK,
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.pad import surface_state
@@ -55,7 +53,7 @@ from evfem.solver.state import (
     State,
     StepFailed,
 )
-from evfem.solver.strategy import Strategy
+from evfem.solver.strategy import Strategy, stuck
 
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
@@ -272,7 +270,7 @@ class Equilibrium(Statics):
                 return self._settled(old, self.body.accepted(old, state), target)
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
-            if self._stuck(history):
+            if stuck(history):
                 break
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
@@ -293,13 +291,6 @@ class Equilibrium(Statics):
             return False
         rate = (history[-1] / history[-1 - window]) ** (1.0 / window)
         return history[-1] * rate ** (most - len(history)) < self.tolerance
-
-    @staticmethod
-    def _stuck(history: list[float]) -> bool:
-        """Whether the last residuals (i,) are hardly below those before: iterations that go to and
-        fro, of which more are in vain where a shorter part ends soon.
-        """
-        return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])
 
     def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)

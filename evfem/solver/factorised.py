@@ -15,7 +15,9 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`)
+    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless the
+        attraction's negative stiffness had to be scaled down; a part of the way where nodes have opened
+        and closed by turns
 
 Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
 """
@@ -46,7 +48,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import ContactNotSolved
 from evfem.contact.stability import Verge, verge
-from evfem.solver.anderson import Anderson
+from evfem.solver.anderson import Anderson, Turning
 from evfem.solver.control import DrivenStep, Target, VoltageProblem
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
@@ -98,6 +100,7 @@ class FactorisedBody:
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
+        self._turning = Turning()
         self._scaled_down = 0
 
     # -- a step begins
@@ -116,6 +119,7 @@ class FactorisedBody:
         self._anderson.reset()
         self._renewed = False
         self._scaled_down = 0
+        self._turning.reset()
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
@@ -207,6 +211,11 @@ class FactorisedBody:
             self._anderson.reset()
             after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
         after = self._grown(old, state, target, balance, after)
+        if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
+            self._anderson.reset()
+            return after
+        if target.reached(state.bone):
+            after = self._turning.next_iterate(state, after, to_and_fro(residuals))
         mixed = self._anderson.next_iterate(state, after)
         # what is given is kept to the last digit
         bone = after.bone.copy()

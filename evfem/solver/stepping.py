@@ -5,8 +5,9 @@ Algorithm (`Stepper.follow`)::
     substep <- the one that worked last
     repeat until the end of the path
         solve one equilibrium at `done + substep`
-        if it failed: halve the substep; at the strategy's smallest release the body, which comes to rest
-            at another equilibrium (`evfem.solver.relaxation`), or give up where it does not
+        if it failed: halve the substep; below `RELEASED` of a step, release the body, which comes to
+            rest at another equilibrium (`evfem.solver.relaxation`); where it does not, halve on, and
+            give up at the strategy's smallest
         else: accept; if it took few iterations, let the next substep grow
 
 Where the error of the path is limited, a part is solved as two halves and accepted where one whole
@@ -18,17 +19,19 @@ step in which the finger snaps again and again comes to its end.
 
 Staggered rounds have the same equilibria as the monolithic coupling, but may not come to them: the
 attraction of one round, frozen, can pull a node down the slope of a texture. Where they do not
-settle, the part is solved all at once.
+settle, the part is solved all at once, and so are the rest of the step and every step of a release:
+a body on its way needs many rounds for each of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any, Protocol
 
 import numpy as np
 
-from evfem.common.constants import COARSER, PATH_FIRST, SMALLEST_FORCE, STAGGERED_LIMIT
+from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.solver.control import GivenVoltage, KeptCharge, Target
@@ -36,6 +39,7 @@ from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
+from evfem.solver.strategy import stuck
 from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
 
@@ -45,12 +49,56 @@ Path = Callable[[float, float], Target]
 Parts = list[tuple[Target, State]]
 
 
+class Accounts(Protocol):
+    """Who keeps account of the parts that were accepted."""
+
+    def accept(self, old: State, new: State) -> None:
+        """A part was accepted, from `old` to `new`."""
+
+    def mark(self) -> Any:
+        """Where the accounts stand."""
+
+    def back(self, mark: Any) -> None:
+        """What was accepted since `mark` led nowhere."""
+
+
+class Unbooked:
+    """Accounts that keep nothing."""
+
+    def accept(self, old: State, new: State) -> None:
+        """A part was accepted."""
+
+    def mark(self) -> None:
+        """Where the accounts stand: nowhere."""
+
+    def back(self, mark: None) -> None:
+        """Nothing was kept."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of a step, from `begin` to `end` (0 to 1), and the target there."""
+
+    begin: float
+    end: float
+    target: Target
+
+
+@dataclass
+class Release:
+    """Below which part of the present step the body is released, and the part that worked last."""
+
+    least: float
+    trusted: float
+
+
 @dataclass
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
     that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `unsettled` counts the parts whose staggered rounds did not settle. Where the error
-    of the path of a part is limited it is at most `allowed`, and `path_error` the largest accepted.
+    step fails. `unsettled` counts the parts that were solved all at once because staggered rounds
+    did not settle, `together` says that those of this step do not. Where the error of the path of a
+    part is limited it is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: StepSolver
@@ -60,43 +108,42 @@ class Stepper:
     body: Body | None = None
     relaxations: int = 0
     unsettled: int = 0
+    together: bool = False
     allowed: float | None = None
     path_error: float = 0.0
 
     def __post_init__(self) -> None:
+        self._release = Release(RELEASED, self.substep)
         if self.allowed is not None:
             self.substep = PATH_FIRST
 
-    def follow(self, state: State, path: Path, accept: Callable[[State, State], None]) -> tuple[State, int]:
-        """From `state` to the end of `path`; `accept(old, new)` sees every converged substep.
-        Returns the end and the number of substeps.
+    def follow(self, state: State, path: Path, accounts: Accounts) -> tuple[State, int]:
+        """From `state` to the end of `path`; the accounts see every converged substep. Returns the end
+        and the number of substeps.
 
         Raises `StepFailed` when the smallest substep fails; what was accepted before stays
         accepted.
         """
         done, substeps, strategy = 0.0, 0, self.equilibrium.strategy
-        least, trusted = strategy.smallest_part, self.substep
+        self.together, self._release = False, Release(max(RELEASED, strategy.smallest_part), self.substep)
         while done < 1.0:
             fraction = 1.0 if self.substep >= 1.0 - done - 1e-12 else done + self.substep
             before = self.equilibrium.record.iterations
             try:
                 parts, error = self._part(state, path, done, fraction)
             except StepFailed as failed:
-                self.cuts += 1
-                self.substep = 0.5 * (fraction - done)
-                if self.substep >= least:
-                    continue
-                state = self._released(state, path(done, fraction), accept, failed)
-                done, substeps = fraction, substeps + 1
-                self.substep, least = min(1.0, max(trusted, least)), COARSER * least
+                part = Part(done, fraction, path(done, fraction))
+                rest = self._shortened(state, part, accounts, failed)
+                if rest is not None:
+                    state, done, substeps = rest, fraction, substeps + 1
                 continue
             if not self._keeps(error, fraction - done):
                 continue
-            trusted = self.substep
+            self._release.trusted = self.substep
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
-                accept(state, new)
+                accounts.accept(state, new)
                 state, substeps = new, substeps + 1
             if self.allowed is not None:
                 self._set_length(error, fraction - done)
@@ -104,6 +151,26 @@ class Stepper:
                 self.substep = min(1.0, strategy.growth * self.substep)
             done = fraction
         return state, substeps
+
+    def _shortened(self, state: State, part: Part, accounts: Accounts, failed: StepFailed) -> State | None:
+        """Halve the part that failed, or release the body at one that is short enough: its rest is
+        returned, and the part that worked before is tried next. Raises `failed` at the smallest part
+        of what was left of the step.
+        """
+        release, least = self._release, self.equilibrium.strategy.smallest_part
+        self.cuts += 1
+        self.substep = half = 0.5 * (part.end - part.begin)
+        if half >= release.least:
+            return None
+        rest = self._released(state, part.target, accounts, failed)
+        if rest is None:
+            if half < least * (1.0 - part.begin):
+                raise failed
+            self.substep, release.least = half, least * (1.0 - part.begin)
+            return None
+        self.substep = min(1.0, max(release.trusted, release.least))
+        release.least *= COARSER
+        return rest
 
     def _keeps(self, error: float, part: float) -> bool:
         """Whether a part with this error of its path is accepted; if not, the next one is shorter."""
@@ -144,28 +211,27 @@ class Stepper:
         if self.body is not None and self.body.dynamics is not None:
             self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
-    def _released(
-        self, state: State, target: Target, accept: Callable[[State, State], None], failed: StepFailed
-    ) -> State:
-        """The equilibrium to which the body snaps from `state`; raises `failed` where there is
-        none.
+    def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
+        """The equilibrium to which the body snaps from `state`, None where it comes to none; raises
+        `Folded` or `LiftedOff` where there can be none.
         """
         self.substep, failed.last = 1.0, (state, target)
         if self.body is None or not self.equilibrium.strategy.relaxation:
-            raise failed
+            return None
         relaxation = Relaxation(self.body, self.solve)
-        if isinstance(failed, Folded) or not relaxation.applies(target):
+        if isinstance(failed, Folded):
             raise failed
-        failed.released = True
+        if not relaxation.applies(target):
+            return None
+        failed.released, mark = True, accounts.mark()
         try:
-            rest = relaxation.follow(state, target, accept)
-        except Folded:
-            raise
-        except LiftedOff as lifted:
-            lifted.last = failed.last
-            raise
-        except StepFailed:
-            raise failed from None
+            rest = relaxation.follow(state, target, accounts.accept)
+        except StepFailed as error:
+            accounts.back(mark)
+            if isinstance(error, Folded | LiftedOff):
+                error.last = failed.last
+                raise
+            return None
         self.relaxations += 1
         return rest
 
@@ -211,25 +277,35 @@ class Stepper:
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
         equilibrium = self.equilibrium
-        if self.coupling == "monolithic" or equilibrium.attraction is None:
+        at_once = self.coupling == "monolithic" or (self.coupling == "staggered" and self._dragged)
+        if at_once or equilibrium.attraction is None:
             return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
             frozen = equilibrium.attraction_at(state, state, target.drive.voltage)
             return equilibrium.step(state, target, frozen)
         try:
-            return self._settled(state, target)
+            if not self.together:
+                return self._settled(state, target)
         except StepFailed:
-            new = equilibrium.step(state, target)
-            self.unsettled += 1
-            return new
+            self.together = True
+        new = equilibrium.step(state, target, start=start)
+        self.unsettled += 1
+        return new
+
+    @property
+    def _dragged(self) -> bool:
+        """Whether the body is on its way to another equilibrium, held back by drag."""
+        return self.body is not None and self.body.drag_rate > 0.0
 
     def _settled(self, state: State, target: Target) -> State:
         """Rounds of mechanics under the attraction of the round before, until it no longer changes."""
         equilibrium, new = self.equilibrium, state
-        for done in range(STAGGERED_LIMIT):
+        changes: list[float] = []
+        while len(changes) < STAGGERED_LIMIT and not stuck(changes):
             frozen = equilibrium.attraction_at(state, new, target.drive.voltage)
-            change = np.abs(frozen - new.attraction).max()
-            if done and change <= equilibrium.tolerance * max(np.abs(new.reaction).max(), SMALLEST_FORCE):
+            changes.append(float(np.abs(frozen - new.attraction).max()))
+            done, allowed = len(changes) > 1, max(np.abs(new.reaction).max(), SMALLEST_FORCE)
+            if done and changes[-1] <= equilibrium.tolerance * allowed:
                 return new
             new = equilibrium.step(state, target, frozen, start=new if done else None)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

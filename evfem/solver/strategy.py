@@ -4,19 +4,21 @@ A step is one equilibrium from one accepted state to the next. It is tried whole
 fails, it is cut into parts: half as long after each failure, longer again after easy ones. What
 makes the iterations of one part hold is not a choice: contact is solved exactly in each of them,
 cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
-and under a force the bone moves by limited strides. Where the smallest part fails too, stability
-is lost: the finger is released and comes to rest at another equilibrium, if there is one
-(`evfem.solver.relaxation`). What happens on the way needs physics instead: `dynamics` "viscous" or
-"inertial" with a speed.
+and under a force the bone moves by limited strides. Where short parts fail too, stability is lost:
+the finger is released and comes to rest at another equilibrium (`evfem.solver.relaxation`); if it
+does not, still shorter parts are tried. What happens on the way needs physics instead: `dynamics`
+"viscous" or "inertial" with a speed.
 
 With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
+from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -31,11 +33,11 @@ class Strategy:
 
     `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
     the factorisation when more iterations than this would be left with the old one;
-    `smallest_part`: of a requested step, before it counts as not converged; `easy`: a part with
-    so few iterations lets the next one grow by the factor `growth`; `reach`: a part begins at
-    most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
-    where even the smallest part fails, and takes no time, the finger is released and comes to rest
-    at another equilibrium; `steps`: "given", each requested step is one part unless that fails,
+    `smallest_part`: of what is left of a requested step, before it counts as not converged;
+    `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`: a
+    part begins at most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
+    where short parts fail, and take no time, the finger is released and comes to rest at another
+    equilibrium; `steps`: "given", each requested step is one part unless that fails,
     or "auto", where friction or time remember the way each is cut into parts whose error of the
     path is at most `path_error` of the force.
 
@@ -58,3 +60,28 @@ class Strategy:
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+
+def stuck(history: Sequence[float]) -> bool:
+    """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
+    ends soon: they come round in a circle, or the last ones are hardly below those before.
+
+    >>> stuck([1e-3, 2e-4] * 4), stuck([0.5**i for i in range(30)])
+    (False, False)
+    >>> stuck([1e-3, 2e-4] * 5), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
+    (True, True)
+    """
+    if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
+        return True
+    return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])
+
+
+def _circle(history: Sequence[float], period: int) -> bool:
+    """Whether the last residuals (i,), at least `STUCK`, are those one period before; a bone that is
+    still on its way, 1 or more, is none.
+    """
+    count = max(2 * period, STUCK)
+    if len(history) < count + period:
+        return False
+    last, before = history[-count:], history[-count - period : -period]
+    return all(b < 1.0 and abs(a - b) <= SAME * a for a, b in zip(last, before, strict=True))

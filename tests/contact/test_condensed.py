@@ -157,6 +157,19 @@ def test_friction_that_grows_along_the_way_is_felt():
     check(step, *matrices)
 
 
+@pytest.mark.parametrize("own", [3.0, -3.0])
+def test_friction_that_rises_with_the_slip_holds_whatever_the_own_compliance(own):
+    """That of a squeezed pad, which only its contact holds, is negative; what falls is left out where
+    the tissue does not hold it.
+    """
+    step, *_ = step_of(np.random.default_rng(0), 0.0, 0.0)
+    rising = replace(step.candidates, status=np.full(K, FORWARD), slip_stiffness=np.full(K, 0.5))
+    np.testing.assert_allclose(rising.follower_rate(np.full(K, own))[:, 0], -0.5, rtol=1e-14)
+    falling = replace(rising, slip_stiffness=np.full(K, -0.5))
+    left = 0.0 if own > 0.0 else 0.5
+    np.testing.assert_allclose(falling.follower_rate(np.full(K, own))[:, 0], left, rtol=1e-14)
+
+
 @pytest.mark.parametrize("unknowns", [(), ("force",)])
 def test_an_interface_that_yields_adds_its_own_way(unknowns):
     compliance = np.random.default_rng(4).uniform(0.01, 0.1, (K, 2))

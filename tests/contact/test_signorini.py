@@ -375,6 +375,21 @@ def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_a
     np.testing.assert_allclose(found.state[:2], 1.0 + 0.02 / (1.0 - 0.9), rtol=1e-12)
 
 
+def test_an_attraction_is_scaled_to_what_the_closed_nodes_hold_where_they_stay():
+    """Node 0, pressed, holds its neighbour at 100 x 0.011 = 1.1; without it, 100 x 1.011 = 101 return.
+    Scaled to 0.9 of the first the neighbour moves ten times its free way of 0.02, of the other 1.01
+    times.
+    """
+    compliance = np.zeros((4, 4))
+    compliance[:2, :2] = [[1.0, 1.0], [1.0, 1.011]]
+    problem = ContactProblem(np.array([-50.0, 1.02 - 50.0, 0.0, 0.0]), compliance, np.zeros(2))
+    pull = AttractionStiffness(np.array([0.0, 100.0]), np.ones(2), np.zeros(2))
+    found = solve_with_attraction(problem, pull, np.array([FORWARD, OPEN]))
+    assert found.reduced
+    assert found.status.tolist() == [FORWARD, OPEN]
+    assert found.state[1] == pytest.approx(1.0 + 0.02 / (1.0 - 0.9), rel=1e-9)
+
+
 def rough_node(gap, gain, loss=0.0, closing=0.0):
     """A node of compliance 0.1 mm per N/mm whose attraction grows with its contact force."""
     problem = ContactProblem(np.array([gap, 0.02]), 0.1 * np.eye(2), np.array([0.5]))

@@ -20,9 +20,8 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.solver.control import Force, GivenVoltage, Target
-from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.state import StepFailed
-from evfem.solver.strategy import Strategy
+from evfem.solver.strategy import Strategy, stuck
 
 ROUND = finger(block(8, 3, sag=0.4))
 GENTLE = Sinusoid(friction=0.3, terms=[[0.02, 2.0, 0.4]], insulator=INSULATOR)
@@ -186,8 +185,8 @@ def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
         return found
 
     monkeypatch.setattr(condensed.LinearContactStep, "solve", watched)
-    body, display = finger(block(16, 4, sag=0.1), E=0.05), Display(Layer(2e-3, 3.35))
-    for top in (300.0, 400.0):
+    for sag, top in ((0.05, 320.0), (0.2, 300.0)):
+        body, display = finger(block(16, 4, sag=sag), E=0.05), Display(Layer(2e-3, 3.35))
         model = make_model(Scene(body, display, StrongTroxel(), top, [Hover(0.02)]))
         bone = model.bone(0.0, -0.02)
         state = model.equilibrium.rest(bone, 0.0)
@@ -393,16 +392,22 @@ def test_residuals_of_exactly_zero_are_numbers_like_others(history):
 
 
 def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
-    stuck = Equilibrium._stuck
-
     def given_up(one, other):
         return next(n for n in range(1, 41) if stuck([1.0, *[one, other] * 20][:n]))
 
-    assert given_up(0.3, 0.01) == 25
-    crawling = [0.09 * 0.999**i for i in range(40)]
-    assert next(n for n in range(1, 41) if stuck(crawling[:n])) == 25
+    assert given_up(0.3, 0.01) == 11
+    crawling = [0.09 * 0.97**i for i in range(40)]
+    assert not any(stuck(crawling[:n]) for n in range(1, 41))
+    wandering = [0.5, *(0.1 + 0.003 * (i * i % 17) for i in range(40))]
+    assert next(n for n in range(1, 41) if stuck(wandering[:n])) == 17
     assert not any(stuck([0.95**i for i in range(n)]) for n in range(1, 60))
-    assert not any(stuck([0.1] * 20 + [0.09**i for i in range(n)]) for n in range(1, 20))
+    assert not any(stuck([0.1] * 7 + [0.09**i for i in range(n)]) for n in range(1, 20))
+    # a bone that goes its way in strides is not where it should be
+    assert not any(stuck([1.0] * n) for n in range(1, 17))
+    circle = [3e-3, 1e-4, 4e-4, 2e-4, 9e-4]
+    assert not stuck(circle * 2 + circle[:4])
+    assert stuck(circle * 3)
+    assert not stuck([value * 0.9**i for i, value in enumerate(circle * 3)])
 
 
 def test_a_contact_problem_known_to_have_no_solution_is_not_solved_again(monkeypatch):

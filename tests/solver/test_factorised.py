@@ -9,14 +9,17 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
+from evfem.common.constants import TURNED_BACK
+from evfem.contact.signorini import OPEN
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Hover, Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
+from evfem.solver.anderson import Anderson
 from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
-from evfem.solver.factorised import to_and_fro
+from evfem.solver.factorised import FactorisedBody, to_and_fro
 from evfem.solver.state import StepFailed
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -145,3 +148,45 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     ]
     assert results[1].newton_iterations[0] <= 3
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
+
+
+def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
+    """It is a part of the way to where it leads, and its residual no step of the map that is mixed."""
+    mix, solve, scaled, mixed = Anderson.next_iterate, FactorisedBody._solve, [], []
+
+    def solved(self, step):
+        found = solve(self, step)
+        scaled.append(found.reduced)
+        return found
+
+    def next_iterate(self, before, after):
+        mixed.append(scaled[-1])
+        return mix(self, before, after)
+
+    monkeypatch.setattr(FactorisedBody, "_solve", solved)
+    monkeypatch.setattr(Anderson, "next_iterate", next_iterate)
+    simulate(Scene(ROUND, Display(), Kaczmarek(), 6000.0, [Hover(gap=0.005)]))
+    assert any(scaled)
+    assert mixed
+    assert not any(mixed)
+
+
+def test_iterations_in_which_a_node_opens_and_closes_by_turns_go_a_part_of_their_way(pressed, monkeypatch):
+    body, state, target = pressed
+    node = int(np.flatnonzero(state.touching)[0])
+    status = state.status.copy()
+    status[node] = OPEN
+    closed, opened = state, replace(state, status=status, u=state.u + 1e-3)
+    monkeypatch.setattr(
+        body, "_linear_step", lambda old, now, *_: closed if now.status[node] == OPEN else opened
+    )
+    monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3] * 3)
+    balance = body.balance(state, state.attraction, target)[1]
+    body.begin(state, target, False, state)
+    after = state
+    for _ in range(2):
+        after = body.advance(state, after, target, balance)
+    assert after is not closed
+    np.testing.assert_allclose(after.u - state.u, (1.0 - TURNED_BACK) * 1e-3, rtol=1e-9)
+    assert after.status[node] == OPEN
+    assert after.voltage == state.voltage

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from tools.builders import SKIN, finger
 from tools.meshes import between, block, held
 
+from evfem.common.constants import RELEASED
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
@@ -132,8 +133,11 @@ def test_a_released_tip_comes_to_rest_in_the_next_trough(point):
     np.testing.assert_allclose(result.stored_energy[-2:], point.energy(tips, bones), rtol=1e-6)
     assert result.snap_dissipation[-2] == 0.0
     freed = point.energy(point.snap(), lost) - point.energy(point.beyond(lost), lost)
-    # the release begins up to 1/1024 of the last step beyond the loss
-    assert result.snap_dissipation[-1] == pytest.approx(freed, rel=1e-3)
+    # the release begins up to 1/32 of the last step beyond the loss
+    later = lost + 2.0 * AHEAD * RELEASED
+    most = point.energy(point.snap(), later) - point.energy(point.beyond(later), later)
+    assert (1.0 - 1e-3) * freed <= result.snap_dissipation[-1] <= (1.0 + 1e-3) * most
+    assert most < 1.1 * freed
     assert left_over(result).max() < 1e-6
     assert result.summary()["relaxations"] == result.provenance["solver"]["relaxations"] == 1
 

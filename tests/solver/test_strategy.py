@@ -8,14 +8,13 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.common.constants import STAGGERED_LIMIT
 from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
 from evfem.solver.state import Record, StepFailed
-from evfem.solver.stepping import Stepper
+from evfem.solver.stepping import Stepper, Unbooked
 from evfem.solver.strategy import Strategy
 
 WRONG = {
@@ -78,7 +77,7 @@ class Steps:
 
 def ways(strategy, longest, takes=5):
     steps = Steps(strategy, longest, takes)
-    Stepper(steps).follow(0.0, lambda _, share: share, lambda old, new: None)
+    Stepper(steps).follow(0.0, lambda _, share: share, Unbooked())
     assert sum(steps.ways) == pytest.approx(1.0, rel=1e-14)
     return steps.ways
 
@@ -110,8 +109,8 @@ class Snapping(Steps):
 
 
 def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
-    """Nothing is ever found without a release: the first comes at the smallest part, each further
-    one at a part four times as long, up to the whole rest.
+    """Nothing is ever found without a release: the first comes at 1/32 of the step, each further one
+    at a part four times as long, up to the whole rest.
     """
     ends = []
 
@@ -127,18 +126,58 @@ def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
             return target
 
     monkeypatch.setattr("evfem.solver.stepping.Relaxation", Released)
-    stepper = Stepper(Snapping(Strategy(smallest_part=1 / 64), 1.0), body=object(), substep=0.5)
-    state, substeps = stepper.follow(0.0, lambda _, share: share, lambda old, new: None)
+    stepper = Stepper(Snapping(Strategy(), 1.0), body=object(), substep=0.5)
+    state, substeps = stepper.follow(0.0, lambda _, share: share, Unbooked())
     parts = np.diff([0.0, *ends])
     assert state == ends[-1] == 1.0
     assert substeps == stepper.relaxations == len(parts)
-    assert parts[0] == 1 / 64
-    assert (parts[:-1] < 2 * 4.0 ** np.arange(len(parts) - 1) / 64).all()
-    assert len(parts) == 5
+    assert parts[0] == 1 / 32
+    assert (parts[:-1] < 2 * 4.0 ** np.arange(len(parts) - 1) / 32).all()
+    assert len(parts) == 4
     assert stepper.substep == 1.0
     held = Stepper(Snapping(Strategy(relaxation=False), 1.0), body=object())
     with pytest.raises(StepFailed):
-        held.follow(0.0, lambda _, share: share, lambda old, new: None)
+        held.follow(0.0, lambda _, share: share, Unbooked())
+
+
+def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tried(monkeypatch):
+    """Parts of 1/100 work, a release at 1/32 books two parts and fails: they are not kept."""
+
+    class Restless:
+        def __init__(self, body, solve):
+            pass
+
+        def applies(self, target):
+            return True
+
+        def follow(self, state, target, accept):
+            accept(state, target)
+            accept(state, target)
+            raise StepFailed("no rest", [])
+
+    class Kept:
+        def __init__(self):
+            self.parts = []
+
+        def accept(self, old, new):
+            self.parts.append((old, new))
+
+        def mark(self):
+            return len(self.parts)
+
+        def back(self, mark):
+            del self.parts[mark:]
+
+    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
+    kept, stepper = Kept(), Stepper(Steps(Strategy(), 1 / 100), body=object())
+    state, substeps = stepper.follow(0.0, lambda _, share: share, kept)
+    assert state == 1.0
+    assert substeps == len(kept.parts)
+    assert [old for old, _ in kept.parts[1:]] == [new for _, new in kept.parts[:-1]]
+    assert stepper.relaxations == 0
+    none = Stepper(Steps(Strategy(), 1 / 5000), body=object())
+    with pytest.raises(StepFailed):
+        none.follow(0.0, lambda _, share: share, Kept())
 
 
 def work(*motion, body=None, friction=0.3, **numbers):
@@ -199,7 +238,20 @@ def test_a_part_whose_staggered_rounds_do_not_settle_is_solved_all_at_once(fails
     stepper = Stepper(solver, "staggered")
     assert stepper.solve(rest, target).together
     assert stepper.unsettled == 1
-    assert solver.rounds == (1 if fails else STAGGERED_LIMIT)
+    assert solver.rounds == (1 if fails else 17)
+    # the rest of the step is not asked again
+    assert stepper.solve(rest, target).together
+    assert (stepper.unsettled, solver.rounds) == (2, 1 if fails else 17)
+
+
+def test_a_released_body_goes_its_way_without_rounds():
+    rest = SimpleNamespace(attraction=np.zeros(1), reaction=np.ones(1))
+    target = SimpleNamespace(drive=SimpleNamespace(voltage=100.0))
+    solver = Unsettling(False)
+    stepper = Stepper(solver, "staggered", body=SimpleNamespace(drag_rate=0.5))
+    assert stepper.solve(rest, target).together
+    assert not solver.rounds
+    assert not stepper.unsettled
 
 
 def test_one_round_is_all_there_is_where_one_was_asked_for():
@@ -227,7 +279,9 @@ def decayed(allowed):
     stepper = Stepper(steps, allowed=allowed)
     start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
     path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
-    new, count = stepper.follow(start, path, lambda old, new: ends.append(float(new.reaction[0])))
+    kept = Unbooked()
+    kept.accept = lambda old, new: ends.append(float(new.reaction[0]))
+    new, count = stepper.follow(start, path, kept)
     assert count == len(ends) - 1
     whole = [way for way, checked in steps.ways if checked]
     return new.reaction[0] / np.exp(-1.0) - 1.0, whole, stepper
