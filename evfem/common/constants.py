@@ -84,6 +84,8 @@ TURNED                  a bone that moved less than this fraction of its next wa
                         along it
 HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
                         mm: far above rounding, far below any mesh
+NEAR                    a slip that has changed by less than this fraction of it in one iteration  rates
+                        is near the end
 SHORT_RAMP              ramps of friction shorter than this fraction of a node distance are       jumps
                         jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps
@@ -159,6 +161,7 @@ ROUNDING = 1e-12
 UNHELD = 1e-10
 TURNED = 1e-9
 HAIR = 1e-9
+NEAR = 0.3
 SHORT_RAMP = 0.5
 CHANGES = 3
 SHORTEST_LENGTH = 1e-3

@@ -110,7 +110,7 @@ class Candidates:
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
         growth = sign * self.friction_slope * self.force[:, 0]
         if self.slip_stiffness is not None:
-            growth = growth - (self.status >= FORWARD) * self.slip_stiffness * self.surface.stretch
+            growth = growth - self.slip_stiffness * self.surface.stretch
         growth = np.where((growth < 0.0) | (growth * own < STABLE), growth, 0.0)
         return turned + growth[:, None] * axes[:, 1]
 

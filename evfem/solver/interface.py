@@ -15,7 +15,15 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
+from evfem.common.constants import (
+    CHANGES,
+    HAIR,
+    NEAR,
+    NEIGHBOURS,
+    SHORT_RAMP,
+    SHORTEST_LENGTH,
+    SMALLEST_FORCE,
+)
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
@@ -86,18 +94,33 @@ class Returned:
 
     Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
     a node at rest which the friction of rest does not: the iterations would let it slip and stick by
-    turns. Such a node slips along the chord of the law from rest, which says the same of rest as the
-    law. For a law that is concave in the speed its iterations contract wherever the tissue is stable.
+    turns. Such a node slips along the steepest of the chord of the law from rest, which says the same
+    of rest as the law, the tangent and the slope that it had last; where it sticks, friction rises
+    with its slip as it did last. So it comes to its speed, or to rest, from one side wherever the
+    tissue is stable, also where the law has a kink; once near, along the tangent.
     """
 
     def __init__(self, size: int) -> None:
         self.nodes = np.zeros(size, dtype=bool)
         self._slipped = np.zeros(size, dtype=bool)
+        self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
 
     def watch(self, c: Ints, status: Ints) -> None:
         """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
         self.nodes[c] |= self._slipped[c] & (status == STICK)
         self._slipped[c] |= status >= FORWARD
+
+    def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
+        """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an
+        iterate with slips (k,), 0 where they stick.
+        """
+        near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
+        steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
+        slope = np.where(self.nodes[c] & ~near, steepest, tangent)
+        slips = slip != 0.0
+        self._slip[c] = slip
+        self._slope[c] = np.where(slips & (slope > 0.0), slope, self._slope[c])
+        return np.where(slips, slope, np.where(self.nodes[c], self._slope[c], 0.0))
 
 
 def steps_of_friction(surface: Any, short: float) -> Floats:
@@ -214,7 +237,8 @@ class Interface:
         moving = self._slipping(old, state, c, known.friction, slip)
         found = moving.linearised(law)
         self._returned.watch(c, known.status)
-        by_speed = np.where(self._returned.nodes[c], moving.chord(law), found.by_speed)
+        by_speed = self._returned.slopes(c, slip, found.by_speed, moving.chord(law))
+        by_speed = np.where(known.status == OPEN, 0.0, by_speed)
         by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         yielding = np.where(slips, np.maximum(by_slip, 0.0) * give, 0.0)
         series = 1.0 / (1.0 + yielding)

@@ -1,5 +1,7 @@
 """Laws of friction: their formulas, what the active set sees of them, and a slab that obeys them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.builders import benchmark_finger, finger
@@ -185,6 +187,34 @@ def test_a_node_that_sticks_again_slips_along_the_chord_from_rest():
     returned.watch(np.array([0, 1, 3]), np.array([STICK, FORWARD, BACKWARD]))
     returned.watch(np.array([0, 1, 3]), np.array([FORWARD, STICK, OPEN]))
     assert returned.nodes.tolist() == [False, True, False, False]
+
+
+def test_the_slope_of_friction_of_a_node_that_sticks_again_is_the_steepest_until_it_is_near():
+    """Node 0 has never stuck; node 1 has: chord, tangent and its last slope, and that alone at rest."""
+    returned, both = Returned(2), np.array([0, 1])
+    returned.watch(both, np.array([FORWARD, FORWARD]))
+    returned.watch(both, np.array([FORWARD, STICK]))
+
+    def slopes(slip, tangent, chord):
+        return returned.slopes(both, np.full(2, slip), np.full(2, tangent), np.full(2, chord)).tolist()
+
+    assert slopes(0.0, 9.0, 9.0) == [0.0, 0.0]
+    assert slopes(1.0, 2.0, 5.0) == [2.0, 5.0]
+    assert slopes(0.0, 9.0, 9.0) == [0.0, 5.0]
+    assert slopes(0.5, 3.0, 1.0) == [3.0, 5.0]
+    assert slopes(1.0, 7.0, 6.0) == [7.0, 7.0]
+    assert slopes(0.9, 1.0, 6.0) == [1.0, 1.0]
+
+
+def test_friction_around_the_kink_of_its_law_is_found_without_many_cuts():
+    """A pad turned round, whose nodes slip around the slowest speed of the law, where its slope jumps."""
+    fast = ev.Slide(1.0, steps=2, speed=96.0, hold="force")
+    motion = [ev.Press(force=0.08, steps=1), fast, replace(fast, distance=-0.15, speed=105.0)]
+    law = ev.RateFriction(speed=4.25651, ratio=1.17422, exponent=0.166983)
+    pad = ev.FingerPad(resolution="coarse", ridges=False)
+    result = ev.simulate(ev.Scene(pad, ev.Flat(friction=0.6), motion=motion, friction_law=law))
+    assert result.substeps.max() <= 2
+    assert result.newton_iterations.max() <= 40
 
 
 def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():

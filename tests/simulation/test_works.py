@@ -21,6 +21,7 @@ from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.simulation.works import Part
+from evfem.solver.control import GivenVoltage, Indentation, Target
 from evfem.tissue.laws import LinearElastic
 
 ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)
@@ -233,3 +234,22 @@ def test_only_a_way_through_a_thin_layer_is_taken_at_more_than_eight_places(thic
     law.asked = 0
     Part(model, rest, fallen).electrostatic()
     assert law.asked == places
+
+
+def test_what_the_way_of_the_loads_loses_in_a_release_is_no_energy_set_free():
+    """A round block under drag whose bone moves: what L lacks on the way of contact is of the way, and
+    drag alone dissipates.
+    """
+    model = make_model(scene(Display(friction=0.0)))
+    solver, body = model.equilibrium, model.body
+    start = solver.rest(model.bone(0.0, 0.0), 0.0)
+    old = solver.step(start, Target(0.0, Indentation(-0.2), GivenVoltage(0.0)))
+    for height in (-0.4, -0.05):
+        body.release(old.u, 0.5)
+        new = solver.step(old, Target(0.0, Indentation(height), GivenVoltage(0.0)))
+        before, after = Part(model, old, old).end(), Part(model, old, new).end()
+        works = Part(model, old, new).works(before, after)
+        drag = body.drag_dissipation(new.u)
+        assert drag > 0.0
+        assert works["snap_dissipation"] == pytest.approx(drag, rel=1e-12)
+        assert works["integrator_dissipation"] < 0.0
