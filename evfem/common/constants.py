@@ -84,8 +84,8 @@ TURNED                  a bone that moved less than this fraction of its next wa
                         along it
 HAIR                    how far inside the rougher side a node is pinned to a jump of friction,   jumps
                         mm: far above rounding, far below any mesh
-NEAR                    a slip that has changed by less than this fraction of it in one iteration  rates
-                        is near the end
+NEAR                    a slip that has changed by less than this fraction of it in one           rates
+                        iteration is near the end
 SHORT_RAMP              ramps of friction shorter than this fraction of a node distance are       jumps
                         jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps

@@ -49,8 +49,9 @@ parts, and only say which of two columns has L.
 Where no equilibrium is near, the body is released and comes to rest at another one
 (`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
 :math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
-:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. An L < 0, which nothing can set
-free, is of the way here too: the first of these steps moves the loads.
+:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. If
+their sum is negative, as it can be in the first of these steps, which moves the loads, it is of the
+way and ``integrator_dissipation``.
 
 Where the voltage is resolved in time (`evfem.contact.charging`) the pad first moves with the charges
 and the voltage that it had, which is the way of :math:`W_e`, and then charge flows:
@@ -207,8 +208,8 @@ class Part:
             given, viscous, lost = given + more, viscous + damped, lost + more - damped
         drag = body.drag_dissipation(new.u)
         lost -= drag
-        snap = lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
-        snapped = (0.0, drag + lost) if snap else (lost, drag)
+        snap = drag + lost > 0.0 and (body.drag_rate > 0.0 or self._snaps(begin.forces, end.forces, lost))
+        snapped = (0.0, drag + lost) if snap else (drag + lost, 0.0)
         flow, stretched = Flow(0.0, 0.0), 0.0
         if tells_source(self.model):
             flow, stretched = self._flow(), self._stretching()

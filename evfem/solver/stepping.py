@@ -86,10 +86,14 @@ class Part:
 
 @dataclass
 class Release:
-    """Below which part of the present step the body is released, and the part that worked last."""
+    """Below which part of the present step the body is released, and the part that worked last;
+    whether a part from the present state failed because the body gives way the more, the more it is
+    loaded: shorter ones may fail otherwise.
+    """
 
     least: float
     trusted: float
+    unstable: bool = False
 
 
 @dataclass
@@ -139,7 +143,7 @@ class Stepper:
                 continue
             if not self._keeps(error, fraction - done):
                 continue
-            self._release.trusted = self.substep
+            self._release.trusted, self._release.unstable = self.substep, False
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
@@ -159,6 +163,7 @@ class Stepper:
         """
         release, least = self._release, self.equilibrium.strategy.smallest_part
         self.cuts += 1
+        release.unstable = failed.unstable = release.unstable or failed.unstable
         self.substep = half = 0.5 * (part.end - part.begin)
         if half >= release.least:
             return None
@@ -168,7 +173,7 @@ class Stepper:
                 raise failed
             self.substep, release.least = half, least * (1.0 - part.begin)
             return None
-        self.substep = min(1.0, max(release.trusted, release.least))
+        self.substep, release.unstable = min(1.0, max(release.trusted, release.least)), False
         release.least *= COARSER
         return rest
 

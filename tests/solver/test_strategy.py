@@ -180,6 +180,23 @@ def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tri
         none.follow(0.0, lambda _, share: share, Kept())
 
 
+@pytest.mark.parametrize("found", [False, True])
+def test_a_part_that_failed_for_stability_is_not_forgotten_until_one_works(found):
+    """Whole and half fail, the half because the body gives way; 1/4 works or fails, and all after it."""
+
+    class Unsteady(Steps):
+        def step(self, old, target, frozen=None, start=None):
+            if found and old == 0.0 and target == 0.25:
+                return target
+            failed = StepFailed("fails", [1.0])
+            failed.unstable = old == 0.0 and target == 0.5
+            raise failed
+
+    with pytest.raises(StepFailed) as error:
+        Stepper(Unsteady(Strategy(), 1.0)).follow(0.0, lambda _, share: share, Unbooked())
+    assert error.value.unstable is not found
+
+
 def work(*motion, body=None, friction=0.3, **numbers):
     """Iterations and factorisations of a smooth motion, and its last normal force."""
     solver = Solver(strategy=Strategy(**numbers))
