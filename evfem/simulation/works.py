@@ -49,9 +49,8 @@ parts, and only say which of two columns has L.
 Where no equilibrium is near, the body is released and comes to rest at another one
 (`evfem.solver.relaxation`). The energy set free there is what the drag dissipates on the way,
 :math:`D_d = \int S_d : \Delta E + |\Delta u|_{M_d}^2 s^2 \ge 0`, and the L of these steps, from which
-:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. If
-their sum is negative, as it can be in the first of these steps, which moves the loads, it is of the
-way and ``integrator_dissipation``.
+:math:`D_d` is taken as :math:`D_v` is; both are ``snap_dissipation``. If their sum is negative, as it
+can be in the first of these steps, which moves the loads, it is ``integrator_dissipation``.
 
 Where the voltage is resolved in time (`evfem.contact.charging`) the pad first moves with the charges
 and the voltage that it had, which is the way of :math:`W_e`, and then charge flows:

@@ -108,19 +108,23 @@ class Snapping(Steps):
         raise StepFailed("no equilibrium near", [1.0])
 
 
+class Applying:
+    """A release that applies everywhere."""
+
+    def __init__(self, body, solve):
+        pass
+
+    def applies(self, target):
+        return True
+
+
 def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
     """Nothing is ever found without a release: the first comes at 1/32 of the step, each further one
     at a part four times as long, up to the whole rest.
     """
     ends = []
 
-    class Released:
-        def __init__(self, body, solve):
-            pass
-
-        def applies(self, target):
-            return True
-
+    class Released(Applying):
         def follow(self, state, target, accept):
             ends.append(target)
             return target
@@ -143,13 +147,7 @@ def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
 def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tried(monkeypatch):
     """Parts of 1/100 work, a release at 1/32 books two parts and fails: they are not kept."""
 
-    class Restless:
-        def __init__(self, body, solve):
-            pass
-
-        def applies(self, target):
-            return True
-
+    class Restless(Applying):
         def follow(self, state, target, accept):
             accept(state, target)
             accept(state, target)
