@@ -44,12 +44,12 @@ ROOMS = {
     "contact": (
         {"numpy", "scipy"},
         "friction surfaces textures own pad edge skin charging attraction fullfield drivenfield "
-        "elimination signorini follower condensed coulomb sweeps disc spatial stability",
+        "changes elimination updated signorini follower condensed coulomb sweeps disc spatial stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},
-        "strategy state hand control condensation interface spatial linearisation pressure anderson "
-        "travel findings "
+        "strategy state hand control condensation slipping interface spatial linearisation pressure anderson "
+        "travel front findings "
         "equilibrium mirrored factorised relaxation path voltage stepping",
     ),
     "scene": (

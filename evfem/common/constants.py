@@ -75,6 +75,8 @@ DISC_ROUNDS             so often before the contact problem is given up         
 DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
 FEW_SOLVES              solves of an active set after which the drops of the attraction are       attraction
                         eliminated from it
+UPDATED                 share of the closed nodes' unknowns that may be exchanged before they      attraction
+                        are factorised again
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
@@ -90,6 +92,8 @@ SHORT_RAMP              ramps of friction shorter than this fraction of a node d
                         jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps
                         consistent
+WEDGED                  so many turns of a slipping node's contact force, up and down, show that     adhesion
+                        friction has no equilibrium between
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
 PATH_FIRST              where the error of the path decides, the first part of a scene, as a      press
@@ -109,8 +113,9 @@ DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 DRAG_STEPS              steps of a release, failed ones included, before it is given up
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
-VERGE                   a step that failed where what takes stability away grows so fast,         snaps
-                        relative to what holds it, has no equilibrium near
+VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
+                        relative to what holds it, has no equilibrium near; the second, where
+                        the body gave way in its iterations
 STAGGERED_LIMIT         rounds of the staggered coupling
 NAMED                   so many of the largest out-of-balance forces are named in a failure
 ======================  ========================================================================  ==========
@@ -151,7 +156,8 @@ MORE = 1.5
 ANDERSON_DEPTH = 3
 TURNED_BACK = 1.0 / 8.0
 ACTIVE_SET_LIMIT = 60
-FEW_SOLVES = 8
+FEW_SOLVES = 2
+UPDATED = 0.1
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 DISC_OWN, DIVERGED = 0.1, 1e6
@@ -164,6 +170,7 @@ HAIR = 1e-9
 NEAR = 0.3
 SHORT_RAMP = 0.5
 CHANGES = 3
+WEDGED = 2
 SHORTEST_LENGTH = 1e-3
 PATH_FIRST, PATH_CHANGE, PATH_SAFETY = 1.0 / 16.0, 4.0, 0.9
 RELEASED = 1.0 / 32.0
@@ -172,6 +179,6 @@ DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 60
 PATIENT = 16
-VERGE = 0.9
+VERGE, VERGE_LOST = 0.9, 0.5
 STAGGERED_LIMIT = 60
 NAMED = 3

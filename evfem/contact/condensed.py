@@ -28,7 +28,7 @@ Algorithm (`LinearContactStep.solve`)::
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -107,12 +107,29 @@ class Candidates:
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+        return turned + self.friction_growth(own)[:, None] * axes[:, 1]
+
+    def by_chords(self) -> Candidates:
+        """The same with the chord of each node's friction law, from zero to the present load, instead of
+        its tangent.
+
+        The tangent of a concave law has friction at zero load (`cohesion`), an open node has none. Where
+        that friction lifts a node off, and without it the node sinks in, the problem has no solution. The
+        law itself vanishes with the load, and so does its chord.
+        """
+        assert self.cohesion is not None
+        pressed = (self.force[:, 0] > 0.0) & (self.cohesion > 0.0)
+        chord = self.cohesion / np.where(pressed, self.force[:, 0], 1.0)
+        friction = np.where(pressed, self.friction + chord, self.friction)
+        return replace(self, friction=friction, cohesion=np.where(pressed, 0.0, self.cohesion))
+
+    def friction_growth(self, own: Floats) -> Floats:
+        """That part of it which is friction: change of the shear force per x displacement, (c,)."""
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
         growth = sign * self.friction_slope * self.force[:, 0]
         if self.slip_stiffness is not None:
             growth = growth - self.slip_stiffness * self.surface.stretch
-        growth = np.where((growth < 0.0) | (growth * own < STABLE), growth, 0.0)
-        return turned + growth[:, None] * axes[:, 1]
+        return np.where((growth < 0.0) | (growth * own < STABLE), growth, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +246,9 @@ class LinearContactStep:
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
         force[near] = self._by_node(found.force)
+        own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
+        grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim]
+        force[:, 1] += np.where(status != OPEN, grown, 0.0)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
@@ -284,6 +304,10 @@ class LinearContactStep:
         try:
             return self._solve_following(near, free, status, follower)
         except ContactNotSolved as failed:
+            if self.candidates.cohesion is not None and self.candidates.cohesion.any():
+                by_chords = replace(self, candidates=self.candidates.by_chords())
+                with suppress(ContactNotSolved):
+                    return by_chords._solve_following(near, free, status, follower)
             if self.timed:
                 raise
             held = self.candidates.axes[near], status, self.candidates.friction[near]
@@ -303,11 +327,12 @@ class LinearContactStep:
             [known.surface.normal_gap[near], known.slip[near]]
         )
         compliance = local(axes, local(axes, C).T).T
-        if known.interface_compliance.any():
-            compliance = compliance + np.diag(known.interface_compliance[near].T.ravel())
+        give = known.interface_compliance[near].T.ravel() if known.interface_compliance.any() else None
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
         cohesion = None if known.cohesion is None else known.cohesion[near]
-        problem = ContactProblem(start, compliance, known.friction[near], extra_unknowns, cohesion=cohesion)
+        problem = ContactProblem(
+            start, compliance, known.friction[near], extra_unknowns, None, cohesion, give
+        )
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
             known.surface.normal_gap[near],

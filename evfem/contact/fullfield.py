@@ -12,7 +12,10 @@ Nodal forces are derivatives of the discrete energy
 
 with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
 the column law, which they are close to, so contact, friction and controls know nothing of the
-field. In every accepted state C lies between its bounds (`certificate`).
+field. Where that tangent leads nowhere, among ridges or steep waves close to a thin insulator, it is
+replaced by the field's own (`fringe_stiffness`), by differences: a node's field decays within a few
+nodes, so every `APART`-th one is moved at once. In every accepted state C lies between its bounds
+(`certificate`).
 """
 
 from __future__ import annotations
@@ -20,13 +23,14 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns
@@ -49,6 +53,8 @@ PARTS = 4
 STEEP = 6.0
 #: solutions that are remembered
 KEPT = 3
+#: nodes of a line that are moved at once for differences: one of so many, by this length (mm)
+APART, MOVED = 8, 1e-7
 
 
 def facing(pad: Pad, points: Floats) -> Ints:
@@ -92,17 +98,18 @@ class Bounds:
         return self.upper / self.lower - 1.0
 
 
-def certificate(x: Floats, gap: Floats, insulator: Layer, skin: Floats, gap_eps_r: float = 1.0) -> Bounds:
-    """Bounds for an outline without solving: points at `x` (L,) with gaps `gap` (L,) in mm, filled
-    with `gap_eps_r`, above an insulator; `skin` (L,) is the skin's layer, reduced (mm).
+def certificate(x: Floats, levels: Floats, insulator: Layer, skin: Floats, gap_eps_r: float = 1.0) -> Bounds:
+    """Bounds for an outline without solving: points at `x` (L,), the heights `levels` (2, L) of the
+    ground and of the outline above in mm, the gap between them filled with `gap_eps_r`, an insulator
+    below; `skin` (L,) is the skin's layer, reduced (mm).
 
     Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
     are linear along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
     C is proportional to all permittivities, and the bounds are those of a gap of air.
     """
-    eps_r = float(insulator.eps_r) / gap_eps_r
+    eps_r, gap = float(insulator.eps_r) / gap_eps_r, levels[1] - levels[0]
     lower = columns_sum(x, gap + float(insulator.thickness) / eps_r + skin * gap_eps_r)
-    upper = least_upper_sum(x, gap, float(insulator.thickness), eps_r)
+    upper = least_upper_sum(x, gap, float(insulator.thickness), eps_r, ground=levels[0])
     return Bounds(eps_0 * gap_eps_r * lower, eps_0 * gap_eps_r * upper)
 
 
@@ -218,13 +225,43 @@ class FieldAttraction(Attraction):
             key += pressing.tobytes()
         found = self.solved.get(key)
         if found is None:
-            lines = self.seen(position)
-            x, levels = self.outline(position, lines, pressing)
-            field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope)
-            self.solved[key] = found = (field, np.asarray(lines.T @ forces))
+            self.solved[key] = found = self._above(position, self.seen(position), pressing)
             while len(self.solved) > KEPT:
                 self.solved.popitem(last=False)
         return found
+
+    def _above(
+        self, position: Floats, lines: Any, pressing: Floats | None
+    ) -> tuple[Capacitance | None, Floats]:
+        """Field and forces (P, 2) at 1 V with columns at these lines (L, P)."""
+        x, levels = self.outline(position, lines, pressing)
+        field, forces = self._solved(x, levels, surface_state(self.surface, lines @ position).slope)
+        return field, np.asarray(lines.T @ forces)
+
+    def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
+        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
+        component). Nodes that touch move along the surface alone: contact holds their gap.
+        """
+        lines, frame = self.seen(position), surface_state(self.surface, position)
+        nodes = in_line(self._plane, self.edges)
+        closed, start = frame.gap <= TOUCHING, self._unit_forces(position, pressing)
+        ways = np.zeros((2, self._size, 2))
+        ways[0, :, 0] = 1.0
+        ways[0, closed, 1], ways[1, ~closed, 1] = frame.slope[closed], 1.0
+        triplets = []
+        for axis, first in product(range(2), range(min(APART, nodes.size))):
+            moved = nodes[first::APART]
+            place = position.copy()
+            place[moved] += MOVED * ways[axis, moved]
+            rate = voltage**2 / MOVED * (self._above(place, lines, pressing)[1] - start)[nodes]
+            nearest = np.clip(np.rint((np.arange(nodes.size) - first) / APART), 0, moved.size - 1)
+            column = 2 * moved[nearest.astype(int)] + axis
+            triplets += [(rate[:, k], 2 * nodes + k, column) for k in range(2)]
+        value, row, column = (np.concatenate(part) for part in zip(*triplets, strict=True))
+        size = 2 * self._size
+        outer = self.flanks.stiffness(position, voltage, np.ones(self._size, dtype=bool), pressing)
+        share = sparse.diags_array(np.repeat(self.share(position[:, 0]) ** 2, 2))
+        return sparse.csr_matrix((value, (row, column)), (size, size)) + sparse.csr_matrix(share @ outer)
 
     def _solved(self, x: Floats, levels: Floats, slope: Floats) -> tuple[Capacitance | None, Floats]:
         """The field of an outline and its forces (L, 2) on the lines at 1 V, above a surface of that
@@ -300,9 +337,7 @@ class FieldAttraction(Attraction):
     def bounds(self, x: Floats, levels: Floats) -> Bounds:
         """The bounds of C between these curves."""
         skin = (levels[3] - levels[2]) / self.skin.eps_r if len(levels) > 3 else np.zeros_like(x)
-        return certificate(
-            x, levels[2] - levels[1], self.surface.insulator, skin, self._columns.eps_r[1].real
-        )
+        return certificate(x, levels[1:3], self.surface.insulator, skin, self._columns.eps_r[1].real)
 
     def check(self, position: Floats) -> None:
         """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its

@@ -31,14 +31,14 @@ Algorithm (`solve_contact`), a primal-dual active set::
         gaps, slips <- start + C (forces + drops) + e d
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
-        change all violated nodes; only the worst one if these statuses have been met before, and
-            always after many solves; then, where that goes round in a circle, only the first one;
-            give up where that goes round too
+        change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
+            round in a circle
     start again from all nodes sticking, then from all open, before giving up
 
 After a few solves the drops of the attraction are taken out of the equations
-(`evfem.contact.elimination`), and the closed nodes are what is left to solve for; the solution that
-is returned is always one of the whole equations.
+(`evfem.contact.elimination`), and the closed nodes are what is left to solve for, with one
+factorisation for statuses that differ in few nodes (`evfem.contact.updated`); the solution that is
+returned is always one of the whole equations.
 
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
 slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
@@ -71,7 +71,9 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, ROUNDING, STABLE
+from evfem.contact.changes import Changes
 from evfem.contact.elimination import Elimination, Motions, bordered
+from evfem.contact.updated import ClosedNodes, Relations
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
@@ -126,8 +128,9 @@ class AttractionStiffness:
 @dataclass(frozen=True)
 class ContactProblem:
     """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients
-    (k,), optional extra_unknowns, and the shear force that friction has without a pressing one,
-    `cohesion` (k,) in N/mm (None: none).
+    (k,), optional extra_unknowns, the shear force that friction has without a pressing one,
+    `cohesion` (k,) in N/mm, and how far the interface itself gives way to contact forces, not to
+    attraction, `give` (2 k,) in mm per N/mm.
 
     The first k entries are normal (gap, pressing force), the last k tangential (slip, shear
     force).
@@ -139,11 +142,17 @@ class ContactProblem:
     extra_unknowns: ExtraUnknowns | None = None
     attraction: AttractionStiffness | None = None
     cohesion: Floats | None = None
+    give: Floats | None = None
 
     @property
     def size(self) -> int:
         """Number of candidate nodes k."""
         return self.friction.size
+
+    @property
+    def under_forces(self) -> Floats:
+        """Compliance (2 k, 2 k) of body and interface to contact forces."""
+        return self.compliance if self.give is None else self.compliance + np.diag(self.give)
 
     @property
     def resists(self) -> Any:
@@ -164,11 +173,13 @@ class ContactProblem:
 
     @cached_property
     def elimination(self) -> Elimination | None:
-        """The problem without the drops of the attraction; None where it has none, or rough faces
-        make them depend on the contact forces.
+        """The problem without the drops of the attraction; None where it has none, rough faces make
+        them depend on the contact forces, or the interface gives way.
         """
         attraction, extra, none = self.attraction, self.extra_unknowns, np.zeros((2 * self.size, 0))
-        if attraction is None or attraction.roughness is not None or not attraction.negative_stiffness.any():
+        if attraction is None or attraction.roughness is not None or self.give is not None:
+            return None
+        if not attraction.negative_stiffness.any():
             return None
         bone = (none, none.T, np.zeros((0, 0)), np.zeros(0))
         if extra is not None:
@@ -178,6 +189,12 @@ class ContactProblem:
             return Elimination.of(whole, attraction.negative_stiffness, attraction.reference_gap)
         except np.linalg.LinAlgError:
             return None
+
+    @cached_property
+    def closed_nodes(self) -> ClosedNodes:
+        """What solves for the closed nodes without the drops."""
+        assert self.elimination is not None
+        return ClosedNodes(self.elimination.left)
 
 
 @dataclass(frozen=True)
@@ -216,44 +233,35 @@ def lost_stability(problem: ContactProblem) -> bool:
     """Whether the body gives way the more, the more it is loaded: its compliance, which contains
     the forces that turn with the profile, is not positive.
     """
-    C = problem.compliance
+    C = problem.under_forces
     return bool(np.linalg.eigvalsh(0.5 * (C + C.T))[0] < 0.0)
 
 
 def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    many = ACTIVE_SET_LIMIT // 3
-    seen: set[bytes] = set()
-    first = whole = False
+    changes, violated, whole = Changes(), np.zeros(0, dtype=np.int64), False
     for solves in range(1, most + 1):
         fewer = not whole and solves > FEW_SOLVES and problem.elimination is not None
         solved = _solve_closed if fewer else _solve_statuses
         force, attraction_drop, extra = solved(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
+        if problem.give is not None:
+            state = state + problem.give * force
         if problem.extra_unknowns is not None:
             state = state + problem.extra_unknowns.columns @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
-        changes = np.flatnonzero(wanted != status)
-        if fewer and not changes.size:
+        violated = np.flatnonzero(wanted != status)
+        if fewer and not violated.size:
             whole = True
             continue
-        if not changes.size:
+        if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        again = status.tobytes() in seen
-        if again and first:  # the next statuses follow from these alone: it would go round for ever
+        picked = changes.picked(status, violated, violation)
+        if not picked.size:
             break
-        if solves > many and (again or solves >= ACTIVE_SET_LIMIT) and not first:
-            first, seen = True, set()
-        elif solves == many:
-            seen = set()
-        seen.add(status.tobytes())
-        if first:
-            changes = changes[:1]
-        elif again or solves > many:
-            changes = changes[[np.argmax(violation[changes])]]
         status = status.copy()
-        status[changes] = wanted[changes]
-    raise ContactNotSolved(f"{changes.size} of {problem.size} nodes keep changing")
+        status[picked] = wanted[picked]
+    raise ContactNotSolved(f"{violated.size} of {problem.size} nodes keep changing")
 
 
 def solve_with_attraction(
@@ -305,7 +313,8 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
     held = C[np.ix_(free, free)]
     if closed.size:
         rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
-        held = held - C[np.ix_(free, rows)] @ np.linalg.solve(C[np.ix_(rows, rows)], C[np.ix_(rows, free)])
+        own = problem.under_forces[np.ix_(rows, rows)]
+        held = held - C[np.ix_(free, rows)] @ np.linalg.solve(own, C[np.ix_(rows, free)])
     root = np.sqrt(stiffness[free])
     gain = root[:, None] * held * root
     factors, modes = np.linalg.eigh(0.5 * (gain + gain.T))
@@ -355,6 +364,9 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     rows = np.concatenate([active, k + stick, attracted])
     matrix, right, known = C[np.ix_(rows, rows)], -problem.start[rows], drop
     matrix[:, : active.size] *= 1.0 - gain
+    if problem.give is not None:
+        pressed = np.arange(rows.size - attracted.size)
+        matrix[pressed, pressed] += problem.give[rows[pressed]]
     slipping = np.flatnonzero(ratio[active])
     if slipping.size:
         matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
@@ -393,33 +405,21 @@ def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats
     elimination, attraction, k = problem.elimination, problem.attraction, problem.size
     assert elimination is not None
     assert attraction is not None
-    left, is_open = elimination.left, status == OPEN
-    active, stick = np.flatnonzero(~is_open), np.flatnonzero(status == STICK)
     against = (status == BACKWARD).astype(float) - (status == FORWARD)
     ratio = problem.friction * against
     # what a contact force is above the force that pushes beside the drops
     above = attraction.gain_on_closing - attraction.negative_stiffness * attraction.reference_gap
-    push = np.concatenate([np.zeros(k), ratio * above])
-    if problem.cohesion is not None:
-        push[k:] += problem.cohesion * against
-    rows = np.concatenate([active, k + stick])
-    matrix, row = left.compliance[np.ix_(rows, rows)], left.rows[:, rows]
-    matrix[:, : active.size] += left.compliance[np.ix_(rows, k + active)] * ratio[active]
-    row[:, : active.size] += left.rows[:, k + active] * ratio[active]
-    matrix = bordered(matrix, left.columns[rows], row, left.pivot)
-    right = np.append(-left.start[rows] - left.compliance[rows] @ push, left.right - left.rows @ push)
+    shear = ratio * above if problem.cohesion is None else ratio * above + problem.cohesion * against
     try:
-        x = np.linalg.solve(matrix, right)
+        force, extra = problem.closed_nodes.solved(Relations(status != OPEN, status == STICK, ratio, shear))
     except np.linalg.LinAlgError as error:
         raise ContactNotSolved(str(error)) from error
-    push[rows] += x[: rows.size]
-    push[k + active] += ratio[active] * x[: active.size]
-    drop = np.zeros(2 * k)
-    drop[elimination.attracted] = elimination.drops(push, x[rows.size :])
+    drop, active = np.zeros(2 * k), np.flatnonzero(status != OPEN)
+    drop[elimination.attracted] = elimination.drops(force, extra)
     drop[active] = -attraction.gain_on_closing[active]
-    force = push
+    force = force.copy()
     force[active] += above[active]
-    return force, drop, x[rows.size :]
+    return force, drop, extra
 
 
 def _next_statuses(
@@ -430,7 +430,7 @@ def _next_statuses(
     """
     k, resists = problem.size, problem.resists
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
-    own_compliance = np.maximum(np.abs(np.diagonal(problem.compliance)[:k]), 1e-300)
+    own_compliance = np.maximum(np.abs(np.diagonal(problem.under_forces)[:k]), 1e-300)
     scale = max(np.abs(normal).max(initial=0.0), np.abs(gap / own_compliance).max(initial=0.0) * 1e-3, 1e-300)
     noise = ROUNDING * scale
     violation = np.zeros(k)

@@ -55,6 +55,10 @@ class SpatialCandidates(Candidates):
         growth = np.where((steep <= 0.0) | (steep * own < STABLE), growth, 0.0)
         return turned + growth[:, None] * np.einsum("ca,cak->ck", along, axes[:, 1:])
 
+    def friction_growth(self, own: Floats) -> Floats:
+        """None (c,): in three dimensions the forces of a linear step are those at its beginning."""
+        return np.zeros_like(own)
+
 
 @dataclass(frozen=True, eq=False)
 class Turning:

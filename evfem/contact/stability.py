@@ -100,7 +100,8 @@ def _compliance(step: LinearContactStep) -> Floats:
     """
     rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
     C = step.body.compliance[np.ix_(rows, rows)]
-    return local(axes, local(axes, C).T).T + np.diag(step.candidates.interface_compliance.T.ravel())
+    give = np.where(step.candidates.status == OPEN, 0.0, step.candidates.interface_compliance.T)
+    return local(axes, local(axes, C).T).T + np.diag(give.ravel())
 
 
 def _bone(step: LinearContactStep) -> ExtraUnknowns:

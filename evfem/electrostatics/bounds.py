@@ -10,7 +10,12 @@ no such flux has more co-energy than the field. The right side is the energy of 
 is linear in slab and air along each vertical, and by Dirichlet's principle none has less than the
 field. It may take any outline below the body's own, as a larger body has the larger capacitance:
 here the highest outline nowhere steeper than one of `SLOPES`, which takes walls too. Both integrals
-are exact for polylines.
+are exact for polylines. Above an electrode and a slab that follow an uneven ground of slope q, along
+which the potential changes too, the same potential has
+
+.. math:: \int \Big[q^2 \frac1H + q\,h' \Big(\frac1H + \frac{(\varepsilon - 1) s^2}{H^3}\Big)\Big] dx
+
+more.
 
 A body that ends in the air has in its upper bound what surrounds it: a quarter of a disc around
 each end, in which the potential grows with the angle, and the body's width above.
@@ -50,13 +55,25 @@ def _columns(x: Floats, distance: Floats) -> Floats:
     return np.asarray(dx / a * mean)
 
 
-def upper_sum(x: Floats, distance: Floats, reduced: float, eps_r: float) -> float:
-    """The upper bound's integral over the polyline `distance` = h + s (mm) without walls."""
+def upper_sum(
+    x: Floats, distance: Floats, reduced: float, eps_r: float, ground: Floats | None = None
+) -> float:
+    """The upper bound's integral over the polyline `distance` = h + s (mm) without walls, above a flat
+    ground or one of these heights (mm).
+    """
     dx, a, b = np.diff(x), distance[:-1], distance[1:]
-    slope = np.divide(b - a, dx, out=np.zeros_like(dx), where=dx > 0.0)
+    first = _columns(x, distance)
+    slope, uneven = (_slopes(dx, y) for y in (distance, np.zeros_like(x) if ground is None else ground))
+    third = dx * (a + b) / (2.0 * (a * b) ** 2)
     fourth = dx * (a * a + a * b + b * b) / (3.0 * (a * b) ** 3)
     spreading = (eps_r**2 - 1.0) * reduced**3 * float(np.sum(slope**2 * fourth)) / 3.0
-    return float(np.sum(_columns(x, distance) * (1.0 + slope**2 / 3.0))) + spreading
+    along = (eps_r - 1.0) * reduced**2 * float(np.sum(uneven * slope * third))
+    return float(np.sum(first * (1.0 + slope**2 / 3.0 + uneven * (uneven + slope)))) + spreading + along
+
+
+def _slopes(dx: Floats, y: Floats) -> Floats:
+    """Slopes of the pieces of a polyline (mm/mm), 0 of upright ones."""
+    return np.divide(np.diff(y), dx, out=np.zeros_like(dx), where=dx > 0.0)
 
 
 def capacitance_bounds(outline: Outline, thickness: float = 0.0, eps_r: float = 1.0) -> tuple[float, float]:
@@ -79,13 +96,19 @@ def capacitance_bounds(outline: Outline, thickness: float = 0.0, eps_r: float = 
 
 
 def least_upper_sum(
-    x: Floats, height: Floats, thickness: float, eps_r: float, periodic: bool = False
+    x: Floats,
+    height: Floats,
+    thickness: float,
+    eps_r: float,
+    periodic: bool = False,
+    ground: Floats | None = None,
 ) -> float:
     """The least of `upper_sum` over lower envelopes of a polyline whose ends are planes of symmetry, or
-    of one that is `periodic`.
+    of one that is `periodic`; `height` (L,) is above the ground.
     """
     reduced, envelope = thickness / eps_r, spread_around if periodic else spread
-    return min(upper_sum(x, envelope(x, height, slope) + reduced, reduced, eps_r) for slope in SLOPES)
+    below = (envelope(x, height, slope) + reduced for slope in SLOPES)
+    return min(upper_sum(x, distance, reduced, eps_r, ground) for distance in below)
 
 
 def surroundings(outline: Outline, ends: tuple[float, float], thickness: float, eps_r: float) -> float:

@@ -58,13 +58,15 @@ def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
     hovers = [motion.gap for motion in scene.motion if isinstance(motion, Hover)]
     gap = min(hovers) if len(hovers) == len(scene.motion) else 0.0
     line = in_line(pad, facing(pad, position))
-    height = position[:, 1] - scene.ground.height(position[:, 0])
+    ground = scene.ground.height(position[:, 0])
+    height = position[:, 1] - ground
     electrical = scene.finger.electrical
     thickness = skin_thickness(electrical, mesh, pad.nodes)
     skin, insulator = (
         lossless(scene, layer) for layer in solids(scene, thickness, electrical.stratum_corneum_eps_r)
     )
     reduced = np.asarray(skin.thickness) / skin.eps_r
-    above = (height - height.min() + gap)[line]
+    above = height - height.min() + gap
+    levels = np.stack([ground, ground + above])[:, line]
     gap_eps_r = getattr(scene.law, "gap_eps_r", 1.0)
-    return certificate(position[line, 0], above, insulator, reduced[line], gap_eps_r), gap
+    return certificate(position[line, 0], levels, insulator, reduced[line], gap_eps_r), gap

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from evfem.common.constants import VERGE
+from evfem.common.constants import VERGE, VERGE_LOST
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -33,7 +33,8 @@ def _lost(model: Model, failed: StepFailed) -> str:
             verge = model.equilibrium.verge(state, target)
     except StepFailed:  # the tangent there is singular
         return ""
-    if verge is None or not (failed.unstable or verge.share >= VERGE):
+    # a trial far from equilibrium may give way too: alone that shows nothing
+    if verge is None or verge.share < (VERGE_LOST if failed.unstable else VERGE):
         return ""
     passing = model.body.dynamics is not None and target.duration > 0.0
     rest = "within a time step as short as this" if passing else "at rest"

@@ -77,10 +77,12 @@ class Turning:
     the tangent says, which is that of the column law: open, it closes; closed, it opens too far.
     Between both is the equilibrium. From there on the iterations go the part `TURNED_BACK` of their
     way, and such a node counts as open on it: a map with a slope from -1 / `TURNED_BACK` to 1 contracts
-    then, and can be mixed.
+    then, and can be mixed. Without `fringes`, under the column law, a node that has opened is on its
+    way to where the column law holds it, and goes the whole of it.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, fringes: bool) -> None:
+        self._fringes = fringes
         self.reset()
 
     def reset(self) -> None:
@@ -93,7 +95,7 @@ class Turning:
         changed = after.touching != before.touching
         back = self._before is not None and np.array_equal(after.touching, self._before)
         self._before = before.touching
-        self.turned = self.turned or bool(stalled and back and changed.any())
+        self.turned = self.turned or bool(self._fringes and stalled and back and changed.any())
         if not self.turned:
             return after
         start, end = _vector(before), _vector(after)

@@ -11,8 +11,8 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself
-        give up if the residual grows or is not finite, or goes to and fro, or after the strategy's
-            iterations, unless their fall promises the end soon
+        give up if the residual grows or is not finite, or goes to and fro while no front peels off,
+            or after the strategy's iterations, unless their fall promises the end soon
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
@@ -41,6 +41,7 @@ from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Target, sticks
+from evfem.solver.front import Front
 from evfem.solver.interface import Interface
 from evfem.solver.state import (
     NO_AGE,
@@ -256,11 +257,12 @@ class Equilibrium(Statics):
         target.drive.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
-        self.record.residuals = history
+        self.record.residuals, front = history, Front()
         while len(history) < self.strategy.iterations or self._nearly(history):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
+            front.watch(state.touching)
             reached = target.reached(state.bone)
             history.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
@@ -270,7 +272,7 @@ class Equilibrium(Statics):
                 return self._settled(old, self.body.accepted(old, state), target)
             if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
                 raise StepFailed("the residual grows", history)
-            if stuck(history):
+            if stuck(history) and not front.advances():
                 break
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)

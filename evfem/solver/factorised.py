@@ -100,7 +100,7 @@ class FactorisedBody:
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
-        self._turning = Turning()
+        self._turning = Turning(attraction is not None and attraction.has_fringes)
         self._scaled_down = 0
 
     # -- a step begins
@@ -178,7 +178,7 @@ class FactorisedBody:
         sums = max(abs(forces[axis:-dim:dim].sum()) for axis in range(dim))
         missing = [target.height.missing(float(state.bone[1]), reaction), target.drive.missing(reaction)]
         if target.hand is not None:
-            missing.append(target.hand.missing(float(state.bone[0]), reaction))
+            missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
         return float(free / largest)
 
@@ -195,15 +195,17 @@ class FactorisedBody:
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate, with the factorisation at hand if that does and a new one if not."""
         again, residuals = self._renewed, self.record.residuals
+        columns = not self.linearisation.fringes
         self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
         # where new tangents one after the other gain little, their maps are nearly one
-        if self._renewed and not (again and (residuals[-1] < ALIKE or to_and_fro(residuals))):
+        alike = again and (residuals[-1] < ALIKE or to_and_fro(residuals))
+        if self._renewed and not (alike and columns != self.linearisation.fringes):
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)
         except ContactNotSolved:
             # an older tangent may ask for what no contact can give
-            older = not self.linearisation.made_at(state)
+            older = self.linearisation.leave_fringes() or not self.linearisation.made_at(state)
             if older:
                 self.linearisation.factorise(state)
             elif not target.height.free:

@@ -150,6 +150,14 @@ class Grip:
         """Force along x (N/mm) that the bone lacks at its x and reactions (dim,)."""
         return float(self.force(x) - reaction[0])
 
+    def unbalanced(self, x: float, reaction: Floats) -> float:
+        """The force that is `missing` beyond rounding, not negative: in a short time a hand with a
+        mass is stiff. Each of the four places has a rounding of its own, half an epsilon.
+        """
+        largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
+        rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
+        return max(abs(self.missing(x, reaction)) - rounding, 0.0)
+
     def unknown(self, tangent: CondensedTangent, x: float, dim: int) -> ExtraUnknown:
         """The bone's travel from x, in mm."""
         push = -tangent.schur[:, -dim]

@@ -18,7 +18,6 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
     CHANGES,
     HAIR,
-    NEAR,
     NEIGHBOURS,
     SHORT_RAMP,
     SHORTEST_LENGTH,
@@ -29,6 +28,7 @@ from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
+from evfem.solver.slipping import Returned, Wedged
 from evfem.solver.state import State
 
 
@@ -89,40 +89,6 @@ class Pins:
         return bool(loose.any())
 
 
-class Returned:
-    """Nodes that have slipped and stick again, in the iterations of one step: `nodes` (P,) bool.
-
-    Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
-    a node at rest which the friction of rest does not: the iterations would let it slip and stick by
-    turns. Such a node slips along the steepest of the chord of the law from rest, which says the same
-    of rest as the law, the tangent and the slope that it had last; where it sticks, friction rises
-    with its slip as it did last. So it comes to its speed, or to rest, from one side wherever the
-    tissue is stable, also where the law has a kink; once near, along the tangent.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.nodes = np.zeros(size, dtype=bool)
-        self._slipped = np.zeros(size, dtype=bool)
-        self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
-
-    def watch(self, c: Ints, status: Ints) -> None:
-        """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
-        self.nodes[c] |= self._slipped[c] & (status == STICK)
-        self._slipped[c] |= status >= FORWARD
-
-    def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
-        """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an
-        iterate with slips (k,), 0 where they stick.
-        """
-        near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
-        steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
-        slope = np.where(self.nodes[c] & ~near, steepest, tangent)
-        slips = slip != 0.0
-        self._slip[c] = slip
-        self._slope[c] = np.where(slips & (slope > 0.0), slope, self._slope[c])
-        return np.where(slips, slope, np.where(self.nodes[c], self._slope[c], 0.0))
-
-
 def steps_of_friction(surface: Any, short: float) -> Floats:
     """Jumps of the friction coefficient and rising or falling ramps shorter than `short` (mm), (J,
     3) in ascending order: position, coefficient before and behind. A ramp that a node crosses in
@@ -157,14 +123,14 @@ class Interface:
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
-        self._returned = Returned(pad.nodes.size)
+        self._returned, self._wedged = Returned(pad.nodes.size), Wedged(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
         self.pins.begin(self.positions(old.u)[:, 0])
-        self._returned = Returned(self.pad.nodes.size)
+        self._returned, self._wedged = Returned(self.pad.nodes.size), Wedged(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
@@ -235,17 +201,19 @@ class Interface:
         slips, give = known.status >= FORWARD, known.interface_compliance[:, 1]
         slip = np.where(slips, known.slip + give * known.force[:, 1], 0.0)
         moving = self._slipping(old, state, c, known.friction, slip)
-        found = moving.linearised(law)
-        self._returned.watch(c, known.status)
-        by_speed = self._returned.slopes(c, slip, found.by_speed, moving.chord(law))
-        by_speed = np.where(known.status == OPEN, 0.0, by_speed)
+        found = self._returned.linearised(law, moving, c, known.status, np.abs(known.force[:, 1]))
+        by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
         by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
-        yielding = np.where(slips, np.maximum(by_slip, 0.0) * give, 0.0)
+        yielding = np.maximum(by_slip, 0.0) * give
         series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        weak = self._weak(state)
+        beyond = np.abs(known.force[:, 1]) - moving.bound(law) > weak
+        opened = self._wedged.opens(c, known.force[:, 0], slips & beyond, found.offset > weak)
         return replace(
             known,
+            status=np.where(opened, OPEN, known.status),
             slip=known.slip / series,
             interface_compliance=known.interface_compliance / np.column_stack([np.ones_like(series), series]),
             friction=series * found.slope,
@@ -328,12 +296,16 @@ class Interface:
         pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
         return self.pins.held & (state.status >= FORWARD) & (pinned != self.friction(old, nodes, x))
 
+    def _weak(self, state: State) -> float:
+        """Forces (N/mm) below which a law of contact or friction holds."""
+        return self.tolerance * max(float(np.abs(state.contact_force).max()), SMALLEST_FORCE)
+
     def obeyed(self, old: State, state: State) -> bool:
         """Whether closed gaps, stick, slip and the friction cone hold at the present positions."""
         position, surface = self.positions(state.u), self.surface_at(state)
         short = self.tolerance * self.length
         active = state.status != OPEN
-        weak = self.tolerance * max(np.abs(state.contact_force).max(), SMALLEST_FORCE)
+        weak = self._weak(state)
         if self.pins.release(self._lower_limit(old, state), state.contact_force[:, 1], weak):
             return False
         if self.pins.let_go(self._strayed(old, state, position[:, 0])):

@@ -10,7 +10,8 @@ A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_
     S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
 
 The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
-nodes.
+nodes; under the full field, once iterations gain nothing, that of the field itself, as long as
+contact has a solution with it.
 
 A tangent only leads to the equilibrium, and what is accepted is balanced in double precision: so its
 factors are of single precision, which takes two thirds of the time and half of the memory. They are
@@ -51,6 +52,11 @@ from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.tissue.body import Body
 
 
+def in_vain(residuals: list[float]) -> bool:
+    """Whether the last four iterations have gained nothing, with the bone where it should be."""
+    return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
+
+
 class Linearisation:
     """Candidates, factorisation and condensed tangent of a body, and the attraction's part in
     them.
@@ -83,18 +89,22 @@ class Linearisation:
         self._outdated = self._renewed_near = False
         self._lets_go = True
         self._drag_rate = 0.0
+        self.fringes = self._held_with_fringes = False
 
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
         self.touching, self.frozen = old.status != OPEN, frozen
-        self._renewed_near, self._lets_go = False, True
+        self._renewed_near, self._lets_go, self._held_with_fringes = False, True, True
+        self._outdated = self.fringes
+        if self.fringes:
+            self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
         """Start the clock of a step; a factorisation made for a much longer or shorter one is of
         no use.
         """
         dynamics = self.body.dynamics
-        self._outdated = self.body.drag_rate != self._drag_rate
+        self._outdated |= self.body.drag_rate != self._drag_rate
         if dynamics is None:
             return
         if self._made_at is not None:
@@ -148,6 +158,10 @@ class Linearisation:
         """Factorise at the present state where there is no factorisation, the old one stalls, or a
         new one saves iterations; says whether it did.
         """
+        follows = self.attraction is not None and self.attraction.has_fringes and self._held_with_fringes
+        if follows and in_vain(history):
+            self._outdated |= not self.fringes
+            self.fringes = True
         if self.factor is not None and not self._outdated and not self._too_old(history):
             return False
         self._doubt_single_precision(history)
@@ -159,6 +173,14 @@ class Linearisation:
         if self.single and near and self._renewed_near:
             self.single, self.factor = False, None
         self._renewed_near = near
+
+    def leave_fringes(self) -> bool:
+        """Go back to the columns' stiffness for the rest of a step in which contact has no solution
+        with the field's own; says whether that was in use.
+        """
+        left, self.fringes = self.fringes, False
+        self._held_with_fringes = self._held_with_fringes and not left
+        return left
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
@@ -202,8 +224,10 @@ class Linearisation:
 
     @property
     def reusable(self) -> TangentPoint | None:
-        """Where the factorisation was made that the next step may use, if there is one."""
-        return None if self.factor is None else self._made_at
+        """Where the factorisation was made that the next step may use, if there is one: that of the
+        field's own stiffness serves one step alone.
+        """
+        return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:
         """Make the factorisation again that a run which goes on from `state` had made at `at`."""
@@ -281,6 +305,11 @@ class Linearisation:
         position, c, dim = self.interface.resting(state), self.candidates, self.body.bone.size
         pressing = state.contact_force[:, 0]
         whole = self.attraction.stiffness(position, state.voltage, self.touching, pressing)
+        if self.fringes:
+            from evfem.contact.fullfield import FieldAttraction
+
+            assert isinstance(self.attraction, FieldAttraction)
+            whole = self.attraction.fringe_stiffness(position, state.voltage, pressing)
         unknowns = (dim * c[:, None] + np.arange(dim)).ravel()
         rows = whole[unknowns]
         inner = np.asarray(rows[:, unknowns].toarray())

@@ -28,6 +28,9 @@ friction and attraction like any other, in the scene's own coupling and to its t
 counts from step to step, and what is dissipated is counted by its definitions
 (`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
 
+A hand with a mass or a damper goes on in its own time: in the first step of a release, and then the
+bone stays at that x, while the tissue, which has no time of its own, comes to rest below it.
+
 A wished friction force is not followed on the way, where drag would be part of it: the voltage
 stays as it is until the end.
 
@@ -42,6 +45,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.constants import (
     DRAG_CALMER,
     DRAG_CHANGE,
@@ -70,9 +74,10 @@ class Relaxation:
     solve: Callable[[State, Target], State]
 
     def applies(self, target: Target) -> bool:
-        """Whether a way to `target` takes no time, so that nothing but an equilibrium is asked for."""
-        held = target.hand is not None and target.hand.hand.timed
-        return target.duration == 0.0 or (self.body.dynamics is None and not held)
+        """Whether the tissue takes no time on its way to `target`, so that nothing but an equilibrium is
+        asked for.
+        """
+        return target.duration == 0.0 or self.body.dynamics is None
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
         """The equilibrium at `target` where the body comes to rest when released at `state`;
@@ -86,7 +91,8 @@ class Relaxation:
             self.body.release(state.u, 0.0)
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
-        held = replace(target, duration=0.0)  # a snap takes no time
+        moving = target.duration > 0.0 and target.hand is not None and target.hand.hand.timed
+        end, held = target, target if moving else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
         rate, slower, speed, quiet, patience = 1.0, DRAG_CHANGE, 0.0, DRAG_REST, Patience()
@@ -103,13 +109,15 @@ class Relaxation:
                     raise
                 continue
             accept(state, new)
+            if held.hand is not None and moving:
+                held, end = (_below(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
             before, speed = speed, rate * float(np.abs(new.u - state.u).max())
             state, slower = new, DRAG_CHANGE
             if speed > before:
                 quiet = DRAG_REST
             elif rate < quiet:
-                rest = self._rest(state, target)
+                rest = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
@@ -125,6 +133,11 @@ class Relaxation:
             return self.solve(state, target)
         except StepFailed:
             return None
+
+
+def _below(bone: Floats, target: Target) -> Target:
+    """The target with the bone (dim,) at the x where it is, while no time passes."""
+    return replace(target, x=float(bone[0]), duration=0.0, hand=None)
 
 
 def _refuse_flight(state: State, target: Target) -> None:

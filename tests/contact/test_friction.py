@@ -15,7 +15,7 @@ from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
-from evfem.solver.interface import Returned
+from evfem.solver.slipping import Returned, Wedged, speed_under
 
 pytestmark = pytest.mark.solver
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
@@ -204,6 +204,65 @@ def test_the_slope_of_friction_of_a_node_that_sticks_again_is_the_steepest_until
     assert slopes(0.5, 3.0, 1.0) == [3.0, 5.0]
     assert slopes(1.0, 7.0, 6.0) == [7.0, 7.0]
     assert slopes(0.9, 1.0, 6.0) == [1.0, 1.0]
+
+
+@pytest.mark.parametrize("stiffness", [1e-9, 1e-5, 1e-3, 0.1])
+@pytest.mark.parametrize("beyond", [1.0001, 1.01, 1.5])
+@pytest.mark.parametrize("start", [0.3, 1.2, 30.0])
+def test_a_node_that_has_returned_finds_its_speed_around_the_kink_of_a_law(stiffness, beyond, start):
+    """A spring F0 - S v against friction that is flat up to 0.05 mm/s and a power of the speed beyond,
+    with a slight slope below: equilibrium at `beyond` times the kink, iterations from elsewhere.
+    """
+    law, one = ev.RateFriction(speed=5.0, ratio=1.1, exponent=0.25), np.array([0])
+    kink = 0.05
+
+    def bound(v):
+        return float(nodes([0.01], speed=v).bound(law)[0])
+
+    given = bound(beyond * kink) + stiffness * beyond * kink
+    returned = Returned(1)
+    for status in (FORWARD, STICK):
+        returned.watch(one, np.array([status]))
+    misfits = []
+    for v in (40.0 * kink, start * kink):
+        returned.linearised(law, nodes([0.01], speed=v), one, np.array([FORWARD]), np.array([given]))
+    force = given - stiffness * v
+    for _ in range(12):
+        misfits.append(abs(force - bound(v)) / force)
+        status = np.array([FORWARD if v > 0.0 else STICK])
+        seen = returned.linearised(law, nodes([0.01], speed=v), one, status, np.array([force]))
+        held = seen.slope[0] * 0.01 * 0.25 + seen.offset[0]
+        v = max(v + (given - stiffness * v - held) / (stiffness + seen.by_speed[0]), 0.0)
+        force = given - stiffness * v
+    assert misfits[-1] < 1e-12
+    assert v == pytest.approx(beyond * kink, rel=1e-6)
+
+
+def test_the_speed_under_a_force_is_that_of_the_law_or_none():
+    """Rest bears the first force, the second is that of 2 mm/s, the last one is beyond the fastest."""
+    seen = nodes([0.01] * 4, speed=np.array([7.0, 7.0, 0.0, 1.0]))
+    at = [replace(seen, speed=np.full(4, v)).bound(POWER)[0] for v in (0.0, 2.0, 9.0)]
+    found = speed_under(POWER, seen, np.array([at[0], at[1], at[1], at[2]]), np.full(4, 8.0))
+    np.testing.assert_allclose(found, [0.0, 2.0, 2.0, 0.0], rtol=1e-12)
+
+
+def test_a_node_begins_open_where_both_tangents_put_friction_too_high():
+    """Loads up and down: node 0 holds more than the law allows all the while, node 1 once does not and
+    is counted anew, node 2 never turns, friction of node 3 is in proportion to the load; node 0 does
+    not open again.
+    """
+    wedged, four = Wedged(4), np.arange(4)
+    concave = np.array([True, True, True, False])
+
+    def opens(load, beyond=(True, True, True, True)):
+        loads = np.array([load, load, rising.pop(), load])
+        return wedged.opens(four, loads, np.array(beyond), concave & (load > 2.5)).tolist()
+
+    rising = [8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0]
+    assert [any(opens(load)) for load in (2.0, 3.0, 1.9)] == [False] * 3
+    assert opens(3.1, (True, False, True, True)) == [True, False, False, False]
+    assert [any(opens(load)) for load in (1.9, 3.1)] == [False] * 2
+    assert opens(1.9) == [False, True, False, False]
 
 
 def test_friction_around_the_kink_of_its_law_is_found_without_many_cuts():

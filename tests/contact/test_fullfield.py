@@ -67,6 +67,37 @@ def test_nodal_forces_are_the_derivative_of_the_energy(quadratic):
     assert np.sum(full.forces(points, 1.0, None) * way) == pytest.approx(slope, rel=1e-7)
 
 
+def test_the_fields_stiffness_is_the_derivative_of_its_forces(monkeypatch):
+    """Closed nodes move along the surface. Moved one by one it is exact; every eighth at once, what
+    reaches farther than four nodes is counted with another one.
+    """
+    pad, points = arc(24, 3.0, 2.0)
+    surface = ev.Sinusoid(terms=[[0.02, 6.0, 0.3]], insulator=ev.FILM, y=0.0)
+    points[:, 1] = surface.height(points[:, 0]) + np.maximum(0.05 * points[:, 0] ** 2 - 2e-3, 0.0)
+    _, full = attractions(pad, points, surface)
+    closed = np.abs(points[:, 0]) < 0.2
+    slope = surface.derivative(points[:, 0]) if hasattr(surface, "derivative") else None
+    volts, step, size = 300.0, 1e-6, len(points)
+    if slope is None:
+        slope = 0.5e6 * (surface.height(points[:, 0] + 1e-6) - surface.height(points[:, 0] - 1e-6))
+    exact = np.zeros((2 * size, 2 * size))
+    for node in range(size):
+        for axis in range(2):
+            way = np.zeros((size, 2))
+            way[node, axis] = 1.0
+            if closed[node]:
+                way[node] = [1.0, slope[node]] if axis == 0 else 0.0
+            # one-sided: the insulator is on one side of it
+            ends = [full.forces(points + k * step * way, volts, None).ravel() for k in (0, 1, 2)]
+            exact[:, 2 * node + axis] = (4.0 * ends[1] - ends[2] - 3.0 * ends[0]) / (2.0 * step)
+    largest = np.abs(exact).max()
+    far = full.fringe_stiffness(points, volts, None).toarray()
+    assert np.abs(far - exact).max() < 0.03 * largest
+    monkeypatch.setattr(fullfield, "APART", size)
+    one_by_one = full.fringe_stiffness(points, volts, None).toarray()
+    assert np.abs(one_by_one - exact).max() < 1e-4 * largest
+
+
 def test_touching_nodes_are_pulled_as_by_the_law():
     """Where all of the outline touches, the field is that of insulator and skin in series."""
     pad, points = arc(10, 3.0, 2.0)
@@ -269,7 +300,8 @@ def test_bounds_know_what_fills_the_gap(filling):
     """
     film = ev.Layer(0.001, 3.9)
     x = np.linspace(0.0, 2.0, 5)
-    flat = certificate(x, np.full(5, 0.009), film, np.zeros(5), filling)
+    levels = np.stack([np.zeros(5), np.full(5, 0.009)])
+    flat = certificate(x, levels, film, np.zeros(5), filling)
     plate = ev.eps_0 * 2.0 / (0.009 / filling + 0.001 / 3.9)
     assert [flat.lower, flat.upper] == pytest.approx([plate, plate], rel=1e-12)
     pad, points = arc(30, 8.0, 2.0)
@@ -279,6 +311,30 @@ def test_bounds_know_what_fills_the_gap(filling):
     layers = ev.Layers.of(skin, film)
     full = FieldAttraction(law, layers, pad, surface, "normal", edges=facing(pad, points), skin=skin)
     full.check(points)
+
+
+def test_bounds_know_how_uneven_the_display_is():
+    """Between tilted plates, a layer of air alone, both follow from the distance along the normal; over
+    steep waves the field's capacitance is below the upper one.
+    """
+    x = np.linspace(0.0, 2.0, 5)
+    tilted = certificate(x, np.stack([0.5 * x, 0.5 * x + 0.01]), ev.Layer(0.0, 1.0), np.zeros(5))
+    assert tilted.upper == pytest.approx(ev.eps_0 * 2.0 / 0.01 * (1.0 + 0.5**2), rel=1e-12)
+    assert tilted.lower == pytest.approx(ev.eps_0 * 2.0 / 0.01, rel=1e-12)
+    pad, points = arc(60, 3.0, 2.0)
+    surface = ev.Sinusoid(terms=[[0.05, 8.0, 0.3]], insulator=ev.Layer(0.02, 4.0), y=0.0)
+    points[:, 1] = surface.height(points[:, 0]) + 0.01 + 0.1 * points[:, 0] ** 2
+    _, full = attractions(pad, points, surface, 0.0)
+    bounds = full.bounds(*full.outline(points, full.seen(points)))
+    value = full.solve(points).value
+    assert bounds.lower < value < bounds.upper
+    flat = certificate(
+        points[:, 0],
+        np.stack([0.0 * points[:, 0], points[:, 1] - surface.height(points[:, 0])]),
+        surface.insulator,
+        np.zeros(len(points)),
+    )
+    assert value > flat.upper  # the bound that took the display for flat
 
 
 DRY = ev.Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8)

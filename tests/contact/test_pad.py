@@ -167,9 +167,11 @@ def test_an_outline_may_bend_and_overhang_but_not_cross_itself():
 
 
 def test_a_stroke_beyond_the_end_of_another_crosses_nothing():
-    """The last one comes down through the line of the first, but behind its end."""
+    """The last one comes down through the line of the first, but behind its end, far from it or near."""
     overhang = [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [1.5, 1.0], [3.0, 1.0], [3.0, -2.0]]
     assert folded(overhang) is None
+    near = [[0.0, 0.0], [2.0, 1.0], [3.0, -1.0], [4.0, -1.0], [4.0, 2.0], [1.9, 1.2], [2.6, 0.9]]
+    assert folded(near) is None
 
 
 def test_neighbours_that_touch_must_not_change_places():

@@ -5,7 +5,7 @@ import pytest
 
 from evfem import FILM
 from evfem.electrostatics import eps_0, rigid_field
-from evfem.electrostatics.bounds import columns_sum, least_upper_sum
+from evfem.electrostatics.bounds import columns_sum, least_upper_sum, upper_sum
 from evfem.electrostatics.columns import Columns
 
 ROWS = np.linspace(0.0, 1.0, 5)
@@ -86,6 +86,32 @@ def test_a_capacitance_is_above_the_columns_and_below_the_vertical_field():
     value = FILM_AND_AIR.solve(x, levels).value / eps_0
     low = columns_sum(x, levels[2] + 0.09 / 3.35)
     assert low < value < least_upper_sum(x, levels[2], 0.09, 3.35)
+
+
+@pytest.mark.parametrize("rise", [0.3, -0.3])
+def test_the_upper_bound_over_a_slope_is_the_energy_of_its_potential(rise):
+    """The potential falls evenly through slab and air along each vertical; its gradient by differences,
+    its energy by quadrature over a wedge of air that opens with 0.1 above a ground that rises.
+    """
+    slab, eps, step = 0.02, 4.0, 1e-6
+
+    def potential(x, y):
+        above, gap = y - rise * x, 0.05 + 0.1 * x
+        distance = gap + slab / eps
+        return np.where(above < 0.0, 1.0 - (above + slab) / eps / distance, (gap - above) / distance)
+
+    at, weight = np.polynomial.legendre.leggauss(12)
+    x = 0.5 * (1.0 + at)[:, None]
+    energy = 0.0
+    for low, high, permittivity in ((-slab, 0.0, eps), (0.0, 0.05 + 0.1 * x, 1.0)):
+        y = rise * x + low + (high - low) * 0.5 * (1.0 + at)
+        along = (potential(x + step, y) - potential(x - step, y)) / (2.0 * step)
+        across = (potential(x, y + step) - potential(x, y - step)) / (2.0 * step)
+        square = permittivity * (high - low) * (along**2 + across**2)
+        energy += float(np.sum(0.25 * weight[:, None] * weight * square))
+    ends = np.array([0.0, 1.0])
+    distance = 0.05 + 0.1 * ends + slab / eps
+    assert upper_sum(ends, distance, slab / eps, eps, rise * ends) == pytest.approx(energy, rel=1e-6)
 
 
 def strips_pressure(period, slab, gap, volts):

@@ -48,6 +48,7 @@ def test_the_sentence_names_the_force_its_amount_and_the_place():
 def test_nothing_is_claimed_of_an_equilibrium_that_is_held():
     assert said(share=0.5)[0] == "nodes keep changing"
     assert said(share=0.5, unstable=True)[0].startswith("there is no equilibrium at rest")
+    assert not said(share=1e-4, unstable=True)[0].startswith("there is no equilibrium at rest")
     assert said(share=0.89)[0] == "nodes keep changing"
 
 

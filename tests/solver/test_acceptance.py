@@ -349,6 +349,35 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
 
 
+def test_a_node_that_sticks_again_yields_and_slips_in_series():
+    """Displaced by dx it slips by s = dx + C (F - F0) under B + K s, or not at all under less: the
+    contact problem, which knows F + T dx with the growth T, says both.
+    """
+    interface, old, new = legal(SURFACES[0], PenaltyInterface)
+    interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=0.7)
+    k, nothing, every = node(STICK), np.zeros(PAD.nodes.size), np.arange(PAD.nodes.size)
+    normal, shear = new.contact_force[k]
+    length, give = PAD.length(MESH.points[PAD.nodes, 0])[k], interface.compliance(old)[k, 1]
+    # the force before is such that it sticks under these penalties
+    before = np.zeros_like(old.contact_force)
+    old = replace(old, age=nothing, contact_force=before)
+    before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k] / give
+    interface.law, interface.duration, steep = law, 2e-3, 0.7 / give
+    interface._returned.nodes[k], interface._returned._slope[k] = True, steep * interface.duration
+    found = interface.candidates(old, new, every, nothing, nothing)
+    rest = float(law.bound(normal / length, MU, 0.0, 0.0)) * length
+    growth, way = found.slip_stiffness[k], -np.sign(shear)
+    limit = found.friction[k] * normal + found.cohesion[k]
+    assert growth == pytest.approx(steep / 1.7, rel=1e-12)
+    for slip, force in ((0.0, 0.9 * rest), (1e-4, rest + 1e-4 * steep)):
+        dx = way * slip - give * (-way * force - shear)
+        taken = -way * force + growth * dx  # what of the force is left to the contact problem
+        seen = found.slip[k] + dx + found.interface_compliance[k, 1] * taken
+        assert seen == pytest.approx(1.7 * way * slip, abs=1e-12)
+        assert (abs(taken) == pytest.approx(limit, rel=1e-9)) == (slip > 0.0)
+        assert abs(taken) <= limit * (1.0 + 1e-9)
+
+
 def test_iterations_go_on_only_where_their_fall_promises_the_end():
     """At 0.7 per iteration from 1e-6 on the tolerance is reached within half as many again."""
     limits = SimpleNamespace(strategy=Strategy(iterations=40), tolerance=1e-8)

@@ -140,7 +140,7 @@ def pulled_back(gap, slope=6.0, root=1.0):
 
 def gaps(shortens, steps=20):
     """Gaps (steps + 1,) of a node that starts closed."""
-    mixing, turning, now = Anderson(), Turning(), pulled_back(9.0)
+    mixing, turning, now = Anderson(), Turning(fringes=True), pulled_back(9.0)
     found = [0.0]
     for k in range(steps):
         after = pulled_back(now.u[0, 1])
@@ -158,7 +158,7 @@ def test_a_node_that_opens_and_closes_by_turns_is_found_in_between():
 
 
 def test_only_nodes_that_turn_back_in_vain_shorten_the_way():
-    turning, closed, opened = Turning(), pulled_back(9.0), pulled_back(0.0)
+    turning, closed, opened = Turning(fringes=True), pulled_back(9.0), pulled_back(0.0)
     for stalled in (False, False, True):
         assert turning.next_iterate(closed, opened, stalled) is opened  # it opens, and never closed again
     turning.reset()
@@ -170,3 +170,10 @@ def test_only_nodes_that_turn_back_in_vain_shorten_the_way():
     assert not part.contact_force.any()
     turning.reset()
     assert turning.next_iterate(opened, closed, True) is closed
+
+
+def test_under_the_column_law_the_way_is_never_shortened():
+    """A node that a column holds further away has to go there."""
+    turning, closed, opened = Turning(fringes=False), pulled_back(9.0), pulled_back(0.0)
+    for before, after in ((closed, opened), (opened, closed)) * 3:
+        assert turning.next_iterate(before, after, True) is after

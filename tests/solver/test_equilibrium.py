@@ -10,6 +10,7 @@ import pytest
 from tools.builders import INSULATOR, balance, benchmark_finger, finger
 from tools.meshes import block
 
+from evfem.common.constants import STUCK
 from evfem.contact import condensed
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
@@ -20,7 +21,7 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.solver.control import Force, GivenVoltage, Target
-from evfem.solver.state import StepFailed
+from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
 
 ROUND = finger(block(8, 3, sag=0.4))
@@ -408,6 +409,45 @@ def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
     assert not stuck(circle * 2 + circle[:4])
     assert stuck(circle * 3)
     assert not stuck([value * 0.9**i for i, value in enumerate(circle * 3)])
+
+
+def iterations_with(monkeypatch, opens):
+    """How many iterations are made while nothing is gained, if `opens` says of iteration i which nodes
+    are open after it.
+    """
+    model, old = pressed(Display())
+    solver = model.equilibrium
+
+    def after(i, state):
+        status = np.full(state.status.size, STICK)
+        status[opens(i)] = OPEN
+        return replace(state, status=status)
+
+    nothing_gained = Balance(np.zeros(1), 0.01, old.attraction)
+    monkeypatch.setattr(solver.body, "balance", lambda state, *_: (state, nothing_gained))
+
+    def advance(old, state, target, balance):
+        return after(len(solver.record.residuals), state)
+
+    monkeypatch.setattr(solver.body, "advance", advance)
+    monkeypatch.setattr(solver.body, "findings", lambda *_: "")
+    with pytest.raises(StepFailed, match="no equilibrium in"):
+        solver.step(after(0, old), Target.held(model.bone(0.0, 0.2), 0.0))
+    return len(solver.record.residuals)
+
+
+def test_iterations_go_on_while_a_front_of_contact_does(monkeypatch):
+    at_rest = iterations_with(monkeypatch, lambda i: [0])
+    assert at_rest < 20
+    # nodes that open by turns, and by turns of three
+    assert iterations_with(monkeypatch, lambda i: [i % 2]) == at_rest
+    assert iterations_with(monkeypatch, lambda i: [i % 3]) <= at_rest + 2
+    most = Strategy().iterations
+    assert iterations_with(monkeypatch, lambda i: np.arange(i // 3)) == most
+    # one that closes goes as far as the linear problems say
+    assert iterations_with(monkeypatch, lambda i: np.arange(15 - i // 3)) == at_rest
+    # one that rests is known to do so `STUCK` iterations later
+    assert iterations_with(monkeypatch, lambda i: np.arange(min(i, 24) // 3)) == 25 + STUCK
 
 
 def test_a_contact_problem_known_to_have_no_solution_is_not_solved_again(monkeypatch):

@@ -1,5 +1,7 @@
 """A spring, a damper and a mass between drive and bone, against what they do by themselves."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -11,6 +13,7 @@ from evfem.errors import InputError
 from evfem.scene.file import dump, loads
 from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
+from evfem.solver.hand import Grip
 
 pytestmark = pytest.mark.solver
 #: hardly deforms: 4 mm on 0.02 mm of 50 MPa
@@ -204,3 +207,26 @@ def test_the_hand_of_a_finger_has_the_published_slopes():
     assert hand.stiffness / (2.0 * np.pi * hand.damping) == pytest.approx(13.8 * 50.0)
     with pytest.raises(ev.InputError, match="speed"):
         ev.Hand.of_finger(0.0)
+
+
+def test_what_a_hand_lacks_beyond_its_rounding_is_nothing_at_the_nearest_place_alone():
+    """Against exact fractions: at the double next to the place where spring and mass balance a force
+    nothing is missing, and a few doubles further something is.
+    """
+    rng, k, m, dt = np.random.default_rng(3), Fraction(K), Fraction(M), Fraction(1e-7)
+    for x0, v0, R in rng.uniform([1.0, -90.0, -1.0], [2.0, 90.0, 1.0], (50, 3)).tolist():
+        grip = Grip(ev.Hand(K, 0.0, M), 1.5, 1e-7, (1.5, x0, v0))
+        rate = m / dt**2
+        exact = (k * Fraction(1.5) + rate * (Fraction(x0) + Fraction(v0) * dt) - Fraction(R)) / (k + rate)
+        x, reaction = float(exact), np.array([R, 0.0])
+        assert grip.unbalanced(x, reaction) == 0.0
+        for way in (-1.0, 1.0):
+            beyond = grip.unbalanced(x + way * 16.0 * np.spacing(x), reaction)
+            assert 0.0 < beyond < abs(grip.missing(x + way * 16.0 * np.spacing(x), reaction))
+
+
+def test_a_mass_that_moves_for_a_tenth_of_a_microsecond_is_balanced_to_its_rounding():
+    """A kilonewton per millimetre at x = 1 mm: half a digit of it is 200 times the tolerance."""
+    result = ev.simulate(slab(ev.Hand(K, 0.0, M), slid(1.0, 1), slid(1e-7, 1), mu=0.0))
+    assert result.substeps.tolist() == [1, 1, 1]
+    assert result.position[-1] == pytest.approx(result.position[-2], abs=1e-6)

@@ -16,6 +16,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.solver.condensation import Singular
+from evfem.solver.linearisation import in_vain
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import NeoHookean
@@ -369,3 +370,74 @@ def test_what_the_deepest_press_may_reach_is_chosen_at_once():
     inside = set(np.flatnonzero(height - height.min() <= 0.8))
     assert inside <= chosen[0]
     assert not inside <= chosen[1]
+
+
+# -- the field's own stiffness ---------------------------------------------------------------------------
+
+#: a voltage whose coupling is not faint
+VOLTS = 4000.0
+#: residuals that gain nothing
+VAIN = [0.5, 0.02, 0.01, 0.03, 0.02, 0.03, 0.02, 0.03, 0.02]
+
+
+def test_iterations_in_vain_are_known_from_the_residuals():
+    assert in_vain(VAIN)
+    assert not in_vain(VAIN[:8])
+    assert not in_vain([*VAIN, 9e-3])
+    assert not in_vain([*VAIN, 2.0])  # the bone is still on its way
+
+
+@pytest.fixture
+def under_the_field():
+    """A linearisation under the full field, its model, and a state 0.1 mm above the display."""
+    linear, model, state = made(voltage=VOLTS, law=StrongTroxel(), field="full", direction="normal")
+    linear.choose_candidates(state, 0.5)
+    linear.refactorise_if_needed(state, [])
+    return linear, model, state
+
+
+def coupled(linear, state):
+    """The factorised tangent's compliance."""
+    linear.refactorise_if_needed(state, VAIN)
+    return linear.tangent.compliance
+
+
+def test_in_vain_the_tangent_is_that_of_the_field(under_the_field):
+    """But for what weakens with a node's own gap: that belongs to the contact problem."""
+    linear, model, state = under_the_field
+    found = coupled(linear, state)
+    assert linear.fringes
+    unknowns = (2 * linear.candidates[:, None] + np.arange(2)).ravel()
+    attraction, place = model.equilibrium.attraction, linear.interface.resting(state)
+    field = attraction.fringe_stiffness(place, VOLTS, state.contact_force[:, 0]).toarray()
+    own = np.zeros_like(unknowns, dtype=float)
+    own[1::2] = linear.negative_stiffness(state)[linear.candidates]
+    coupling = field[np.ix_(unknowns, unknowns)] - np.diag(own)
+    inner = slice(4, -4)  # nodes outside move along with the outermost candidates
+    known = (linear.tangent.schur[:-2, :-2] - np.linalg.inv(found))[inner, inner]
+    np.testing.assert_allclose(known, coupling[inner, inner], atol=1e-6 * np.abs(coupling).max())
+    by_columns = attraction.stiffness(place, VOLTS, linear.touching).toarray()[np.ix_(unknowns, unknowns)]
+    assert np.abs(field[np.ix_(unknowns, unknowns)] - by_columns).max() > 0.01 * np.abs(coupling).max()
+
+
+def test_the_fields_stiffness_serves_one_step(under_the_field):
+    linear, _, state = under_the_field
+    assert linear.reusable is not None
+    coupled(linear, state)
+    assert linear.reusable is None
+    linear.begin(state, False)
+    assert not linear.fringes
+    assert linear.refactorise_if_needed(state, [])
+    assert linear.reusable is not None
+
+
+def test_a_field_that_contact_does_not_hold_is_left_for_the_step(under_the_field):
+    linear, _, state = under_the_field
+    assert not linear.leave_fringes()
+    coupled(linear, state)
+    assert linear.leave_fringes()
+    coupled(linear, state)
+    assert not linear.fringes
+    linear.begin(state, False)
+    coupled(linear, state)
+    assert linear.fringes

@@ -25,6 +25,7 @@ from evfem.simulation.model import make_model
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
+from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Patience, Relaxation
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
@@ -217,6 +218,24 @@ def test_friction_on_the_way_is_counted(point):
     slipped = np.diff(result.friction_dissipation)[crossed - 1] / load
     assert (slipped > 0.5 * LENGTH).all()
     assert (slipped < 1.1 * LENGTH).all()
+
+
+def test_tissue_without_time_snaps_below_a_heavy_hand_that_stays_where_it_is(point):
+    """The tip jumps to the next trough at once, as without a hand, and no other column has what that
+    sets free; the bone goes on.
+    """
+    lost, speed = point.bone(point.snap()), 10.0
+    hand = Hand(stiffness=50.0, damping=0.02, mass=1e-5)
+    slides = [Slide(lost - AHEAD, steps=10, speed=speed), Slide(2.0 * AHEAD, steps=1, speed=speed)]
+    result = simulate(scene(*slides, hand=hand))
+    assert result.relaxations.tolist() == [0] * 14 + [1]
+    bones = result.position[[13, 14]]
+    tips = np.array([point.before(bones[0]), point.beyond(bones[1])])
+    np.testing.assert_allclose(result.tangential_force[[13, 14]], point.kx * (bones - tips), rtol=1e-6)
+    freed = point.energy(point.snap(), lost) - point.energy(point.beyond(lost), lost)
+    assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.1)
+    assert bones[1] - bones[0] == pytest.approx(2.0 * AHEAD, rel=1e-3)
+    assert left_over(result).max() < 1e-6
 
 
 @pytest.mark.slow

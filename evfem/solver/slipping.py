@@ -1,0 +1,132 @@
+r"""Nodes that go to and fro under a law of friction, in the iterations of one step.
+
+The contact problem sees a law by its tangent at the iterate. Where a node comes back to where it has
+been, the tangents do not lead to the law, and what has been seen of it takes their place:
+
+- friction that rises steeply from rest with the speed and levels off, or has a kink there: `Returned`,
+- friction that grows less and less with the load, of a node that it presses: `Wedged`. With the load
+  :math:`\lambda_n = \alpha + \beta T` under the shear force T, equilibria are the roots of
+  :math:`b(\alpha + \beta T) = T`. Where the node would leave the surface without friction,
+  :math:`\alpha < 0`, a concave bound b has two of them, or none once they have met. Its tangents lie
+  above b and have roots all the same, so that they go on for ever; T = 0, an open node, solves the
+  contact problem all the while.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import NEAR, WEDGED
+from evfem.contact.friction import Linearised, Slipping
+from evfem.contact.signorini import FORWARD, OPEN, STICK
+from evfem.protocols import FrictionLaw
+
+#: of an interval of speeds: to the last digit of a double
+HALVINGS = 60
+
+
+class Returned:
+    """Nodes that have slipped and stick again: `nodes` (P,) bool.
+
+    Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
+    a node at rest which the friction of rest does not: the iterations would let it slip and stick by
+    turns. Where it has a kink, the tangent of either side may lead to the other one. Such a node is
+    seen where the law says its present force, by the tangent there; where it sticks under more than
+    the friction of rest, by the chord from rest to there. If the law says that force of no speed up to
+    the highest that the node has had, it slips along the steepest of the chord of the law from rest,
+    the tangent and the slope that it had last, once near along the tangent; where it sticks,
+    friction rises with its slip as it did last.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.nodes = np.zeros(size, dtype=bool)
+        self._slipped = np.zeros(size, dtype=bool)
+        self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
+        self._fastest = np.zeros(size)
+
+    def linearised(
+        self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats
+    ) -> Linearised:
+        """The law as the nodes c (k,) shall see it at an iterate with statuses and shear forces (k,)."""
+        self.watch(c, status)
+        self._fastest[c] = np.maximum(self._fastest[c], moving.speed)
+        seen = moving.linearised(law)
+        seen = replace(seen, by_speed=self.slopes(c, moving.speed, seen.by_speed, moving.chord(law)))
+        back = self.nodes[c] & (status != OPEN)
+        if not back.any():
+            return seen
+        speed = speed_under(law, moving, force, np.where(back, self._fastest[c], 0.0))
+        there = replace(moving, speed=speed)
+        tangent, bound = there.linearised(law), there.bound(law)
+        sticks, slips = (speed > 0.0) & (status == STICK), (speed > 0.0) & (status >= FORWARD)
+        # what the tangent says of the present speed
+        share = 1.0 + tangent.by_speed * (moving.speed - speed) / np.where(slips, bound, 1.0)
+        slips &= (share > 0.0) & (tangent.by_speed > 0.0)
+        return Linearised(
+            np.where(slips, share * tangent.slope, seen.slope),
+            np.where(slips, share * tangent.offset, seen.offset),
+            np.select([slips, sticks], [tangent.by_speed, there.chord(law)], seen.by_speed),
+            np.where(slips, share * tangent.by_mu, seen.by_mu),
+        )
+
+    def watch(self, c: Ints, status: Ints) -> None:
+        """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
+        self.nodes[c] |= self._slipped[c] & (status == STICK)
+        self._slipped[c] |= status >= FORWARD
+
+    def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
+        """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an
+        iterate with slips (k,), 0 where they stick.
+        """
+        near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
+        steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
+        slope = np.where(self.nodes[c] & ~near, steepest, tangent)
+        slips = slip != 0.0
+        self._slip[c] = slip
+        self._slope[c] = np.where(slips & (slope > 0.0), slope, self._slope[c])
+        return np.where(slips, slope, np.where(self.nodes[c], self._slope[c], 0.0))
+
+
+def speed_under(law: FrictionLaw, seen: Slipping, force: Floats, fastest: Floats) -> Floats:
+    """Speeds (k,) in mm/s, up to `fastest` (k,), at which the friction of nodes is `force` (k,) in N/mm,
+    by bisection; 0 where rest bears it or no such speed does.
+    """
+    low, high = np.zeros_like(force), np.array(fastest)
+    within = (replace(seen, speed=low).bound(law) < force) & (replace(seen, speed=high).bound(law) >= force)
+    for _ in range(HALVINGS if within.any() else 0):
+        middle = 0.5 * (low + high)
+        below = replace(seen, speed=middle).bound(law) < force
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.where(within, high, 0.0)
+
+
+class Wedged:
+    """Nodes that slip where friction has no equilibrium left: the tangent below and the tangent above
+    both put it too high, and each leads to where the other one holds. Where that has been seen, the
+    contact problem begins with the node open.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._turns, self._way = np.zeros(size, dtype=np.int64), np.zeros(size)
+        self._force, self._concave = np.full(size, np.nan), np.zeros(size, dtype=bool)
+
+    def opens(self, c: Ints, normal: Floats, beyond: Any, concave: Any) -> Any:
+        """Which of the nodes c (k,) begin open, at an iterate with contact forces (k,), where they slip
+        and hold more than the law allows (k,) bool, and where the tangent of the law leaves friction at
+        no load (k,) bool: once in a step.
+
+        >>> wedged, node, yes = Wedged(1), np.array([0]), np.array([True])
+        >>> [bool(wedged.opens(node, np.array([p]), yes, yes)[0]) for p in (2.0, 3.0, 1.9, 3.1)]
+        [False, False, False, True]
+        """
+        self._concave[c] |= concave
+        way = np.sign(normal - self._force[c])
+        turned = beyond & (way * self._way[c] < 0.0)
+        self._way[c] = np.where(beyond & np.isfinite(way), way, 0.0)
+        self._force[c] = np.where(beyond, normal, np.nan)
+        self._turns[c] += turned
+        return turned & self._concave[c] & (self._turns[c] == WEDGED)
