@@ -100,23 +100,25 @@ class ExtraUnknowns:
 
 @dataclass(frozen=True)
 class Roughness:
-    """Attraction of nodes between rough faces: stronger by `gain` (k,), below 1, times the contact
-    force, and weaker by `loss_on_opening` (k,) N/mm where a node opens that touched.
+    """Attraction between rough faces, along normals, then tangents: stronger by `gain` (2 k,) times
+    what a contact force has beyond `present` (k,), weaker by `loss_on_opening` (2 k,) N/mm where open.
     """
 
     gain: Floats
     loss_on_opening: Floats
+    present: Floats
 
     def of(self, nodes: Ints) -> Roughness:
         """Of these nodes alone."""
-        return Roughness(self.gain[nodes], self.loss_on_opening[nodes])
+        gain, loss = (each.reshape(2, -1)[:, nodes].ravel() for each in (self.gain, self.loss_on_opening))
+        return Roughness(gain, loss, self.present[nodes])
 
 
 @dataclass(frozen=True)
 class AttractionStiffness:
     """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
     per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0, without a contact force. `roughness` says how it depends on that.
+    `gain_on_closing` (k,) at g = 0. `roughness` says how it depends on the contact force there.
     """
 
     negative_stiffness: Floats
@@ -335,18 +337,16 @@ def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: I
 
 
 def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:
-    """Open nodes whose attraction changes with the gap, drops of the attraction (2 k,) that follow
-    from the statuses alone, and its gain per contact force (k,), which rough faces have.
-    """
+    """Open nodes that it pulls less with the gap, drops (2 k,) by status, gain per contact force (2 k,)."""
     k, attraction = problem.size, problem.attraction
-    drop, gain = np.zeros(2 * k), np.zeros(k)
+    drop, gain = np.zeros(2 * k), np.zeros(2 * k)
     if attraction is None:
         return np.zeros(0, dtype=np.int64), drop, gain
     is_open = status == OPEN
     drop[:k] = np.where(is_open, 0.0, -attraction.gain_on_closing)
     if attraction.roughness is not None:
-        drop[:k] += np.where(is_open, attraction.roughness.loss_on_opening, 0.0)
-        gain = attraction.roughness.gain
+        rough, gain = attraction.roughness, attraction.roughness.gain
+        drop += np.where(np.tile(is_open, 2), rough.loss_on_opening, gain * np.tile(rough.present, 2))
     return np.flatnonzero(is_open & (attraction.negative_stiffness > 0.0)), drop, gain
 
 
@@ -356,20 +356,19 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     """
     k, C, extra, attraction = problem.size, problem.compliance, problem.extra_unknowns, problem.attraction
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
-    # shear force per pressing force of slipping nodes: against the slip
     against = (status == BACKWARD).astype(float) - (status == FORWARD)
-    ratio = problem.friction * against
+    ratio = problem.friction * against  # shear force per pressing force of slipping nodes
     attracted, drop, gain = _attracted(problem, status)
-    gain = gain[active]
+    gain, aside = gain[active], gain[k + active]
     rows = np.concatenate([active, k + stick, attracted])
     matrix, right, known = C[np.ix_(rows, rows)], -problem.start[rows], drop
     matrix[:, : active.size] *= 1.0 - gain
     if problem.give is not None:
         pressed = np.arange(rows.size - attracted.size)
         matrix[pressed, pressed] += problem.give[rows[pressed]]
-    slipping = np.flatnonzero(ratio[active])
-    if slipping.size:
-        matrix[:, slipping] += C[np.ix_(rows, k + active[slipping])] * ratio[active[slipping]]
+    sheared = ratio[active] - aside
+    if (some := np.flatnonzero(sheared)).size:
+        matrix[:, some] += C[np.ix_(rows, k + active[some])] * sheared[some]
     if attraction is not None:
         right -= C[rows] @ drop
         own = np.arange(rows.size - attracted.size, rows.size)
@@ -382,7 +381,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     if extra is not None:
         row = extra.rows[:, rows]
         row[:, : active.size] *= 1.0 - gain
-        row[:, : active.size] += extra.rows[:, k + active] * ratio[active]
+        row[:, : active.size] += extra.rows[:, k + active] * sheared
         matrix = bordered(matrix, extra.columns[rows], row, extra.pivot)
         right = np.append(right, extra.right - extra.rows @ known)
     try:
@@ -393,7 +392,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
     drop[attracted] += x[contact : rows.size]
-    drop[active] -= gain * x[: active.size]
+    drop[np.append(active, k + active)] -= np.append(gain, aside) * np.tile(x[: active.size], 2)
     force[k:] += ratio * force[:k]
     if problem.cohesion is not None:
         force[k:] += problem.cohesion * against

@@ -219,7 +219,9 @@ SOLVER = {
 STRATEGY = {
     "iterations": Text("", "most of one part of a step"),
     "patience": Text("", "iterations with an old factorisation before it is renewed"),
-    "smallest_part": Text("", "of what is left of a step, before it counts as not converged"),
+    "smallest_part": Text(
+        "", "of what is left of a step before it counts as not converged; its square if time passes"
+    ),
     "easy": Text("", "iterations of a part after which the next one may be longer"),
     "growth": Text("", "by which factor"),
     "reach": Text("", "first guess: so many of the last part's displacements ahead"),

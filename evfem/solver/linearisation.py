@@ -257,9 +257,7 @@ class Linearisation:
         return self.attraction.negative_stiffness(place, state.voltage, self.touching, pressing)
 
     def gain_on_closing(self, state: State) -> Floats:
-        """What the attraction of every pad node gains when its gap closes (P,) in N/mm, at no
-        contact force.
-        """
+        """What the attraction of every pad node gains when its gap closes (P,) in N/mm."""
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
@@ -270,12 +268,12 @@ class Linearisation:
             ]
             for s in (state, everywhere)
         )
-        gain, rough = np.maximum(now - closed, 0.0), self.roughness(state)
-        return gain if rough is None else gain - rough.gain * pressing
+        return np.asarray(np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
         """How the attraction of every pad node depends on its contact force, where rough faces come
-        closer under it; None without them. What grows faster than the contact force itself would
+        closer under it, along normal and tangent: on a slope what pulls down moves the node sideways
+        too. None without them. What grows faster than the contact force itself would
         find no equilibrium: it is cut to `STABLE`.
         """
         attraction = self.attraction
@@ -291,8 +289,13 @@ class Linearisation:
             attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
             for each in (None, pressing)
         )
+        surface = self.interface.surface_at(state)
+        along = np.stack([1.0 / surface.stretch, surface.slope / surface.stretch])
+        if attraction.direction == "normal":
+            along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
-        return Roughness(np.minimum(gain, STABLE), unpressed - pressed)
+        gain = np.minimum(gain, STABLE / along[0])
+        return Roughness((gain * along).ravel(), ((unpressed - pressed) * along).ravel(), pressing)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own

@@ -161,7 +161,7 @@ class Stepper:
         returned, and the part that worked before is tried next. Raises `failed` at the smallest part
         of what was left of the step.
         """
-        release, least = self._release, self.equilibrium.strategy.smallest_part
+        release, least = self._release, self._least(part.target)
         self.cuts += 1
         release.unstable = failed.unstable = release.unstable or failed.unstable
         self.substep = half = 0.5 * (part.end - part.begin)
@@ -176,6 +176,14 @@ class Stepper:
         self.substep, release.unstable = min(1.0, max(release.trusted, release.least)), False
         release.least *= COARSER
         return rest
+
+    def _least(self, target: Target) -> float:
+        """The smallest part of what is left of a step: a smaller one where it takes time, for tissue
+        with viscosity or inertia is the stiffer, the shorter the part.
+        """
+        least = self.equilibrium.strategy.smallest_part
+        timed = self.body is not None and not Relaxation(self.body, self.solve).applies(target)
+        return least**2 if timed else least
 
     def _keeps(self, error: float, part: float) -> bool:
         """Whether a part with this error of its path is accepted; if not, the next one is shorter."""

@@ -33,7 +33,9 @@ class Strategy:
 
     `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
     the factorisation when more iterations than this would be left with the old one;
-    `smallest_part`: of what is left of a requested step, before it counts as not converged;
+    `smallest_part`: of what is left of a requested step, before it counts as not converged, and its
+    square where the step takes time, for tissue with viscosity or inertia is the stiffer the shorter a
+    part;
     `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`: a
     part begins at most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
     where short parts fail, and take no time, the finger is released and comes to rest at another

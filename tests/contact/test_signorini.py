@@ -415,11 +415,14 @@ def test_an_attraction_is_scaled_to_what_the_closed_nodes_hold_where_they_stay()
     assert found.state[1] == pytest.approx(1.0 + 0.02 / (1.0 - 0.9), rel=1e-9)
 
 
-def rough_node(gap, gain, loss=0.0, closing=0.0):
-    """A node of compliance 0.1 mm per N/mm whose attraction grows with its contact force."""
+def rough_node(gap, gain, loss=0.0, aside=(0.0, 0.0)):
+    """A node of compliance 0.1 mm per N/mm whose attraction grows with its contact force beyond 2 N/mm,
+    where it is stronger by 2 gains; `aside`: gain and loss along the tangent.
+    """
     problem = ContactProblem(np.array([gap, 0.02]), 0.1 * np.eye(2), np.array([0.5]))
-    rough = Roughness(np.array([gain]), np.array([loss]))
-    return problem, AttractionStiffness(np.zeros(1), np.zeros(1), np.array([closing]), rough)
+    gains, losses = np.array([gain, aside[0]]), np.array([loss, aside[1]])
+    rough = Roughness(gains, losses, np.array([2.0]))
+    return problem, AttractionStiffness(np.zeros(1), np.zeros(1), np.array([2.0 * gain]), rough)
 
 
 def test_a_rough_node_presses_with_what_its_own_attraction_leaves():
@@ -434,6 +437,23 @@ def test_a_rough_node_presses_with_what_its_own_attraction_leaves():
     slipped = solve_with_attraction(sliding, pull, np.array([STICK]))
     assert slipped.status.tolist() == [FORWARD]
     assert slipped.force[1] == pytest.approx(-0.5 * found.force[0], rel=1e-12)
+
+
+def test_on_a_slope_a_rough_node_is_pulled_sideways_by_what_presses_it():
+    """Its 10 N/mm of contact force are 8 more than at present and pull 2.4 N/mm to the side: friction
+    holds them against the 0.02 mm / C that it has slipped, or loses 3 N/mm of them as it opens.
+    """
+    problem, pull = rough_node(gap=-0.4, gain=0.6, aside=(0.3, 0.0))
+    held = solve_with_attraction(problem, pull, np.array([STICK]))
+    assert held.force[0] == pytest.approx(10.0, rel=1e-12)
+    assert held.attraction_drop[1] == pytest.approx(-0.3 * 8.0, rel=1e-12)
+    assert held.force[1] == pytest.approx(2.4 - 0.02 / 0.1, rel=1e-12)
+    sliding = replace_start(problem, [-0.4, 9.0])
+    slipped = solve_with_attraction(sliding, pull, np.array([STICK]))
+    assert slipped.state[1] == pytest.approx(9.0 + 0.1 * (-5.0 - 2.4), rel=1e-12)
+    problem, pull = rough_node(gap=1.0, gain=0.6, aside=(0.3, 3.0))
+    opened = solve_with_attraction(problem, pull, np.array([STICK]))
+    assert opened.state[1] == pytest.approx(0.02 + 0.1 * 3.0, rel=1e-12)
 
 
 def replace_start(problem, start):

@@ -98,6 +98,35 @@ def test_the_smallest_part_is_the_last_one_tried():
         ways(Strategy(smallest_part=0.26), 0.3)
 
 
+@dataclass(frozen=True)
+class Timed:
+    """A place that is reached in so many seconds."""
+
+    x: float
+    duration: float
+
+
+class Lasting(Steps):
+    """The same for targets that say how long they take; nothing counts but where they are."""
+
+    def step(self, old, target, frozen=None, start=None):
+        return super().step(old, target.x)
+
+
+@pytest.mark.parametrize(("duration", "smallest"), [(1.0, 1 / 16), (0.0, 1 / 4)])
+def test_a_step_that_takes_time_has_parts_down_to_the_square_of_the_smallest(duration, smallest):
+    """Viscosity and inertia hold the more, the shorter a part is."""
+
+    def followed(longest):
+        steps = Lasting(Strategy(smallest_part=0.25, growth=1.0, relaxation=False), longest)
+        stepper = Stepper(steps, body=SimpleNamespace(dynamics="viscous", drag_rate=0.0))
+        return stepper.follow(0.0, lambda _, share: Timed(share, duration), Unbooked())[1]
+
+    assert followed(smallest) == round(1 / smallest)
+    with pytest.raises(StepFailed):
+        followed(0.99 * smallest)
+
+
 class Snapping(Steps):
     """Nothing is found from these places on; a release takes them as they are."""
 
