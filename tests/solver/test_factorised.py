@@ -131,7 +131,7 @@ def test_new_tangents_that_gain_little_are_known_from_the_residuals():
 @pytest.mark.filterwarnings("ignore:a finger of")
 def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     """A nail of 200 MPa above a finger that hovers: iterations that went on would shuffle its last
-    digits.
+    digits, and the step would be cut. Whether the third or fourth is small enough is the machine's.
     """
     results = [
         simulate(
@@ -146,7 +146,8 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
         )
         for tolerance in (1e-8, 1e-11)
     ]
-    assert results[1].newton_iterations[0] <= 3
+    assert results[1].newton_iterations[0] <= 5
+    assert results[1].substeps[0] == 1
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
 
 
