@@ -151,7 +151,7 @@ class ContactProblem:
         """Number of candidate nodes k."""
         return self.friction.size
 
-    @property
+    @cached_property
     def under_forces(self) -> Floats:
         """Compliance (2 k, 2 k) of body and interface to contact forces."""
         return self.compliance if self.give is None else self.compliance + np.diag(self.give)
