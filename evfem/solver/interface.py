@@ -291,10 +291,15 @@ class Interface:
         return float(gap[sunk].max()) if sunk.any() else None
 
     def _strayed(self, old: State, state: State, x: Floats) -> Any:
-        """Pinned nodes (P,) that have slipped away to where the coefficient is another one."""
+        """Pinned nodes (P,) that have slipped away to where the coefficient is another one, or whose
+        interface has yielded to where it does not hold them.
+        """
         nodes = np.arange(x.size)
         pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
-        return self.pins.held & (state.status >= FORWARD) & (pinned != self.friction(old, nodes, x))
+        here, slips = self.friction(old, nodes, x), state.status >= FORWARD
+        yielded = np.abs(x - self.pins.x) > self.tolerance * self.length
+        beyond = np.abs(state.contact_force[:, 1]) > self._resting_limit(old, state, here) + self._weak(state)
+        return self.pins.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
         """Forces (N/mm) below which a law of contact or friction holds."""
@@ -306,7 +311,8 @@ class Interface:
         short = self.tolerance * self.length
         active = state.status != OPEN
         weak = self._weak(state)
-        if self.pins.release(self._lower_limit(old, state), state.contact_force[:, 1], weak):
+        lower = self._resting_limit(old, state, self.pins.lower)
+        if self.pins.release(lower, state.contact_force[:, 1], weak):
             return False
         if self.pins.let_go(self._strayed(old, state, position[:, 0])):
             return False
@@ -331,12 +337,11 @@ class Interface:
         closed = (np.abs(gap) <= short) & (normal >= -weak)
         return bool((closed & sticks & slips).all())
 
-    def _lower_limit(self, old: State, state: State) -> Floats:
-        """Shear forces (P,) that hold a node on the smoother side of the jump that it is pinned to."""
-        lower = self.pins.lower
+    def _resting_limit(self, old: State, state: State, mu: Floats) -> Floats:
+        """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
         if self.law is None:
-            return np.asarray(lower * state.contact_force[:, 0])
-        return self._slipping(old, state, np.arange(lower.size), lower, np.zeros(lower.size)).bound(self.law)
+            return np.asarray(mu * state.contact_force[:, 0])
+        return self._slipping(old, state, np.arange(mu.size), mu, np.zeros(mu.size)).bound(self.law)
 
 
 class PenaltyInterface(Interface):

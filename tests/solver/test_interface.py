@@ -13,7 +13,7 @@ from evfem.common.constants import CHANGES, HAIR
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.scene.motion import Press
-from evfem.scene.scene import Scene
+from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.solver.interface import Pins, steps_of_friction
 
@@ -22,11 +22,11 @@ SURFACES = [Flat(y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1)]
 surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"])
 
 
-def interface_and_state(surface, statuses):
+def interface_and_state(surface, statuses, solver=None):
     """The interface of a pad about 0.1 mm above the surface, and a state whose nodes have these
     statuses.
     """
-    model = make_model(Scene(ROUND, surface, motion=[Press(indentation=0.1)]))
+    model = make_model(Scene(ROUND, surface, motion=[Press(indentation=0.1)], solver=solver or Solver()))
     state = model.equilibrium.rest(np.zeros(2), 0.0)
     status = np.resize(statuses, state.status.size)
     return model.equilibrium.interface, replace(state, status=status)
@@ -130,6 +130,29 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
         force[node] = [5.0, shear]
         assert interface.obeyed(old, replace(old, u=u, status=status, contact_force=force)) == obeyed
     assert not interface.pins.held.any()
+
+
+@jumps
+@pytest.mark.parametrize(("shear", "obeyed"), [(2.0, False), (0.9, False), (-2.0, True)])
+def test_a_pinned_node_does_not_yield_to_where_nothing_holds_it(table, shear, obeyed):
+    """Friction of 0.6 times 5 N/mm holds 2 N/mm on the rougher side; those that push the node through
+    the yielding interface on to the smoother one, 0.2 times 5 do not. Nor do 0.9 N/mm, below these 1,
+    keep it pinned.
+    """
+    penalty = Solver(contact="penalty", penalty_normal=1e3, penalty_tangential=1e3)
+    interface, old = interface_and_state(Flat(friction=table, y=-0.1), [STICK], penalty)
+    position, rougher = interface.positions(old.u), 1.0 if table[-1][1] == 0.6 else -1.0
+    node = int(np.argmin(np.abs(position[:, 0] - 0.3)))
+    place, force = 0.3 + rougher * HAIR, np.array([5.0, rougher * shear])
+    interface.pins.x[node], interface.pins.lower[node] = place, 0.2
+    give = interface.compliance(old)[node]
+    u, every = old.u.copy(), np.zeros_like(old.contact_force)
+    u[interface.pad.nodes[node]] += [place - give[1] * force[1], -0.1 - give[0] * force[0]] - position[node]
+    every[node] = force
+    status = np.where(np.arange(len(position)) == node, STICK, OPEN)
+    state = replace(old, u=u, status=status, contact_force=every)
+    assert interface.obeyed(old, state) == obeyed
+    assert interface.pins.held[node] == obeyed
 
 
 def test_short_ramps_of_friction_are_jumps_at_their_rougher_end():
