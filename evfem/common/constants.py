@@ -79,6 +79,8 @@ UPDATED                 share of the closed nodes' unknowns that may be exchange
                         are factorised again
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
+LEFT_OVER               least share of a contact force that the tangent leaves where the          attraction
+                        attraction between rough faces grows as fast as it
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
 ROUNDING                violations below this fraction of the largest force are rounding
 UNHELD                  pivots of the bone below this fraction belong to a body without a hold
@@ -162,6 +164,7 @@ DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 DISC_OWN, DIVERGED = 0.1, 1e6
 STABLE = 0.9
+LEFT_OVER = 0.01
 LOST = 3
 ROUNDING = 1e-12
 UNHELD = 1e-10

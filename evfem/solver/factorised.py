@@ -264,7 +264,7 @@ class FactorisedBody:
         except ContactNotSolved:
             if search == "never" or not step.unknowns:
                 raise
-            found, bone = self.travel.searched(step)
+            found, bone = self.travel.searched(step, state)
             driven = DrivenStep(found)
         if driven.change:
             saved = saved + driven.change * driven.unit

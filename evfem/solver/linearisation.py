@@ -33,6 +33,7 @@ from evfem.common.constants import (
     FAR,
     FIRST,
     HELD,
+    LEFT_OVER,
     LONGER,
     SHORTER,
     SLOW,
@@ -55,6 +56,20 @@ from evfem.tissue.body import Body
 def in_vain(residuals: list[float]) -> bool:
     """Whether the last four iterations have gained nothing, with the bone where it should be."""
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
+
+
+def steadied(gain: Floats) -> Floats:
+    """Gains of the attraction per contact force (P,) as the tangent takes them.
+
+    What a contact force of 1 leaves is 1 - gain. Where that is nothing the node's equilibrium folds, and
+    beyond, the force grows by itself until the rough faces are close: iterations are to leave such a
+    place, and to come to one below 1 by its own tangent. So beyond `STABLE` the tangent takes
+    abs(1 - gain), from `LEFT_OVER` to 1 - `STABLE`.
+
+    >>> steadied(np.array([0.5, 0.95, 1.0, 1.05, 8.0])).round(12).tolist()
+    [0.5, 0.95, 0.99, 0.95, 0.9]
+    """
+    return np.where(gain > STABLE, 1.0 - np.clip(np.abs(1.0 - gain), LEFT_OVER, 1.0 - STABLE), gain)
 
 
 class Linearisation:
@@ -273,8 +288,7 @@ class Linearisation:
     def roughness(self, state: State) -> Roughness | None:
         """How the attraction of every pad node depends on its contact force, where rough faces come
         closer under it, along normal and tangent: on a slope what pulls down moves the node sideways
-        too. None without them. What grows faster than the contact force itself would
-        find no equilibrium: it is cut to `STABLE`.
+        too. None without them.
         """
         attraction = self.attraction
         if (
@@ -294,7 +308,7 @@ class Linearisation:
         if attraction.direction == "normal":
             along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
-        gain = np.minimum(gain, STABLE / along[0])
+        gain = steadied(gain * along[0]) / along[0]
         return Roughness((gain * along).ravel(), ((unpressed - pressed) * along).ravel(), pressing)
 
     def _coupling(self, state: State) -> Floats | None:

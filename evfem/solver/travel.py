@@ -5,6 +5,7 @@ that is too long for a linear step, or searched for where no travel settles the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,13 +60,14 @@ class Travel:
         least = SEARCH_START * self.longest
         return float(np.clip(2.0 * gap, least, self.longest))
 
-    def searched(self, step: LinearContactStep) -> tuple[StepSolution, Floats]:
+    def searched(self, step: LinearContactStep, state: State) -> tuple[StepSolution, Floats]:
         """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
         travel settles it: an attraction that is extrapolated over a long way has none, for
         example.
 
         The travel grows towards the lacking force, twice as far each time, and is halved where
-        that overshoots.
+        that overshoots. A body that hovers is attracted the more, the lower it is, and lacks more on
+        its whole way to where it touches: it goes there at once.
         """
 
         def at(travel: float) -> tuple[float, StepSolution, Floats]:
@@ -77,6 +79,7 @@ class Travel:
         first = best = at(0.0)
         travel = 0.0
         way = float(np.copysign(SEARCH_START * self.longest, first[0]))
+        falls = first[0] < 0.0 and not first[1].status.any()
         for _ in range(SEARCH_LIMIT):
             try:
                 new = at(travel + way)
@@ -90,4 +93,9 @@ class Travel:
             best, travel = new, travel + (new[2] - best[2])[step.unknowns[0].axis]
             if abs(best[0]) < SEARCH_END * abs(first[0]):
                 break
+        if travel == 0.0 and falls:
+            for part in range(SEARCH_LIMIT):
+                with suppress(ContactNotSolved):
+                    best = at(-(0.5**part) * self._longest_flight(state))
+                    break
         return best[1], best[2]

@@ -18,7 +18,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.solver.condensation import Singular
-from evfem.solver.linearisation import in_vain
+from evfem.solver.linearisation import in_vain, steadied
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import NeoHookean
@@ -303,6 +303,28 @@ def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_a
     np.testing.assert_allclose(found.loss_on_opening, loss, atol=neighbours * loss.max())
     np.testing.assert_array_equal(found.present, pressing)
     assert 0.01 < found.gain.max() < STABLE
+
+
+def test_beyond_a_fold_the_tangent_repels_and_before_it_is_exact():
+    """The scalar problem f(p) = p - 2 sqrt(p) + b folds at p = 1, where the gain 1 / sqrt(p) is 1. An
+    iteration with the steadied gain comes fast to the upper root, from below the fold too, and leaves
+    the lower one.
+    """
+
+    def followed(p, b):
+        for count in range(1, 200):
+            step = -(p - 2.0 * np.sqrt(p) + b) / (1.0 - steadied(np.array([p**-0.5]))[0])
+            p = max(p + step, 1e-3)
+            if abs(step) < 1e-10:
+                return p, count
+        return p, count
+
+    for b in (0.999, 0.9, 0.0):
+        low, high = (1.0 - np.sqrt(1.0 - b)) ** 2, (1.0 + np.sqrt(1.0 - b)) ** 2
+        for begin in (1.01 * low + 1e-2, 1.0, high + 1.0):
+            p, count = followed(begin, b)
+            assert p == pytest.approx(high, rel=1e-8)
+            assert count < 40
 
 
 @pytest.mark.parametrize("direction", ["vertical", "normal"])
