@@ -49,7 +49,6 @@ from evfem.contact.signorini import (
     ExtraUnknowns,
     Roughness,
     Unstable,
-    lost_stability,
     solve_with_attraction,
 )
 
@@ -136,7 +135,7 @@ class Candidates:
 class StepSolution:
     """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses
     (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
-    had to be scaled down.
+    had to be scaled down, or what turns with the profile.
     """
 
     moved: Floats
@@ -145,6 +144,7 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
+    weakened: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,8 +208,8 @@ class LinearContactStep:
 
     `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
     else moves the body; `snap`: nodes that the attraction pulls over the gap close at once;
-    `timed`: time passes, and a shorter step is held by viscosity or inertia, where one without time
-    must go the way it is pushed.
+    `timed`: time passes, or drag slows a release, and a shorter step is held by viscosity or inertia,
+    a slower one by drag, where one without them must go the way it is pushed.
     """
 
     body: CondensedTangent
@@ -249,7 +249,7 @@ class LinearContactStep:
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
         grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim]
         force[:, 1] += np.where(status != OPEN, grown, 0.0)
-        return StepSolution(moved, force, status, found.extra, solves, found.reduced)
+        return StepSolution(moved, force, status, found.extra, solves, found.reduced, found.weakened)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step
@@ -313,7 +313,8 @@ class LinearContactStep:
             held = self.candidates.axes[near], status, self.candidates.friction[near]
             for weaker in follower.weaker(self.body.among(near), *held):
                 with suppress(ContactNotSolved):
-                    return self._solve_following(near, free, status, weaker)
+                    found, pushed = self._solve_following(near, free, status, weaker)
+                    return replace(found, weakened=True), pushed
             raise failed
 
     def _solve_following(
@@ -342,7 +343,7 @@ class LinearContactStep:
         try:
             found = solve_with_attraction(problem, attraction, status, self.snap)
         except ContactNotSolved as error:
-            if follower.loaded.size and lost_stability(problem):
+            if follower.loaded.size and problem.gives_way:
                 raise Unstable(LOST_STABILITY) from error
             raise
         pressed = (found.force + found.attraction_drop).reshape(2, -1)

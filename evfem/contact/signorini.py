@@ -156,6 +156,16 @@ class ContactProblem:
         """Compliance (2 k, 2 k) of body and interface to contact forces."""
         return self.compliance if self.give is None else self.compliance + np.diag(self.give)
 
+    @cached_property
+    def gives_way(self) -> bool:
+        """Whether the body gives way the more, the more it is loaded: this compliance, which contains
+        the forces that turn with the profile, is not positive.
+        """
+        try:
+            return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
+        except np.linalg.LinAlgError:
+            return True
+
     @property
     def resists(self) -> Any:
         """Which nodes have friction (k,) bool."""
@@ -168,9 +178,7 @@ class ContactProblem:
         return limit if self.cohesion is None else limit + self.cohesion
 
     def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), drops of the attraction (2 k,), extra unknowns (p,) for given
-        statuses.
-        """
+        """Contact forces (2 k,), drops (2 k,) and extra unknowns (p,) for given statuses."""
         return _solve_statuses(self, status)
 
     @cached_property
@@ -203,7 +211,7 @@ class ContactProblem:
 class ContactSolution:
     """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns
     (p,), new gaps and slips (2 k,), the number of dense solves, and whether the negative stiffness
-    had to be scaled down.
+    had to be scaled down, or what turns with the profile.
     """
 
     force: Floats
@@ -213,12 +221,13 @@ class ContactSolution:
     state: Floats
     solves: int
     reduced: bool = False
+    weakened: bool = False
 
 
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
-    """Signorini-Coulomb on the candidates, started from `status` (k,) and, should that cycle, from
-    all nodes sticking or all open; raises `ContactNotSolved` when none of them ends within
-    `ACTIVE_SET_LIMIT` solves and one per node, or the body has lost its stability.
+    """Signorini-Coulomb, started from `status` (k,) and, should that cycle, from all nodes sticking
+    or all open; raises `ContactNotSolved` when none of them ends within `ACTIVE_SET_LIMIT` solves and
+    one per node, or the body gives way.
     """
     most, failed = ACTIVE_SET_LIMIT + problem.size, ContactNotSolved("")
     for start in (status, np.full(problem.size, STICK), np.full(problem.size, OPEN)):
@@ -226,17 +235,9 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
             return _active_set(problem, start, most)
         except ContactNotSolved as error:
             failed = error
-            if lost_stability(problem):  # other starts rarely find more, and cost as much
+            if problem.gives_way:  # other starts rarely find more, and cost as much
                 break
     raise failed
-
-
-def lost_stability(problem: ContactProblem) -> bool:
-    """Whether the body gives way the more, the more it is loaded: its compliance, which contains
-    the forces that turn with the profile, is not positive.
-    """
-    C = problem.under_forces
-    return bool(np.linalg.eigvalsh(0.5 * (C + C.T))[0] < 0.0)
 
 
 def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
@@ -288,6 +289,8 @@ def solve_with_attraction(
         try:
             found = _active_set(attracted, start, ACTIVE_SET_LIMIT)
         except ContactNotSolved:
+            if problem.gives_way:
+                raise
             continue
         if _feedback(problem, attraction, found.status)[0] < 1.0:
             return found
@@ -351,9 +354,7 @@ def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Flo
 
 
 def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
-    """Contact forces (2 k,), drops of the attraction (2 k,) and extra unknowns (p,) for given
-    statuses: one dense linear system.
-    """
+    """Contact forces (2 k,), drops (2 k,) and extra unknowns (p,): one dense linear system."""
     k, C, extra, attraction = problem.size, problem.compliance, problem.extra_unknowns, problem.attraction
     active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
     against = (status == BACKWARD).astype(float) - (status == FORWARD)
@@ -424,9 +425,7 @@ def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats
 def _next_statuses(
     problem: ContactProblem, status: Ints, force: Floats, state: Floats
 ) -> tuple[Ints, Floats]:
-    """Statuses that the solution asks for, and by how much each node violates its own, in
-    comparable units.
-    """
+    """Statuses that the solution asks for, and each node's violation of its own, comparable."""
     k, resists = problem.size, problem.resists
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
     own_compliance = np.maximum(np.abs(np.diagonal(problem.under_forces)[:k]), 1e-300)

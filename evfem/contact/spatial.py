@@ -130,7 +130,8 @@ class SpatialContactStep(LinearContactStep):
             weaker = None if self.timed else turning.weaker(self.body.among(near))
             if weaker is not None:
                 with suppress(ContactNotSolved):
-                    return self._solve_turning(near, free, status, weaker)
+                    found, pushed = self._solve_turning(near, free, status, weaker)
+                    return replace(found, weakened=True), pushed
             raise
 
     def _solve_turning(

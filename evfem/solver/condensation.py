@@ -110,7 +110,7 @@ class Pardiso:
             self._iparm[index] = value
         self._mark[:] = 0
         self._mark[self.kept] = 1
-        self._analysed = False
+        self._analysed = self._open = False
         self._phase, self._error = ctypes.c_int32(0), ctypes.c_int32(0)
         self._fixed = self._arguments()
 
@@ -154,6 +154,7 @@ class Pardiso:
             self._values = upper.astype(self.real)
             self._values[self.pattern.diagonal[self.kept]] += shift
             S, b = np.zeros(self.schur.shape, self.real), np.zeros(self.pattern.size, self.real)
+            self._open = True
             error = 0 if self._analysed else self._call(11, b, S)
             error = error or self._call(22, b, S)
             self._analysed = error == 0
@@ -188,13 +189,19 @@ class Pardiso:
         return x
 
     def close(self) -> None:
-        """Give the library's memory back."""
-        if self._handle.any():
-            self._call(-1, np.zeros(1), np.zeros(1))
-            self._handle[:] = 0
+        """Give the library's memory back.
+
+        No ufunc is asked: garbage may be collected within the end of an `np.errstate`, and CPython's
+        context variable that holds numpy's error state, read just then, goes on to point to what is
+        freed next.
+        """
+        if self._open:
+            self._call(-1, self._values, self._values)
+            ctypes.memset(self._handle.ctypes.data, 0, self._handle.nbytes)
+            self._open = False
 
     def __del__(self) -> None:
-        if hasattr(self, "_handle") and not sys.is_finalizing():
+        if hasattr(self, "_fixed") and not sys.is_finalizing():
             self.close()
 
 

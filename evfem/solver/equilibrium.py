@@ -257,7 +257,7 @@ class Equilibrium(Statics):
         target.drive.begin(old)
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
-        self.record.residuals, front = history, Front()
+        self.record.residuals, self.record.weakened, front, refused = history, 0, Front(), 0
         while len(history) < self.strategy.iterations or self._nearly(history):
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
@@ -267,12 +267,16 @@ class Equilibrium(Statics):
             history.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
                 raise StepFailed("the residual is not finite", history)
-            if reached and balance.residual <= self.tolerance and self._accepts(old, state, target):
-                self._refuse_fold(state)
-                return self._settled(old, self.body.accepted(old, state), target)
-            if len(history) > GROWTH_GRACE and history[-1] > GROWTH_LIMIT * max(min(history), self.tolerance):
+            if reached and balance.residual <= self.tolerance:
+                if self._accepts(old, state, target):
+                    self._refuse_fold(state)
+                    return self._settled(old, self.body.accepted(old, state), target)
+                if len(history) > refused + 1:  # what follows is another problem: nodes let go or admitted
+                    refused = len(history)
+            since = history[refused:]
+            if len(since) > GROWTH_GRACE and since[-1] > GROWTH_LIMIT * max(min(since), self.tolerance):
                 raise StepFailed("the residual grows", history)
-            if stuck(history) and not front.advances():
+            if stuck(since, self.record.weakened) and not front.advances():
                 break
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)

@@ -278,7 +278,7 @@ class FactorisedBody:
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
-        linearisation = self.linearisation
+        linearisation, dynamics = self.linearisation, self.body.dynamics
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
@@ -291,7 +291,7 @@ class FactorisedBody:
             bone=target.bone(state.bone) - state.bone,
             unknowns=self._unknowns(state, target),
             snap=self._scaled_down >= LOST,
-            timed=self.body.dynamics is not None and self.body.dynamics.step > 0.0,
+            timed=self.body.drag_rate > 0.0 or (dynamics is not None and dynamics.step > 0.0),
         )
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
@@ -305,6 +305,7 @@ class FactorisedBody:
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
         self.record.contact_solves += found.solves
+        self.record.weakened += found.weakened
         self._scaled_down = self._scaled_down + 1 if found.reduced else 0
         return found
 

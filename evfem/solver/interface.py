@@ -40,7 +40,8 @@ class Pins:
     has no consistent value on either side: the iterations put the node before the jump, behind it,
     before it again. Such a node is pinned to the jump, a hair inside the rougher side, where it
     sticks with the higher coefficient. It is released when its shear force falls below the lower
-    limit.
+    limit. A node that began the step on the rougher side is not held: it leaves it and slides on, or
+    it stays there.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
@@ -53,7 +54,7 @@ class Pins:
         self.x = np.full(self.size, np.nan)
         self.lower = np.zeros(self.size)
         if len(self.jumps):
-            self._side = np.searchsorted(self.jumps[:, 0], x, side="right")
+            self._side, self._begin = np.searchsorted(self.jumps[:, 0], x, side="right"), x
             self._changes = np.zeros(self.size, dtype=np.int64)
             self._released = np.zeros(self.size, dtype=bool)
 
@@ -71,8 +72,11 @@ class Pins:
         self._changes += moved
         new = np.flatnonzero(moved & (self._changes >= CHANGES) & ~self.held)
         place, before, behind = self.jumps[np.maximum(side, self._side)[new] - 1].T
-        self.x[new] = place + np.where(behind > before, HAIR, -HAIR)
-        self.lower[new] = np.minimum(before, behind)
+        inside = np.where(behind > before, HAIR, -HAIR)
+        from_smoother = (place - self._begin[new]) * inside > 0.0
+        new = new[from_smoother]
+        self.x[new] = (place + inside)[from_smoother]
+        self.lower[new] = np.minimum(before, behind)[from_smoother]
         self._side = side
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:

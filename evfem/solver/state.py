@@ -123,13 +123,16 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start."""
+    """Work done: iterations, factorisations and dense contact solves, counted since the start; of
+    the last step the residuals, and how many of its iterations the body would not have held.
+    """
 
     iterations: int = 0
     factorisations: int = 0
     contact_solves: int = 0
     backend: str = "none"
     residuals: list[float] = field(default_factory=list)
+    weakened: int = 0
 
 
 @dataclass(frozen=True)

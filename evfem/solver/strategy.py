@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
-from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK
+from evfem.common.constants import FALLING, LONGEST_CIRCLE, LOST, SAME, STUCK
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -64,18 +64,22 @@ class Strategy:
         check_fields(self)
 
 
-def stuck(history: Sequence[float]) -> bool:
+def stuck(history: Sequence[float], weakened: int = 0) -> bool:
     """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
-    ends soon: they come round in a circle, or the last ones are hardly below those before.
+    ends soon: they come round in a circle, or the last ones are hardly below those before. Where the
+    body would not have held so many of them, fewer are enough.
 
     >>> stuck([1e-3, 2e-4] * 4), stuck([0.5**i for i in range(30)])
     (False, False)
     >>> stuck([1e-3, 2e-4] * 5), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
     (True, True)
+    >>> stuck([1e-1, 4e-3, 5e-3, 4e-3, 5e-3], weakened=2), stuck([1e-1, 4e-3, 5e-3, 4e-3, 5e-3], weakened=3)
+    (False, True)
     """
     if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
         return True
-    return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])
+    last, least = (LOST, LOST + 1) if weakened >= LOST else (STUCK, 2 * STUCK)
+    return len(history) > least and min(history[-last:]) >= FALLING * min(history[:-last])
 
 
 def _circle(history: Sequence[float], period: int) -> bool:

@@ -9,7 +9,7 @@ import pytest
 
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
 from evfem.contact.pad import SurfaceState
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Unstable
 
 K = 5
 
@@ -237,3 +237,16 @@ def test_a_node_that_the_tangent_of_its_friction_lifts_off_is_held_by_the_chord(
     assert found.status.tolist() == [BACKWARD]
     load = 0.2 / 1.45
     np.testing.assert_allclose(found.force, [[load, 0.5 * load]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_crests_that_push_harder_than_the_body_holds_are_weakened_and_said(seed):
+    """Without time the nodes go the way they are pushed; a shorter or slower step would be held."""
+    crests = candidates(np.random.default_rng(seed), 1.0).surface
+    for curvature, pushes in ((-0.1, False), (-5.0, True)):
+        surface = replace(crests, curvature=np.full(K, curvature))
+        step, _, _ = step_of(np.random.default_rng(seed), 1.0, surface=surface)
+        assert step.solve().weakened == pushes
+        if pushes:
+            with pytest.raises(Unstable):
+                replace(step, timed=True).solve()

@@ -553,3 +553,15 @@ def test_what_is_returned_solves_the_whole_equations(monkeypatch):
     assert asked[-1] == "_solve_statuses"
     whole = replace(problem, attraction=attraction).solved(found.status)
     np.testing.assert_array_equal(found.force, whole[0])
+
+
+def test_a_body_gives_way_where_its_compliance_is_not_positive():
+    start, mu = np.zeros(4), np.zeros(2)
+    turned = np.diag([1.0, 1.0, 1.0, -0.5])
+    for compliance, give, gives_way in (
+        (np.eye(4), None, False),
+        (turned, None, True),
+        (turned, np.array([0.0, 0.0, 0.0, 1.0]), False),  # the interface takes it up
+        (np.eye(4) + 3.0 * np.eye(4, k=1), None, True),  # its symmetric part is not
+    ):
+        assert ContactProblem(start, compliance, mu, give=give).gives_way == gives_way

@@ -1,6 +1,8 @@
 """Condensing factorisations against dense algebra; both back ends on the same problems."""
 
 import importlib.util
+import subprocess
+import sys
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -317,3 +319,40 @@ def test_where_single_precision_does_not_factorise_double_does(back_end):
     factor.factorise(entries(pattern, cells))
     assert factor.real is np.float64
     np.testing.assert_allclose(factor.schur, [[0.0]], atol=1e-6)
+
+
+#: a factorisation is collected while numpy's error state is set back, in a context that holds other
+#: variables too, as those of pytest and Jupyter do
+COLLECTED = """
+import contextvars, gc
+import numpy as np
+from evfem.solver.condensation import Pardiso
+from evfem.tissue.pattern import Pattern
+
+others = [contextvars.ContextVar(str(k)) for k in range(3)]
+for other in others:
+    other.set(0)
+pattern = Pattern(np.arange(4)[None], 1)
+upper = np.zeros(pattern.indices.size)
+upper[pattern.diagonal] = 2.0
+for allocations in range(30):
+    gc.set_threshold(10**6)
+    factor = Pardiso(pattern, np.array([3]))
+    factor.factorise(upper)
+    factor.itself = factor
+    errors = np.errstate(invalid="ignore")
+    errors.__enter__()
+    del factor
+    gc.set_threshold(allocations)
+    errors.__exit__(None, None, None)
+    gc.set_threshold(10**6)
+    others_in_its_memory = [[allocations] * 5 for k in range(9)]
+    np.isfinite(np.ones(4))
+"""
+
+
+@pytest.mark.skipif(Pardiso not in BACK_ENDS, reason="needs evfem[fast]")
+def test_a_factorisation_may_be_collected_while_numpy_changes_its_error_state():
+    """CPython keeps a context variable that is read just then after it is freed."""
+    done = subprocess.run([sys.executable, "-c", COLLECTED], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

@@ -64,15 +64,16 @@ JUMPS = {"rougher": [[-9.0, 0.2], [0.3, 0.2], [0.3, 0.6]], "smoother": [[-9.0, 0
 jumps = pytest.mark.parametrize("table", JUMPS.values(), ids=JUMPS.keys())
 
 
-def crossing(table, times):
+def crossing(table, times, smoother=True):
     """Pins of three nodes: one crosses the jump so many times, one does so in the air, one stays
-    away.
+    away; the first two begin on the smoother side of it, or on the other one.
     """
     surface = Flat(friction=table)
     pins, touching = Pins(surface.friction_jumps, 3), np.array([True, False, True])
-    pins.begin(np.array([0.2, 0.2, -1.0]))
+    begin, beyond = (0.2, 0.4) if (table[-1][1] == 0.6) == smoother else (0.4, 0.2)
+    pins.begin(np.array([begin, begin, -1.0]))
     for k in range(times):
-        x = 0.4 if k % 2 == 0 else 0.2
+        x = beyond if k % 2 == 0 else begin
         pins.watch(np.array([x, x, -1.0]), touching)
     return surface, pins
 
@@ -88,6 +89,12 @@ def test_a_node_that_keeps_crossing_a_jump_is_pinned_to_its_rougher_side(table):
 
 
 @jumps
+def test_a_node_that_leaves_the_rougher_side_is_not_pinned(table):
+    """Beyond the jump less friction holds it: it slides on until that does, or stays where it was."""
+    assert not crossing(table, 5 * CHANGES, smoother=False)[1].held.any()
+
+
+@jumps
 def test_a_pinned_node_is_let_go_below_the_lower_limit_and_for_good(table):
     """0.2 of 5 N/mm; it keeps up to 3 N/mm in either direction."""
     _, pins = crossing(table, CHANGES)
@@ -98,8 +105,9 @@ def test_a_pinned_node_is_let_go_below_the_lower_limit_and_for_good(table):
     for x in (0.4, 0.2, 0.4, 0.2, 0.4):
         pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
     assert not pins.held[0]
-    pins.begin(np.zeros(3))
-    for x in (0.4, 0.2, 0.4):
+    begin = 0.2 if table[-1][1] == 0.6 else 0.4
+    pins.begin(np.full(3, begin))
+    for x in (0.6 - begin, begin, 0.6 - begin):
         pins.watch(np.array([x, 0.2, -1.0]), np.full(3, True))
     assert pins.held[0]  # in the next step it may be pinned again
 
