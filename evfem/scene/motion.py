@@ -129,7 +129,8 @@ class Wait:
     """Stay where it is for `duration` (s), in `steps` equal parts: for a voltage that changes with
     time, and for tissue that creeps.
 
-    `hold` keeps the indentation or the applied force of the moment before.
+    `hold` keeps the indentation or the applied force of the moment before. A finger that touches
+    nothing and is not attracted has no force at any height: it stays where it is.
 
     >>> Wait(duration=0.1).steps
     100

@@ -205,7 +205,9 @@ class Run:
                 yield Request(first + k, index, motion.kind, path, seconds)
 
     def _start_of(self, rows_before: int) -> dict[str, float]:
-        """Bone position, indentation, force and voltage at which a motion starts."""
+        """Bone position, indentation, force and voltage at which a motion starts, and whether the finger
+        is loose: touches nothing and is not attracted.
+        """
         if rows_before == 0:
             return {
                 "position": 0.0,
@@ -213,10 +215,12 @@ class Run:
                 "indentation": 0.0,
                 "applied_force": 0.0,
                 "voltage": self.voltage_at(0.0, 0.0),
+                "loose": 0.0,
             }
         row = {"position_z": 0.0} | self.rows[rows_before - 1]
         names = ("position", "position_z", "indentation", "applied_force", "voltage")
         start = {name: row[name] for name in names}
+        start["loose"] = float(row["normal_force"] == 0.0 and row["electrostatic_force"] == 0.0)
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
 
     def _driven(self, rows_before: int) -> float:
@@ -247,14 +251,14 @@ class Run:
             x, z = motion.way
             position = towards("position", start["position"] + x)
             position_z = towards("position_z", start["position_z"] + z)
-            force = start["applied_force"] if motion.hold == "force" else None
         elif isinstance(motion, VoltageRamp):
             voltage = towards("voltage", motion.voltage)
-            force = start["applied_force"] if motion.hold == "force" else None
-        elif isinstance(motion, Wait):
-            force = start["applied_force"] if motion.hold == "force" else None
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
+        if isinstance(motion, Slide | VoltageRamp | Wait) and motion.hold == "force":
+            # a loose finger has no force at any height: it stays where it is until a voltage acts
+            resting = start["loose"] and voltage == 0.0 and not isinstance(self.voltage, FollowForce)
+            force = None if resting else start["applied_force"]
         bone = self.model.bone(position, indentation, position_z)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
         drive: VoltageControl = GivenVoltage(voltage)

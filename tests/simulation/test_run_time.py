@@ -43,6 +43,19 @@ def test_a_waiting_finger_feels_the_voltage_of_the_moment(hold):
     assert result.electrostatic_force[12] / result.electrostatic_force[2] > (2300.0 / 300.0) ** 2
 
 
+def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
+    """It has no force at any height: that of the moment before, zero, would hold it at none."""
+    hold = {"steps": 3, "hold": "force"}
+    motion = [ev.Press(indentation=-0.05, steps=1), ev.Slide(0.2, speed=20.0, **hold)]
+    motion += [ev.Wait(0.1, **hold), ev.VoltageRamp(1500.0, **hold)]
+    for dynamics in ("quasistatic", "viscous", "inertial"):
+        body = finger(block(8, 3, sag=0.4), viscosity=5e-3)
+        result = ev.simulate(scene(*motion, voltage=0.0, body=body, solver=ev.Solver(dynamics=dynamics)))
+        assert result.indentation[:7].tolist() == [-0.05] * 7
+        assert np.abs(result.applied_force[:7]).max() < 1e-9
+        assert result.contact_width[7] > 0.0  # nothing holds it against an attraction
+
+
 def test_an_equilibrium_does_not_depend_on_how_long_it_took():
     """Quasi-static: the same voltages as a profile over the position, at the same places."""
     slide = ev.Slide(0.4, steps=8, speed=20.0)
