@@ -82,6 +82,8 @@ STABLE                  fraction of the critical negative stiffness that is used
 LEFT_OVER               least share of a contact force that the tangent leaves where the          attraction
                         attraction between rough faces grows as fast as it
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
+WEAKENED                a step is given up, if so many of its contact problems were solved with   slides
+                        weakened turning forces, after so many iterations without gain
 ROUNDING                violations below this fraction of the largest force are rounding
 UNHELD                  pivots of the bone below this fraction belong to a body without a hold
 TURNED                  a bone that moved less than this fraction of its next way has not moved   turns
@@ -113,7 +115,7 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
-DRAG_STEPS              steps of a release, failed ones included, before it is given up
+DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near; the second, where
@@ -166,6 +168,7 @@ DISC_OWN, DIVERGED = 0.1, 1e6
 STABLE = 0.9
 LEFT_OVER = 0.01
 LOST = 3
+WEAKENED = 3
 ROUNDING = 1e-12
 UNHELD = 1e-10
 TURNED = 1e-9

@@ -425,7 +425,7 @@ def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats
 def _next_statuses(
     problem: ContactProblem, status: Ints, force: Floats, state: Floats
 ) -> tuple[Ints, Floats]:
-    """Statuses that the solution asks for, and each node's violation of its own, comparable."""
+    """Statuses that the solution asks for, and how far each node violates its own."""
     k, resists = problem.size, problem.resists
     normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
     own_compliance = np.maximum(np.abs(np.diagonal(problem.under_forces)[:k]), 1e-300)

@@ -62,9 +62,10 @@ class Slide:
     """Slide by `distance` (mm, negative towards -x) in `steps` equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
-    which the load drifts (`evfem.scene.drift`). `speed` (mm/s) sets how much time passes; it is
-    needed with `dynamics` other than quasistatic. A finger in three dimensions slides at an `angle`,
-    in degrees from +x in the plane of the display, 90 being +z.
+    which the load drifts (`evfem.scene.drift`). A finger that touches nothing and is not attracted has
+    no force at any height: in every motion with `hold` it stays where it is. `speed` (mm/s) sets how
+    much time passes; it is needed with `dynamics` other than quasistatic. A finger in three dimensions
+    slides at an `angle`, in degrees from +x in the plane of the display, 90 being +z.
 
     >>> Slide(distance=5.0).steps
     100
@@ -129,8 +130,7 @@ class Wait:
     """Stay where it is for `duration` (s), in `steps` equal parts: for a voltage that changes with
     time, and for tissue that creeps.
 
-    `hold` keeps the indentation or the applied force of the moment before. A finger that touches
-    nothing and is not attracted has no force at any height: it stays where it is.
+    `hold` keeps the indentation or the applied force of the moment before.
 
     >>> Wait(duration=0.1).steps
     100

@@ -124,7 +124,8 @@ class Limits:
 @dataclass
 class Record:
     """Work done: iterations, factorisations and dense contact solves, counted since the start; of
-    the last step the residuals, and how many of its iterations the body would not have held.
+    the last step the residuals, and how many of its contact problems were solved with weakened
+    turning forces, as the body would not have held the whole ones.
     """
 
     iterations: int = 0

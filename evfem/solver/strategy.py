@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
-from evfem.common.constants import FALLING, LONGEST_CIRCLE, LOST, SAME, STUCK
+from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK, WEAKENED
 
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
@@ -66,8 +66,8 @@ class Strategy:
 
 def stuck(history: Sequence[float], weakened: int = 0) -> bool:
     """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
-    ends soon: they come round in a circle, or the last ones are hardly below those before. Where the
-    body would not have held so many of them, fewer are enough.
+    ends soon: they come round in a circle, or the last ones are hardly below those before. Where
+    so many contact problems were `weakened`, fewer are enough.
 
     >>> stuck([1e-3, 2e-4] * 4), stuck([0.5**i for i in range(30)])
     (False, False)
@@ -78,7 +78,7 @@ def stuck(history: Sequence[float], weakened: int = 0) -> bool:
     """
     if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
         return True
-    last, least = (LOST, LOST + 1) if weakened >= LOST else (STUCK, 2 * STUCK)
+    last, least = (WEAKENED, WEAKENED + 1) if weakened >= WEAKENED else (STUCK, 2 * STUCK)
     return len(history) > least and min(history[-last:]) >= FALLING * min(history[:-last])
 
 
