@@ -115,6 +115,8 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+NUDGE                   what was not at rest is pushed aside by so much once, mm: far above what   crests
+                        iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
@@ -184,6 +186,7 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 100
+NUDGE = 1e-5
 PATIENT = 16
 VERGE, VERGE_LOST = 0.9, 0.5
 STAGGERED_LIMIT = 60

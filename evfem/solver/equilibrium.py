@@ -10,7 +10,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         R, residual <- balance of the body, with the shares of the controls (`evfem.solver.control`)
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
-        give up if what would be accepted has an outline that crosses itself
+        give up if what would be accepted has an outline that crosses itself, or is not stable
         give up if the residual grows or is not finite, or goes to and fro while no front peels off,
             or after the strategy's iterations, unless their fall promises the end soon
         state <- the body's next iterate: linearise, solve contact exactly, move
@@ -56,6 +56,8 @@ from evfem.solver.state import (
 )
 from evfem.solver.strategy import Strategy, stuck
 
+#: why an equilibrium is refused that the body leaves
+NOT_STABLE = "the equilibrium that was found is not stable"
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
@@ -77,6 +79,9 @@ class LinearisedBody(Protocol):
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate; raises `ContactNotSolved` or `StepFailed`."""
+
+    def unstable(self, old: State, state: State, target: Target) -> bool:
+        """Whether the body would leave the equilibrium `state`, pushed aside by contact."""
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with everything that follows from it."""
@@ -270,6 +275,8 @@ class Equilibrium(Statics):
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     self._refuse_fold(state)
+                    if self.body.unstable(old, state, target):
+                        raise Unstable(NOT_STABLE)
                     return self._settled(old, self.body.accepted(old, state), target)
                 if len(history) > refused + 1:  # what follows is another problem: nodes let go or admitted
                     refused = len(history)

@@ -46,8 +46,8 @@ from evfem.common.constants import (
 )
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
-from evfem.contact.signorini import ContactNotSolved
-from evfem.contact.stability import Verge, verge
+from evfem.contact.signorini import FORWARD, ContactNotSolved
+from evfem.contact.stability import SLOPES, Verge, verge
 from evfem.solver.anderson import Anderson, Turning
 from evfem.solver.control import DrivenStep, Target, VoltageProblem
 from evfem.solver.findings import findings
@@ -367,6 +367,23 @@ class FactorisedBody:
         return max(found, key=lambda one: one.share)
 
     # -- a step ends
+
+    def unstable(self, old: State, state: State, target: Target) -> bool:
+        """Whether crests push the finger out of the equilibrium `state` faster than it is held, by the
+        tangent at hand: iterations may come to such a one from afar. Tissue in time moves as it does,
+        the loss of the attraction is seen by the iterations, and in three dimensions it is not known.
+        """
+        dynamics, linearisation = self.body.dynamics, self.linearisation
+        crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
+        timed = dynamics is not None and dynamics.step > 0.0
+        if timed or state.bone.size == 3 or not crests.any():
+            return False
+        if linearisation.refused:
+            linearisation.factorise(state)
+        step = self._contact_step(old, state, target, np.zeros(len(linearisation.tangent.schur)))
+        still = np.zeros(step.candidates.status.size)
+        found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+        return found.cause == SLOPES and found.share > 1.0
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""

@@ -177,11 +177,16 @@ class Linearisation:
         if follows and in_vain(history):
             self._outdated |= not self.fringes
             self.fringes = True
-        if self.factor is not None and not self._outdated and not self._too_old(history):
+        if not self.refused and not self._too_old(history):
             return False
         self._doubt_single_precision(history)
         self.factorise(state)
         return True
+
+    @property
+    def refused(self) -> bool:
+        """Whether there is no factorisation, or one of other candidates, another drag or time step."""
+        return self.factor is None or self._outdated
 
     def _doubt_single_precision(self, history: list[float]) -> None:
         near = len(history) > 1 and history[-1] < ALIKE

@@ -15,7 +15,7 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
             failed again and again
             give up where a finger that is pulled has lost the surface: nothing brings it back
         while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
-            it is found
+            it is found, and else the body is nudged
 
 Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
 finger that swings may jump over the equilibrium next to it, so the way would depend on a density
@@ -27,6 +27,11 @@ tissue with one relaxation time everywhere and low speed. The steps are equilibr
 friction and attraction like any other, in the scene's own coupling and to its tolerance; friction
 counts from step to step, and what is dissipated is counted by its definitions
 (`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
+
+*A nudge*: a symmetric finger on the middle of a crest has an equilibrium, and drag would lead it there,
+but the least push makes it leave. Such an equilibrium is refused (`evfem.solver.equilibrium`), with drag
+as without. Drag of the next step then holds the body at a place `NUDGE` aside, and the motion that is
+lost grows from there.
 
 A hand with a mass or a damper goes on in its own time: in the first step of a release, and then the
 bone stays at that x, while the tissue, which has no time of its own, comes to rest below it.
@@ -53,6 +58,7 @@ from evfem.common.constants import (
     DRAG_MOST,
     DRAG_REST,
     DRAG_STEPS,
+    NUDGE,
     PATIENT,
 )
 from evfem.solver.control import GivenVoltage, Target
@@ -96,8 +102,9 @@ class Relaxation:
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
         rate, slower, speed, quiet, patience = 1.0, DRAG_CHANGE, 0.0, DRAG_REST, Patience()
+        nudged = 0.0
         for _ in range(DRAG_STEPS):
-            self.body.release(state.u, rate)
+            self.body.release(state.u + nudged * self._aside, rate)
             try:
                 new = self.solve(state, held)
             except Folded:
@@ -113,7 +120,7 @@ class Relaxation:
                 held, end = (_below(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
             before, speed = speed, rate * float(np.abs(new.u - state.u).max())
-            state, slower = new, DRAG_CHANGE
+            state, slower, nudged = new, DRAG_CHANGE, 0.0
             if speed > before:
                 quiet = DRAG_REST
             elif rate < quiet:
@@ -121,10 +128,20 @@ class Relaxation:
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                quiet = DRAG_CALMER * rate
+                quiet, nudged = DRAG_CALMER * rate, NUDGE
             change = _next(speed / before if before > 0.0 else 0.0)
             rate *= max(change, patience.least(change))
         raise StepFailed("the released finger does not come to rest", [])
+
+    @property
+    def _aside(self) -> Floats:
+        """A shear along x (N, dim) that leaves the top where it is, with more of it on the right: a part of
+        every motion along x.
+        """
+        points = self.body.space.mesh.points
+        height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
+        shear[:, 0] = (points[:, 1].max() - points[:, 1]) * (1.0 + points[:, 0] / height) / height
+        return shear
 
     def _rest(self, state: State, target: Target) -> State | None:
         """The equilibrium without drag, if it is found from here."""

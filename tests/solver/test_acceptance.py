@@ -38,7 +38,7 @@ class Script:
 
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
-        self.states, self.residuals, self.admitted = states, residuals, []
+        self.states, self.residuals, self.admitted, self.left = states, residuals, [], False
 
     def known(self, old, target):
         return None
@@ -55,6 +55,9 @@ class Script:
 
     def accepted(self, old, state):
         return state
+
+    def unstable(self, old, state, target):
+        return self.left
 
     def admit(self, state, gap):
         self.admitted.append(gap)
@@ -206,6 +209,16 @@ def test_a_residual_that_is_no_number_fails_the_step(residual):
     interface, old, good = legal(SURFACES[0])
     with pytest.raises(StepFailed, match="not finite"):
         accepted(interface, old, [good, good], (residual, 0.0))
+
+
+def test_an_equilibrium_that_the_body_leaves_is_refused():
+    interface, old, new = legal(SURFACES[0])
+    script = Script([new], (0.0, 0.0))
+    script.left = True
+    solver = Equilibrium(script, interface, None, Limits(TOLERANCE))
+    with pytest.raises(StepFailed, match="the equilibrium that was found is not stable") as failed:
+        solver.step(old, Target.held(old.bone, 0.0))
+    assert failed.value.unstable
 
 
 def test_an_outline_that_folds_over_itself_is_refused():

@@ -53,6 +53,11 @@ def scene(*others, friction=0.0, **options):
     return Scene(wedge(), surface, motion=motion, output=Output(every=1000), **options)
 
 
+def on_a_crest(press):
+    """The wedge pressed on the middle of a crest."""
+    return Scene(wedge(), Sinusoid(friction=0.0, terms=[[HEIGHT, WAVE, -TROUGH]]), motion=[press])
+
+
 def springs():
     """kx and ky of the tip (N/mm per mm): the stiffness of the body at rest, condensed by numpy."""
     body = make_model(scene()).body
@@ -90,6 +95,13 @@ class Point:
     def before(self, bone):
         """x of the tip short of the snap."""
         return brentq(lambda x: self.bone(x) - bone, 0.0, self.snap())
+
+    def beside(self, depth):
+        """x of the tip below a bone that was pressed on the middle of a crest, and how far it is lifted."""
+        lift = lambda x: depth - HEIGHT * (1.0 - np.cos(WAVE * x))  # noqa: E731
+        push = lambda x: self.ky * lift(x) * HEIGHT * WAVE * np.sin(WAVE * x)  # noqa: E731
+        x = brentq(lambda x: push(x) - self.kx * x, 0.01 * LENGTH, 0.5 * LENGTH)
+        return x, lift(x)
 
     def beyond(self, bone):
         """x of the tip in the next trough with the bone at the same place."""
@@ -141,6 +153,33 @@ def test_a_released_tip_comes_to_rest_in_the_next_trough(point):
     assert most < 1.1 * freed
     assert left_over(result).max() < 1e-6
     assert result.summary()["relaxations"] == result.provenance["solver"]["relaxations"] == 1
+
+
+def test_a_tip_on_a_crest_comes_to_rest_beside_it(point):
+    """Pressed on the middle of a crest, the tip has an equilibrium there, which it leaves once the force
+    turns with the crest faster than the springs hold it: in each row it is beside the crest already.
+    """
+    result = simulate(on_a_crest(Press(indentation=DEPTH, steps=4)))
+    for row, depth in enumerate(result.indentation):
+        x, lifted = point.beside(depth)
+        assert abs(result.tangential_force[row]) == pytest.approx(point.kx * x, rel=1e-5)
+        assert result.normal_force[row] == pytest.approx(point.ky * lifted, rel=1e-6)
+    assert result.relaxations[0] > 0
+    assert result.provenance["solver"]["cuts"] < 10
+    assert left_over(result).max() < 1e-6
+
+
+def test_stability_is_that_of_the_body_with_its_present_drag():
+    """On the middle of the crest the tip is held by some drag, and not without."""
+    model = make_model(on_a_crest(Press(indentation=DEPTH)))
+    solver, rest = model.equilibrium, model.equilibrium.rest(model.bone(0.0, 0.0), 0.0)
+    target = Target.held(model.bone(0.0, 0.3 * DEPTH), 0.0)
+    for rate, unstable in ((1.0, False), (0.0, True), (1.0, False)):
+        model.body.release(rest.u, 1.0)
+        state = solver.step(rest, target)
+        model.body.release(state.u, rate)
+        solver.body.begin(state, target, False, state)
+        assert solver.body.unstable(state, state, target) is unstable
 
 
 def test_without_relaxation_the_step_fails(point):

@@ -314,6 +314,7 @@ class Decaying(Steps):
 
     def step(self, old, target, frozen=None, start=None):
         self.ways.append((target.duration, start is not None))
+        assert len(self.ways) < 10_000, "the same part is tried again and again"
         return SimpleNamespace(reaction=old.reaction / (1.0 + target.duration), bone=np.zeros(2))
 
 
@@ -350,6 +351,17 @@ def test_parts_that_err_too_much_are_done_again_shorter():
     _, parts, stepper = decayed(1e-6)
     assert parts[:3] == pytest.approx([1 / 16, 1 / 64, 1 / 256])
     assert stepper.path_error <= 1e-6
+
+
+def test_the_smallest_part_is_accepted_whatever_its_error():
+    """Twelve thousandths, added up from the beginning of the step, differ from one another by rounding."""
+    steps = Decaying(Strategy(smallest_part=0.012), 1.0)
+    stepper = Stepper(steps, allowed=1e-9)
+    start = SimpleNamespace(reaction=np.ones(1), bone=np.zeros(2))
+    path = lambda done, fraction: SimpleNamespace(duration=fraction - done)  # noqa: E731
+    _, count = stepper.follow(start, path, Unbooked())
+    assert count == 2 * 84
+    assert stepper.path_error > 1e-9
 
 
 def test_few_automatic_steps_agree_with_many_given_ones():
