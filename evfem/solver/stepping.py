@@ -159,7 +159,7 @@ class Stepper:
     def _shortened(self, state: State, part: Part, accounts: Accounts, failed: StepFailed) -> State | None:
         """Halve the part that failed, or release the body at one that is short enough: its rest is
         returned, and the part that worked before is tried next. Raises `failed` at the smallest part
-        of what was left of the step.
+        of what was left of the step, or `LiftedOff`.
         """
         release, least = self._release, self._least(part.target)
         self.cuts += 1
@@ -170,6 +170,7 @@ class Stepper:
         rest = self._released(state, part.target, accounts, failed)
         if rest is None:
             if half < least * (1.0 - part.begin):
+                self._refuse_flight(state, part.target, failed)
                 raise failed
             self.substep, release.least = half, least * (1.0 - part.begin)
             return None
@@ -247,6 +248,21 @@ class Stepper:
             return None
         self.relaxations += 1
         return rest
+
+    def _refuse_flight(self, state: State, target: Target, failed: StepFailed) -> None:
+        """Raise `LiftedOff` where tissue that is viscous, but has no mass, was pulled off: in the air nothing
+        limits how fast it leaves, and no part of the step is short enough.
+        """
+        dynamics = None if self.body is None else self.body.dynamics
+        if self.body is None or dynamics is None or dynamics.mass is not None or target.duration == 0.0:
+            return
+        try:
+            Relaxation(self.body, self.solve).follow(state, replace(target, duration=0.0), Unbooked().accept)
+        except LiftedOff as lifted:
+            lifted.last = failed.last
+            raise
+        except StepFailed:
+            return
 
     def solve(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow. Iterations

@@ -17,9 +17,10 @@ from evfem.common.constants import RELEASED
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.electrostatics.timesignals import Sampled
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import MeshedFinger
-from evfem.scene.motion import Press, Slide, VoltageRamp
+from evfem.scene.motion import Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.result import COLUMNS, Saved
@@ -220,6 +221,16 @@ def test_a_finger_pulled_harder_than_the_attraction_holds_lifts_off():
         simulate(held_by_voltage)
     assert lost.value.step == 2
     assert "it was lost at position 0 mm" in str(lost.value)
+
+
+def test_a_viscous_finger_without_mass_is_pulled_off_at_once():
+    """In the air nothing limits how fast it leaves, so no time step is short enough."""
+    motion = [Press(indentation=1e-4, steps=1), Wait(duration=0.1, steps=10, hold="force")]
+    pad, falling = finger(block(8, 2, sag=0.01), E=0.02, viscosity=1e-3), Sampled([1500.0, 0.0], rate=10.0)
+    viscous = Solver(dynamics="viscous")
+    with pytest.raises(NotConverged, match=r"lifts off, where the attraction .* try more voltage") as lost:
+        simulate(Scene(pad, Display(), Kaczmarek(), falling, motion, solver=viscous))
+    assert lost.value.step > 1
 
 
 def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
