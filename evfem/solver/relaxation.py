@@ -9,7 +9,8 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
 
     rate <- 1
     repeat
-        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
+        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state; iterations
+            begin ahead of it, as far along the last step's way as steps become shorter
         if it failed: a higher rate, slower
         else: accept; a lower rate, faster, but not while the speed grows, nor soon where lower ones have
             failed again and again
@@ -46,7 +47,7 @@ doi:10.1137/S0036142996304796 (pseudo-transient continuation).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -60,6 +61,7 @@ from evfem.common.constants import (
     DRAG_STEPS,
     NUDGE,
     PATIENT,
+    SMALLEST_J,
 )
 from evfem.solver.control import GivenVoltage, Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -74,10 +76,12 @@ LIFTED = (
 
 @dataclass
 class Relaxation:
-    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included."""
+    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included, with
+    iterations that begin at a third argument, or there if that is None.
+    """
 
     body: Body
-    solve: Callable[[State, Target], State]
+    solve: Callable[[State, Target, State | None], State]
 
     def applies(self, target: Target) -> bool:
         """Whether the tissue takes no time on its way to `target`, so that nothing but an equilibrium is
@@ -101,37 +105,40 @@ class Relaxation:
         end, held = target, target if moving else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
-        rate, slower, speed, quiet, patience = 1.0, DRAG_CHANGE, 0.0, DRAG_REST, Patience()
-        nudged = 0.0
+        pace = Pace()
         for _ in range(DRAG_STEPS):
-            self.body.release(state.u + nudged * self._aside, rate)
+            self.body.release(state.u + pace.nudge * self._aside, pace.rate)
             try:
-                new = self.solve(state, held)
+                new = self.solve(state, held, self._ahead(state, pace.ahead))
             except Folded:
                 raise
             except StepFailed:
-                patience.failed()
-                rate, slower = slower * rate, DRAG_CHANGE * slower
-                if rate > DRAG_MOST:
+                if pace.failed():
                     raise
                 continue
             accept(state, new)
             if held.hand is not None and moving:
                 held, end = (_below(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
-            before, speed = speed, rate * float(np.abs(new.u - state.u).max())
-            state, slower, nudged = new, DRAG_CHANGE, 0.0
-            if speed > before:
-                quiet = DRAG_REST
-            elif rate < quiet:
+            calm = pace.went(float(np.abs(new.u - state.u).max()))
+            state = new
+            if calm:
                 rest = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                quiet, nudged = DRAG_CALMER * rate, NUDGE
-            change = _next(speed / before if before > 0.0 else 0.0)
-            rate *= max(change, patience.least(change))
+                pace.refused()
+            pace.choose()
         raise StepFailed("the released finger does not come to rest", [])
+
+    def _ahead(self, state: State, fraction: float) -> State | None:
+        """Where iterations of the next step begin: a fraction of the last step's way ahead; None for the
+        state itself.
+        """
+        u = state.u + fraction * state.last_increment
+        if fraction == 0.0 or not self.body.tissue.smallest_J(u) > SMALLEST_J:
+            return None
+        return replace(state, u=u, bone=u[self.body.space.mesh.node_sets["bone"][0]].copy())
 
     @property
     def _aside(self) -> Floats:
@@ -147,7 +154,7 @@ class Relaxation:
         """The equilibrium without drag, if it is found from here."""
         self.body.release(state.u, 0.0)
         try:
-            return self.solve(state, target)
+            return self.solve(state, target, None)
         except StepFailed:
             return None
 
@@ -192,6 +199,57 @@ class Patience:
         self.left = max(self.left - 1, 0)
         self.lowered = change < 1.0 and not self.left
         return 1.0 if self.left else 0.0
+
+
+@dataclass
+class Pace:
+    """How a release goes on: the `rate` of drag of the next step, how far `ahead` its iterations begin, as
+    a fraction of the last one's way, and by how much it is nudged (mm).
+
+    >>> pace = Pace()
+    >>> pace.went(0.4), pace.choose(), pace.rate
+    (False, None, 0.5)
+    >>> pace.went(0.2), pace.ahead
+    (False, 0.5)
+    """
+
+    rate: float = 1.0
+    ahead: float = 0.0
+    nudge: float = 0.0
+    slower: float = DRAG_CHANGE
+    way: float = 0.0
+    speed: float = 0.0
+    growth: float = 0.0
+    quiet: float = DRAG_REST
+    patience: Patience = field(default_factory=Patience)
+
+    def failed(self) -> bool:
+        """A step failed: the next one is slower. Whether drag holds the body by so much that this is no
+        snap.
+        """
+        self.patience.failed()
+        self.ahead, self.rate, self.slower = 0.0, self.slower * self.rate, DRAG_CHANGE * self.slower
+        return self.rate > DRAG_MOST
+
+    def went(self, way: float) -> bool:
+        """A step went so far (mm). Whether the body may be at rest: it slows down, with hardly any drag."""
+        before, self.speed = self.speed, self.rate * way
+        self.growth = self.speed / before if before > 0.0 else 0.0
+        self.ahead = min(way / self.way, 1.0) if self.way > 0.0 else 0.0
+        self.way, self.slower, self.nudge = way, DRAG_CHANGE, 0.0
+        if self.speed > before:
+            self.quiet = DRAG_REST
+            return False
+        return self.rate < self.quiet
+
+    def refused(self) -> None:
+        """It was not at rest."""
+        self.quiet, self.nudge = DRAG_CALMER * self.rate, NUDGE
+
+    def choose(self) -> None:
+        """The rate after a step that succeeded."""
+        change = _next(self.growth)
+        self.rate *= max(change, self.patience.least(change))
 
 
 def _next(growth: float) -> float:

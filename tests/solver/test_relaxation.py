@@ -255,6 +255,20 @@ def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
     assert Patience().least(0.5) == 0.0
 
 
+def test_steps_of_a_release_begin_ahead_on_the_last_ones_way():
+    """The bone too; but where cells would collapse there, and with nothing behind, from the state itself."""
+    model = make_model(scene())
+    release, rest = Relaxation(model.body, None), model.equilibrium.rest(np.zeros(2), 0.0)
+    moved = replace(rest, last_increment=np.full_like(rest.u, 0.2))
+    ahead = release._ahead(moved, 0.5)
+    np.testing.assert_allclose(ahead.u, 0.1)
+    np.testing.assert_allclose(ahead.bone, 0.1)
+    assert release._ahead(moved, 0.0) is None
+    height = model.body.space.mesh.points[:, 1]
+    squeezed = np.column_stack([np.zeros_like(height), -height])
+    assert release._ahead(replace(rest, last_increment=squeezed), 1.0) is None
+
+
 def test_friction_on_the_way_is_counted(point):
     """Each column from its definition, and the books closed; what slips dissipates."""
     result = simulate(scene(Slide(2.5, steps=25), friction=0.05))
