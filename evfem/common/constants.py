@@ -85,6 +85,8 @@ LOST                    so many such iterations in a row show that nodes are bei
 WEAKENED                a step is given up, if so many of its contact problems were solved with   slides
                         weakened turning forces, after so many iterations without gain
 ROUNDING                violations below this fraction of the largest force are rounding
+FIELD_ROUNDING          forces of the full field are known to this fraction of the largest nodal    full field
+                        one: changes of 1e-15 mm change them by 4e-13 to 1.4e-10 of it
 UNHELD                  pivots of the bone below this fraction belong to a body without a hold
 TURNED                  a bone that moved less than this fraction of its next way has not moved   turns
                         along it
@@ -115,6 +117,8 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+STEADY                  steps of a release whose way is more than this fraction of the one before   snaps
+                        begin ahead
 NUDGE                   what was not at rest is pushed aside by so much once, mm: far above what   crests
                         iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
@@ -172,6 +176,7 @@ LEFT_OVER = 0.01
 LOST = 3
 WEAKENED = 3
 ROUNDING = 1e-12
+FIELD_ROUNDING = 1e-10
 UNHELD = 1e-10
 TURNED = 1e-9
 HAIR = 1e-9
@@ -186,6 +191,7 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 100
+STEADY = 0.6
 NUDGE = 1e-5
 PATIENT = 16
 VERGE, VERGE_LOST = 0.9, 0.5

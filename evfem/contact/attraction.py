@@ -113,6 +113,8 @@ class Attraction:
     has_energy = False
     #: whether the forces are more than those of columns
     has_fringes = False
+    #: what rounding does to the forces, as a fraction of the largest nodal one
+    rounding = 0.0
 
     def column_forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None

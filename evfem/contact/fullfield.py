@@ -30,6 +30,7 @@ import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import FIELD_ROUNDING
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
@@ -183,6 +184,7 @@ class FieldAttraction(Attraction):
         return Attraction.forces_along(self, positions, voltages, touching, pressing)
 
     has_fringes = True
+    rounding = FIELD_ROUNDING
 
     @property
     def has_energy(self) -> bool:  # type: ignore[override]

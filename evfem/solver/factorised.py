@@ -184,11 +184,12 @@ class FactorisedBody:
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements that contain the
-        bone's travel, and of the stresses of the stiffest cells.
+        bone's travel, of the stresses of the stiffest cells, and of the attraction.
         """
         epsilon = float(np.finfo(float).eps)
         travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
-        return epsilon * self.linearisation.stiffest * travel
+        pull = 0.0 if self.attraction is None else self.attraction.rounding * np.abs(state.attraction).max()
+        return max(epsilon * self.linearisation.stiffest * travel, float(pull))
 
     # -- one outer iteration
 

@@ -62,6 +62,7 @@ from evfem.common.constants import (
     NUDGE,
     PATIENT,
     SMALLEST_J,
+    STEADY,
 )
 from evfem.solver.control import GivenVoltage, Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -235,7 +236,7 @@ class Pace:
         """A step went so far (mm). Whether the body may be at rest: it slows down, with hardly any drag."""
         before, self.speed = self.speed, self.rate * way
         self.growth = self.speed / before if before > 0.0 else 0.0
-        self.ahead = min(way / self.way, 1.0) if self.way > 0.0 else 0.0
+        self.ahead = min(way / self.way, 1.0) if way > STEADY * self.way > 0.0 else 0.0
         self.way, self.slower, self.nudge = way, DRAG_CHANGE, 0.0
         if self.speed > before:
             self.quiet = DRAG_REST

@@ -48,6 +48,19 @@ def test_the_full_field_of_a_flat_outline_is_the_law():
     assert np.all((rates > 1.5) & (rates < 2.5)), rates
 
 
+def test_nodal_forces_are_known_to_what_counts_as_rounding():
+    """Above a thin insulator, where cells are thin too; moves far below the solver's change them."""
+    pad, points = arc(24, 3.0, 2.0)
+    surface = ev.Display(insulator=ev.Layer(0.0066, 7.9), y=0.0)
+    points[:, 1] = np.maximum(points[:, 1] - 0.005, 0.0)
+    _, full = attractions(pad, points, surface)
+    touching, rng = points[:, 1] <= 0.0, np.random.default_rng(5)
+    forces = full.forces(points, 361.0, touching)
+    moved = [points + 1e-15 * rng.normal(size=points.shape) for _ in range(5)]
+    noise = max(np.abs(full.forces(there, 361.0, touching) - forces).max() for there in moved)
+    assert 1e-14 < noise / np.abs(forces).max() < full.rounding
+
+
 @pytest.mark.parametrize("quadratic", [True, False])
 def test_nodal_forces_are_the_derivative_of_the_energy(quadratic):
     """In both directions, over a textured insulator, some nodes nearly touching."""

@@ -161,6 +161,19 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
 
 
+def test_forces_that_are_rounding_of_the_attraction_are_no_imbalance(pressed, monkeypatch):
+    """Contact carries the attraction, so the force on the bone may be much smaller than both."""
+    body, accepted, target = pressed
+    moved = replace(accepted, u=accepted.u + 1e-7 * np.random.default_rng(2).normal(size=accepted.u.shape))
+    moved.u[body.body.space.mesh.node_sets["bone"]] = accepted.bone
+    off, pulled = residual(pressed, moved), np.abs(accepted.attraction).max()
+    reaction = np.abs(body.balance(moved, accepted.attraction, target)[0].reaction).max()
+    monkeypatch.setattr(type(body.attraction), "rounding", 1e-3)
+    rounding = 1e-3 * pulled / body.limits.tolerance
+    assert rounding > reaction
+    assert residual(pressed, moved) == pytest.approx(off * reaction / rounding, rel=1e-12)
+
+
 def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
     """It is a part of the way to where it leads, and its residual no step of the map that is mixed."""
     mix, solve, scaled, mixed = Anderson.next_iterate, FactorisedBody._solve, [], []
