@@ -64,6 +64,8 @@ MORE                    so many times the iterations may be used where the resid
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
+HOPELESS                where the body gives way, an active set with more violated nodes after a    attraction
+                        third of its solves is given up
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
@@ -171,6 +173,7 @@ UPDATED = 0.1
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 DISC_OWN, DIVERGED = 0.1, 1e6
+HOPELESS = 12
 STABLE = 0.9
 LEFT_OVER = 0.01
 LOST = 3

@@ -32,7 +32,7 @@ Algorithm (`solve_contact`), a primal-dual active set::
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
         change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
-            round in a circle
+            round in a circle, or many are left when one at a time begins and the body gives way
     start again from all nodes sticking, then from all open, before giving up
 
 After a few solves the drops of the attraction are taken out of the equations
@@ -70,7 +70,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, ROUNDING, STABLE
+from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, HOPELESS, ROUNDING, STABLE
 from evfem.contact.changes import Changes
 from evfem.contact.elimination import Elimination, Motions, bordered
 from evfem.contact.updated import ClosedNodes, Relations
@@ -259,6 +259,8 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
             continue
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
+        if solves == ACTIVE_SET_LIMIT // 3 and violated.size > HOPELESS and problem.gives_way:
+            break
         picked = changes.picked(status, violated, violation)
         if not picked.size:
             break

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
+from evfem.common.constants import ACTIVE_SET_LIMIT
 from evfem.contact import signorini
 from evfem.contact.signorini import (
     BACKWARD,
@@ -565,3 +566,20 @@ def test_a_body_gives_way_where_its_compliance_is_not_positive():
         (np.eye(4) + 3.0 * np.eye(4, k=1), None, True),  # its symmetric part is not
     ):
         assert ContactProblem(start, compliance, mu, give=give).gives_way == gives_way
+
+
+@pytest.mark.parametrize(("hopeless", "given_up"), [(12, True), (30, False)])
+def test_many_violated_nodes_of_a_body_that_gives_way_are_given_up(monkeypatch, hopeless, given_up):
+    """Thirty nodes of random compliances of either sign, none of whose statuses hold: changed one at a
+    time they would go round in a circle at last.
+    """
+    solve, solves = signorini._solve_statuses, []
+    monkeypatch.setattr(signorini, "_solve_statuses", lambda *known: solves.append(1) or solve(*known))
+    monkeypatch.setattr(signorini, "HOPELESS", hopeless)
+    rng, compliance = np.random.default_rng(0), np.eye(60)
+    random = rng.normal(size=(30, 30))
+    compliance[:30, :30] = 0.5 * (random + random.T)
+    start = np.concatenate([-np.abs(rng.normal(size=30)), np.zeros(30)])
+    with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
+        solve_contact(ContactProblem(start, compliance, np.zeros(30)), np.full(30, OPEN))
+    assert (len(solves) == ACTIVE_SET_LIMIT // 3) == given_up
