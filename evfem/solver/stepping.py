@@ -253,8 +253,9 @@ class Stepper:
         """Raise `LiftedOff` where tissue that is viscous, but has no mass, was pulled off: in the air nothing
         limits how fast it leaves, and no part of the step is short enough.
         """
-        dynamics = None if self.body is None else self.body.dynamics
-        if self.body is None or dynamics is None or dynamics.mass is not None or target.duration == 0.0:
+        if self.body is None or target.duration == 0.0 or not self.equilibrium.strategy.relaxation:
+            return
+        if self.body.dynamics is None or self.body.dynamics.mass is not None:
             return
         try:
             Relaxation(self.body, self.solve).follow(state, replace(target, duration=0.0), Unbooked().accept)
