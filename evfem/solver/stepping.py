@@ -253,12 +253,13 @@ class Stepper:
         """Raise `LiftedOff` where tissue that is viscous, but has no mass, was pulled off: in the air nothing
         limits how fast it leaves, and no part of the step is short enough.
         """
-        if self.body is None or target.duration == 0.0 or not self.equilibrium.strategy.relaxation:
+        if self.body is None or not self.equilibrium.strategy.relaxation:
             return
-        if self.body.dynamics is None or self.body.dynamics.mass is not None:
+        relaxation = Relaxation(self.body, self.solve)
+        if relaxation.applies(target) or self.body.dynamics is None or self.body.dynamics.mass is not None:
             return
         try:
-            Relaxation(self.body, self.solve).follow(state, replace(target, duration=0.0), Unbooked().accept)
+            relaxation.follow(state, replace(target, duration=0.0), Unbooked().accept)
         except LiftedOff as lifted:
             lifted.last = failed.last
             raise
