@@ -119,9 +119,9 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
-STEADY                  steps of a release whose way is more than this fraction of the one before   snaps
-                        begin ahead
-NUDGE                   what was not at rest is pushed aside by so much once, mm: far above what   crests
+STEADY                  after a step of a release that went more than this fraction of the one      snaps
+                        before, the next begins ahead
+NUDGE                   what would leave its rest is pushed aside by so much once, mm: far above what   crests
                         iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
@@ -179,7 +179,7 @@ LEFT_OVER = 0.01
 LOST = 3
 WEAKENED = 3
 ROUNDING = 1e-12
-FIELD_ROUNDING = 1e-10
+FIELD_ROUNDING = 2e-10
 UNHELD = 1e-10
 TURNED = 1e-9
 HAIR = 1e-9

@@ -304,7 +304,7 @@ def solve_with_attraction(
             if _feedback(problem, scaled, found.status)[0] < 1.0:
                 return replace(found, reduced=True)
     if problem.gives_way:  # other starts rarely find more, and cost as much
-        raise ContactNotSolved("the attraction weakens faster than the tissue stiffens")
+        raise ContactNotSolved("the body gives way the more, the more it is loaded")
     return replace(solve_contact(weaker, status), reduced=True)
 
 

@@ -57,7 +57,7 @@ def _place(model: Model, state: State) -> str:
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
     """What may help a scene of its kind."""
     dynamics = scene.solver.dynamics
-    if isinstance(failed, LiftedOff) and dynamics != "quasistatic":
+    if isinstance(failed, LiftedOff):
         return "try more voltage, or hold = indentation"
     if isinstance(failed, Folded):
         return f"try less voltage, a thicker insulator, smaller steps, {FINER}"

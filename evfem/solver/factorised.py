@@ -371,8 +371,9 @@ class FactorisedBody:
 
     def unstable(self, old: State, state: State, target: Target) -> bool:
         """Whether crests push the finger out of the equilibrium `state` faster than it is held, by the
-        tangent at hand: iterations may come to such a one from afar. Tissue in time moves as it does,
-        the loss of the attraction is seen by the iterations, and in three dimensions it is not known.
+        tangent at hand and by its own: iterations may come to such a one from afar. Not asked of tissue
+        in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue that
+        gives way by itself, a negative compliance, is not seen.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
@@ -381,9 +382,20 @@ class FactorisedBody:
             return False
         if linearisation.refused:
             linearisation.factorise(state)
-        step = self._contact_step(old, state, target, np.zeros(len(linearisation.tangent.schur)))
+        left = self._pushed_out(old, state, target)
+        if left and not linearisation.made_at(state):
+            linearisation.factorise(state)
+            left = self._pushed_out(old, state, target)
+        return left
+
+    def _pushed_out(self, old: State, state: State, target: Target) -> bool:
+        """Whether slopes win by the tangent at hand, without the attraction."""
+        step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
         still = np.zeros(step.candidates.status.size)
-        found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+        try:
+            found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
+        except np.linalg.LinAlgError:
+            return False
         return found.cause == SLOPES and found.share > 1.0
 
     def accepted(self, old: State, state: State) -> State:

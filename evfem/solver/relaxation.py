@@ -16,7 +16,7 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
             failed again and again
             give up where a finger that is pulled has lost the surface: nothing brings it back
         while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
-            it is found, and else the body is nudged
+            it is found; the body is nudged where it would leave that
 
 Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
 finger that swings may jump over the equilibrium next to it, so the way would depend on a density
@@ -30,9 +30,9 @@ counts from step to step, and what is dissipated is counted by its definitions
 (`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
 
 *A nudge*: a symmetric finger on the middle of a crest has an equilibrium, and drag would lead it there,
-but the least push makes it leave. Such an equilibrium is refused (`evfem.solver.equilibrium`), with drag
-as without. Drag of the next step then holds the body at a place `NUDGE` aside, and the motion that is
-lost grows from there.
+but the least push makes it leave. In the plane such an equilibrium is refused
+(`evfem.solver.equilibrium`), with drag as without. Drag of the next step then holds the body at a place
+`NUDGE` aside, and the motion that is lost grows from there.
 
 A hand with a mass or a damper goes on in its own time: in the first step of a release, and then the
 bone stays at that x, while the tissue, which has no time of its own, comes to rest below it.
@@ -124,11 +124,11 @@ class Relaxation:
             calm = pace.went(float(np.abs(new.u - state.u).max()))
             state = new
             if calm:
-                rest = self._rest(state, end)
+                rest, left = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                pace.refused()
+                pace.refused(left)
             pace.choose()
         raise StepFailed("the released finger does not come to rest", [])
 
@@ -143,21 +143,21 @@ class Relaxation:
 
     @property
     def _aside(self) -> Floats:
-        """A shear along x (N, dim) that leaves the top where it is, with more of it on the right: a part of
-        every motion along x.
+        """A shear along x (N, dim) that leaves the top where it is, with more of it on the right, so that it
+        has a part of symmetric motions and of antisymmetric ones.
         """
         points = self.body.space.mesh.points
         height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
         shear[:, 0] = (points[:, 1].max() - points[:, 1]) * (1.0 + points[:, 0] / height) / height
         return shear
 
-    def _rest(self, state: State, target: Target) -> State | None:
-        """The equilibrium without drag, if it is found from here."""
+    def _rest(self, state: State, target: Target) -> tuple[State | None, bool]:
+        """The equilibrium without drag, if it is found from here; if not, whether one is left."""
         self.body.release(state.u, 0.0)
         try:
-            return self.solve(state, target, None)
-        except StepFailed:
-            return None
+            return self.solve(state, target, None), False
+        except StepFailed as failed:
+            return None, failed.unstable
 
 
 def _below(bone: Floats, target: Target) -> Target:
@@ -243,9 +243,9 @@ class Pace:
             return False
         return self.rate < self.quiet
 
-    def refused(self) -> None:
-        """It was not at rest."""
-        self.quiet, self.nudge = DRAG_CALMER * self.rate, NUDGE
+    def refused(self, left: bool) -> None:
+        """It was not at rest; nudged where that is because it would leave."""
+        self.quiet, self.nudge = DRAG_CALMER * self.rate, NUDGE if left else 0.0
 
     def choose(self) -> None:
         """The rate after a step that succeeded."""

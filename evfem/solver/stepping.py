@@ -189,7 +189,7 @@ class Stepper:
     def _keeps(self, error: float, part: float) -> bool:
         """Whether a part with this error of its path is accepted; if not, the next one is shorter."""
         least = self.equilibrium.strategy.smallest_part
-        if self.allowed is None or error <= self.allowed or part <= (1.0 + 1e-9) * least:  # but for rounding
+        if self.allowed is None or error <= self.allowed or part <= least + 1e-12:
             self.path_error = max(self.path_error, error)
             return True
         self.substep = max(longer(error / self.allowed) * part, least)

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from tools.builders import SKIN, finger
 from tools.meshes import between, block, held
 
-from evfem.common.constants import RELEASED
+from evfem.common.constants import NUDGE, RELEASED
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
@@ -27,7 +27,7 @@ from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.hand import Hand
-from evfem.solver.relaxation import Patience, Relaxation
+from evfem.solver.relaxation import Pace, Patience, Relaxation
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
 
@@ -253,6 +253,19 @@ def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
     patience.least(0.5)
     assert stays() == 1
     assert Patience().least(0.5) == 0.0
+
+
+@pytest.mark.parametrize(("left", "nudge"), [(True, NUDGE), (False, 0.0)])
+def test_only_a_body_that_would_leave_is_nudged(left, nudge):
+    """Once: the step after it goes on without."""
+    pace = Pace(rate=1e-3)
+    pace.went(0.2)
+    pace.choose()
+    assert pace.went(0.1)
+    pace.refused(left)
+    assert pace.nudge == nudge
+    assert not pace.went(0.05)  # asked again with a tenth of the drag
+    assert pace.nudge == 0.0
 
 
 def test_steps_of_a_release_begin_ahead_on_the_last_ones_way():
