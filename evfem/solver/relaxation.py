@@ -113,8 +113,8 @@ class Relaxation:
                 new = self.solve(state, held, self._ahead(state, pace.ahead))
             except Folded:
                 raise
-            except StepFailed:
-                if pace.failed():
+            except StepFailed as failed:
+                if pace.failed(failed.unstable):
                     raise
                 continue
             accept(state, new)
@@ -224,11 +224,12 @@ class Pace:
     quiet: float = DRAG_REST
     patience: Patience = field(default_factory=Patience)
 
-    def failed(self) -> bool:
-        """A step failed: the next one is slower. Whether drag holds the body by so much that this is no
-        snap.
+    def failed(self, left: bool) -> bool:
+        """A step failed: the next one is slower, and nudged where the body would leave. Whether drag holds
+        it by so much that this is no snap.
         """
         self.patience.failed()
+        self.nudge = NUDGE if left else self.nudge
         self.ahead, self.rate, self.slower = 0.0, self.slower * self.rate, DRAG_CHANGE * self.slower
         return self.rate > DRAG_MOST
 

@@ -266,6 +266,8 @@ def test_only_a_body_that_would_leave_is_nudged(left, nudge):
     assert pace.nudge == nudge
     assert not pace.went(0.05)  # asked again with a tenth of the drag
     assert pace.nudge == 0.0
+    assert not pace.failed(left)
+    assert pace.nudge == nudge
 
 
 def test_steps_of_a_release_begin_ahead_on_the_last_ones_way():
