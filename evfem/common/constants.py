@@ -121,8 +121,8 @@ DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 STEADY                  after a step of a release that went more than this fraction of the one      snaps
                         before, the next begins ahead
-NUDGE                   what would leave its rest is pushed aside by so much once, mm: far above what   crests
-                        iterations leave, far below what is seen
+NUDGE                   what would leave its rest is pushed aside by so much once, mm: far above  crests
+                        what iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps

@@ -188,8 +188,10 @@ class FactorisedBody:
         """
         epsilon = float(np.finfo(float).eps)
         travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
-        pull = 0.0 if self.attraction is None else self.attraction.rounding * np.abs(state.attraction).max()
-        return max(epsilon * self.linearisation.stiffest * travel, float(pull))
+        rounding = epsilon * self.linearisation.stiffest * travel
+        if self.attraction is None or not self.attraction.rounding:
+            return rounding
+        return max(rounding, self.attraction.rounding * float(np.abs(state.attraction).max()))
 
     # -- one outer iteration
 

@@ -210,8 +210,8 @@ class Pace:
     >>> pace = Pace()
     >>> pace.went(0.4), pace.choose(), pace.rate
     (False, None, 0.5)
-    >>> pace.went(0.2), pace.ahead
-    (False, 0.5)
+    >>> pace.went(0.3), round(pace.ahead, 12)
+    (False, 0.75)
     """
 
     rate: float = 1.0
