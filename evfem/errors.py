@@ -193,6 +193,10 @@ class NotConverged(EvfemError, RuntimeError):
         return type(self), (self.step, self.residuals, self.advice, self.result)
 
 
+class Unresolved(EvfemError):
+    """The finger's mesh does not resolve a field; inside a run it ends as `NotConverged`."""
+
+
 class StopRun(EvfemError):
     """Raised by an observer's `step` to end a run after that step; the result so far is returned.
 

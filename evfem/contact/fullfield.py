@@ -36,7 +36,7 @@ from evfem.contact.pad import Pad, surface_state
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns
 from evfem.electrostatics.laws import Layer, eps_0
-from evfem.errors import EvfemError
+from evfem.errors import Unresolved
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
 SERIES_GAP = 1e-4
@@ -342,7 +342,7 @@ class FieldAttraction(Attraction):
         return certificate(x, levels[1:3], self.surface.insulator, skin, self._columns.eps_r[1].real)
 
     def check(self, position: Floats) -> None:
-        """Raise EvfemError if the capacitance under the pad at `position` (P, 2) is not between its
+        """Raise Unresolved if the capacitance under the pad at `position` (P, 2) is not between its
         bounds.
         """
         if self._electrodes is not None or self.floating:
@@ -350,7 +350,7 @@ class FieldAttraction(Attraction):
         bounds = self.bounds(*self.outline(position, self.seen(position)))
         value = self.solve(position).value
         if not bounds.lower * (1.0 - MARGIN) <= value <= bounds.upper * (1.0 + MARGIN):
-            raise EvfemError(
+            raise Unresolved(
                 f"the field's capacitance, {value:.6g} N/V^2, is not between its bounds "
                 f"{bounds.lower:.6g} and {bounds.upper:.6g}; a finer mesh of the finger resolves it"
             )

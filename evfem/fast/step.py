@@ -101,9 +101,8 @@ class RememberedPad:
         voltage = target.drive.guess(begin.voltage)
         return replace(begin, u=begin.u + (bone - begin.bone), bone=bone, voltage=voltage)
 
-    def unstable(self, old: State, state: State, target: Target) -> bool:
+    def leaves(self, old: State, state: State, target: Target) -> None:
         """The display is flat: nothing pushes the finger aside."""
-        return False
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state, which has the forces on the bone already."""

@@ -19,7 +19,7 @@ from evfem.common.notices import LOG
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
-from evfem.errors import NotConverged, StopRun
+from evfem.errors import NotConverged, StopRun, Unresolved
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
@@ -45,6 +45,7 @@ from evfem.solver.control import (
     HeightControl,
     Indentation,
     KeptCharge,
+    Loose,
     Target,
     VoltageControl,
 )
@@ -256,16 +257,21 @@ class Run:
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
         if isinstance(motion, Slide | VoltageRamp | Wait) and motion.hold == "force":
-            # a loose finger has no force at any height: it stays where it is until a voltage acts
-            resting = start["loose"] and voltage == 0.0 and not isinstance(self.voltage, FollowForce)
-            force = None if resting else start["applied_force"]
+            force = start["applied_force"]
         bone = self.model.bone(position, indentation, position_z)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
+        if force is not None and self._resting(motion, start, voltage):
+            height = Loose()
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
         return Target(position, height, drive, z=along, hand=self._grip)
+
+    def _resting(self, motion: Motion, start: dict[str, float], voltage: float) -> bool:
+        """Whether a force is held that the finger has at any height: it is loose, and no voltage acts."""
+        held = not isinstance(motion, Press) and not isinstance(self.voltage, FollowForce)
+        return held and voltage == 0.0 and bool(start["loose"])
 
     @property
     def _grip(self) -> Grip | None:
@@ -317,6 +323,9 @@ class Run:
         except StepFailed as error:
             said = advice(self.scene, self.model, error)
             raise NotConverged(request.step, error.residuals, said, self.result()) from error
+        except Unresolved as error:
+            residuals = self.model.equilibrium.record.residuals
+            raise NotConverged(request.step, residuals, str(error), self.result()) from error
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps

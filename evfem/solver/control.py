@@ -10,6 +10,7 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
+`Loose`             height of the bone           none, or that of `Force`      F_y = 0
 `GivenVoltage`      voltage                                                    none
 `KeptCharge`        charge of the electrode      voltage                       found by the stepper
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
@@ -99,6 +100,25 @@ class Force:
     def towards(self, end: HeightControl, fraction: float) -> Force:
         assert isinstance(end, Force)
         return Force(self.force + fraction * (end.force - self.force))
+
+
+class Loose(Indentation):
+    """A finger that carries no force and that nothing touches stays at the height where it is; touched
+    by tissue that recovers, it gives way (`evfem.solver.equilibrium`).
+
+    >>> Loose().known(0.3)
+    0.3
+    """
+
+    def __init__(self) -> None:
+        super().__init__(np.nan)
+
+    def known(self, height: float) -> float:
+        return height
+
+    def towards(self, end: HeightControl, fraction: float) -> Loose:
+        assert isinstance(end, Loose)
+        return self
 
 
 @dataclass(frozen=True)

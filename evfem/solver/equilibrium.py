@@ -36,11 +36,11 @@ from evfem.common.constants import (
     MORE,
     SMALLEST_FORCE,
 )
-from evfem.contact.attraction import Attraction
+from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
-from evfem.solver.control import Target, sticks
+from evfem.solver.control import Force, Indentation, Loose, Target, sticks
 from evfem.solver.front import Front
 from evfem.solver.interface import Interface
 from evfem.solver.state import (
@@ -62,6 +62,14 @@ NOT_STABLE = "the equilibrium that was found is not stable"
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
 
+class Left(Unstable):
+    """What was found is an equilibrium that the body leaves, by `verge`."""
+
+    def __init__(self, verge: Verge) -> None:
+        super().__init__(NOT_STABLE)
+        self.verge = verge
+
+
 class LinearisedBody(Protocol):
     """A body as the outer iteration sees it; its states have displacements (`size`, 2)."""
 
@@ -80,8 +88,8 @@ class LinearisedBody(Protocol):
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate; raises `ContactNotSolved` or `StepFailed`."""
 
-    def unstable(self, old: State, state: State, target: Target) -> bool:
-        """Whether the body would leave the equilibrium `state`, pushed aside by contact."""
+    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
+        """What makes the body leave the equilibrium `state`, pushed aside by contact; None if it stays."""
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with everything that follows from it."""
@@ -210,9 +218,22 @@ class Equilibrium(Statics):
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
     ) -> State:
         """Equilibrium at `target`, friction counted from `old`; `frozen` attraction (P, 2) instead
-        of the current one if given; iterations begin at `start` (default `old`). Raises
-        `StepFailed`.
+        of the current one if given; iterations begin at `start` (default `old`). A loose finger that
+        is touched gives way. Raises `StepFailed`.
         """
+        found = self._followed(old, target, frozen, start)
+        if not isinstance(target.height, Loose) or not found.touching.any():
+            return found
+        lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, found)
+        gap = float(self.interface.surface_at(lifted).gap.min())
+        if gap <= TOUCHING:
+            return lifted
+        # without a force every height above is an equilibrium too
+        height = Indentation(float(lifted.bone[1]) - gap + TOUCHING)
+        return self._followed(old, replace(target, height=height), frozen, lifted)
+
+    def _followed(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
+        """The equilibrium at `target`, with the voltage as its control wants it."""
         found = None
         try:
             found = self._try(old, target, frozen, start)
@@ -253,6 +274,7 @@ class Equilibrium(Statics):
             kind = Folded if isinstance(error, Folded) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
+            failed.verge = error.verge if isinstance(error, Left) else None
             failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
             raise failed from error
 
@@ -275,8 +297,8 @@ class Equilibrium(Statics):
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
                     self._refuse_fold(state)
-                    if self.body.unstable(old, state, target):
-                        raise Unstable(NOT_STABLE)
+                    if (verge := self.body.leaves(old, state, target)) is not None:
+                        raise Left(verge)
                     return self._settled(old, self.body.accepted(old, state), target)
                 if len(history) > refused + 1:  # what follows is another problem: nodes let go or admitted
                     refused = len(history)

@@ -371,8 +371,8 @@ class FactorisedBody:
 
     # -- a step ends
 
-    def unstable(self, old: State, state: State, target: Target) -> bool:
-        """Whether crests push the finger out of the equilibrium `state` faster than it is held, by the
+    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
+        """How crests push the finger out of the equilibrium `state` faster than it is held, by the
         tangent at hand and by its own: iterations may come to such a one from afar. Not asked of tissue
         in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue that
         gives way by itself, a negative compliance, is not seen.
@@ -381,24 +381,24 @@ class FactorisedBody:
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
         timed = dynamics is not None and dynamics.step > 0.0
         if timed or state.bone.size == 3 or not crests.any():
-            return False
+            return None
         if linearisation.refused:
             linearisation.factorise(state)
-        left = self._pushed_out(old, state, target)
-        if left and not linearisation.made_at(state):
+        found = self._pushed_out(old, state, target)
+        if found is not None and not linearisation.made_at(state):
             linearisation.factorise(state)
-            left = self._pushed_out(old, state, target)
-        return left
+            found = self._pushed_out(old, state, target)
+        return found
 
-    def _pushed_out(self, old: State, state: State, target: Target) -> bool:
-        """Whether slopes win by the tangent at hand, without the attraction."""
+    def _pushed_out(self, old: State, state: State, target: Target) -> Verge | None:
+        """By how much slopes win by the tangent at hand, without the attraction; None if they do not."""
         step = self._contact_step(old, state, target, np.zeros(len(self.linearisation.tangent.schur)))
         still = np.zeros(step.candidates.status.size)
         try:
             found = verge(replace(step, candidates=replace(step.candidates, negative_stiffness=still)))
         except np.linalg.LinAlgError:
-            return False
-        return found.cause == SLOPES and found.share > 1.0
+            return None
+        return found if found.cause == SLOPES and found.share > 1.0 else None
 
     def accepted(self, old: State, state: State) -> State:
         """The converged state with its velocity and its increment."""

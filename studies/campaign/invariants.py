@@ -22,7 +22,8 @@ from evfem.scene.scene import Scene
 from evfem.simulation.history import WIDTHS
 from evfem.simulation.result import COLUMNS, Frame, Result
 
-FORCE, ENERGY = 1e-6, 1e-9  # N/mm, N
+#: below these, N/mm and N, forces and energies are rounding: of the skin's stiffness, 1e-12 N/mm
+FORCE, ENERGY = 1e-5, 1e-9
 #: relative errors that a correct result may have: of sums and tractions, and of the works of one row
 TOLERANCE, FALL = 1e-6, 1e-6
 #: mm: how deep a node may sink in, and how far a node pinned to a jump of friction may be from it

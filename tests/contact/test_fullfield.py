@@ -10,6 +10,7 @@ from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
 from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
 from evfem.contact.pad import Pad
+from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
 
 
@@ -157,6 +158,20 @@ def scene(field, finger, motion, **options):
 
 
 SMOOTH = ev.FingerPad(ridges=False, resolution="coarse")
+
+
+def test_a_run_whose_field_the_mesh_does_not_resolve_keeps_what_it_has(monkeypatch):
+    deep = []
+
+    def check(attraction, points):
+        deep.append(points)
+        if len(deep) > 1:
+            raise Unresolved("a finer mesh of the finger resolves it")
+
+    monkeypatch.setattr(FieldAttraction, "check", check)
+    with pytest.raises(ev.NotConverged, match=r"step 2 did not converge .* a finer mesh") as failed:
+        ev.simulate(scene("full", SMOOTH, [ev.Hover(gap=0.1, steps=2)]))
+    assert len(failed.value.result.step) == 1
 
 
 def test_a_hovering_pad_feels_the_field_of_its_outline():

@@ -56,6 +56,21 @@ def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
         assert result.contact_width[7] > 0.0  # nothing holds it against an attraction
 
 
+def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it():
+    """Without a force the tissue creeps back at its own rate, and the bone stands as high as that needs: once
+    little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau.
+    """
+    body, tau, wait = finger(block(8, 3, sag=0.4), viscosity=5e-3), 5e-3, 0.1
+    motion = [ev.Press(indentation=0.4, steps=4, speed=20.0), ev.Press(indentation=0.2, steps=4, speed=400.0)]
+    motion.append(ev.Wait(wait, steps=8, hold="force"))
+    result = ev.simulate(scene(*motion, voltage=0.0, body=body, solver=ev.Solver(dynamics="viscous")))
+    assert np.abs(result.applied_force[4:]).max() < 1e-12
+    left = result.indentation[7:]
+    assert left[0] == 0.2
+    factor = left[6:] / left[5:-1]
+    np.testing.assert_allclose(factor, 1.0 / (1.0 + wait / 8 / tau), rtol=1e-3)
+
+
 def test_an_equilibrium_does_not_depend_on_how_long_it_took():
     """Quasi-static: the same voltages as a profile over the position, at the same places."""
     slide = ev.Slide(0.4, steps=8, speed=20.0)

@@ -12,6 +12,7 @@ from tools.meshes import block
 from evfem.contact.friction import RateFriction
 from evfem.contact.pad import make_pad
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.contact.stability import SLOPES, Verge
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.mesh.mesh import raised
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
@@ -38,7 +39,7 @@ class Script:
 
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
-        self.states, self.residuals, self.admitted, self.left = states, residuals, [], False
+        self.states, self.residuals, self.admitted, self.left = states, residuals, [], None
 
     def known(self, old, target):
         return None
@@ -56,7 +57,7 @@ class Script:
     def accepted(self, old, state):
         return state
 
-    def unstable(self, old, state, target):
+    def leaves(self, old, state, target):
         return self.left
 
     def admit(self, state, gap):
@@ -214,11 +215,12 @@ def test_a_residual_that_is_no_number_fails_the_step(residual):
 def test_an_equilibrium_that_the_body_leaves_is_refused():
     interface, old, new = legal(SURFACES[0])
     script = Script([new], (0.0, 0.0))
-    script.left = True
+    script.left = Verge(1.5, SLOPES)
     solver = Equilibrium(script, interface, None, Limits(TOLERANCE))
     with pytest.raises(StepFailed, match="the equilibrium that was found is not stable") as failed:
         solver.step(old, Target.held(old.bone, 0.0))
     assert failed.value.unstable
+    assert failed.value.verge is script.left
 
 
 def test_an_outline_that_folds_over_itself_is_refused():
