@@ -63,9 +63,10 @@ class Slide:
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
     which the load drifts (`evfem.scene.drift`). A finger that touches nothing and is not attracted has
-    no force at any height: in every motion with `hold` it stays where it is. `speed` (mm/s) sets how
-    much time passes; it is needed with `dynamics` other than quasistatic. A finger in three dimensions
-    slides at an `angle`, in degrees from +x in the plane of the display, 90 being +z.
+    no force at any height: in every motion with `hold` it stays where it is, and gives way to what
+    touches it. `speed` (mm/s) sets how much time passes; it is needed with `dynamics` other than
+    quasistatic. A finger in three dimensions slides at an `angle`, in degrees from +x in the plane of
+    the display, 90 being +z.
 
     >>> Slide(distance=5.0).steps
     100
