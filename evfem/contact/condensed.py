@@ -209,8 +209,7 @@ class LinearContactStep:
     `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
     else moves the body; `snap`: nodes that the attraction pulls over the gap close at once;
     `timed`: time passes, or drag slows a release, and a shorter step is held by viscosity or inertia,
-    a slower one by drag, where one without them must go the way it is pushed; `begin`: statuses (c,) at
-    which the solution is sought first, if not at the candidates' own.
+    a slower one by drag, where one without them must go the way it is pushed.
     """
 
     body: CondensedTangent
@@ -220,7 +219,6 @@ class LinearContactStep:
     unknowns: tuple[ExtraUnknown, ...] = ()
     snap: bool = False
     timed: bool = False
-    begin: Ints | None = None
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
@@ -228,7 +226,7 @@ class LinearContactStep:
         normal_gap = self.candidates.surface.normal_gap
         # under the present contact forces: without them the whole pad would sink
         gap = normal_gap + self._along_normal(free[:, 0] + self.body.compliance @ self._present)
-        status, solves = (self.candidates.status if self.begin is None else self.begin).copy(), 0
+        status, solves = self.candidates.status.copy(), 0
         own = np.diagonal(self.body.compliance)[1 :: self.body.dim]
         near = np.flatnonzero(
             (status != OPEN) | (gap < 0.0) | (self.candidates.negative_stiffness * own > WEAK)

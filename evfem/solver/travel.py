@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats
 from evfem.common.constants import SEARCH_END, SEARCH_LIMIT, SEARCH_START
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import ContactNotSolved
@@ -42,24 +42,15 @@ class Travel:
             bone[unknown.axis] += travel
         if not target.height.free:
             return found, bone
-        push = 0.0
-        if (
-            not found.status.any()
-            and bone[1] * target.height.missing(float(state.bone[1]), state.reaction) < 0.0
-        ):
-            push = self._push(step)
-        flies = bone[1] * push < 0.0
+        missing = target.height.missing(float(state.bone[1]), state.reaction)
+        flies = not found.status.any() and bone[1] * missing < 0.0
         if abs(bone[1]) > self.longest or flies:
             # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
-            # part of the way, the way that it is pushed
+            # part of the way, the way the missing force pushes
             longest = self._longest_flight(state) if flies else self.longest
-            bone[1] = np.copysign(longest, push if flies else bone[1])
+            bone[1] = np.copysign(longest, missing if flies else bone[1])
             found = self.solve(replace(step, bone=bone, unknowns=()))
         return found, bone
-
-    def _push(self, step: LinearContactStep) -> float:
-        """Force (N/mm) that the bone lacks where it stands, once the tissue has come to rest below it."""
-        return step.lacking(self.solve(replace(step, unknowns=())), 0.0)
 
     def _longest_flight(self, state: State) -> float:
         """How far (mm) a body that touches nothing moves in one iteration: to the surface and as
@@ -75,24 +66,23 @@ class Travel:
         example.
 
         The travel grows towards the lacking force, twice as far each time, and is halved where
-        that overshoots; each solution is sought from the nearest one found. A body that hovers is
-        attracted the more, the lower it is, and lacks more on its whole way to where it touches: it
-        goes there at once.
+        that overshoots. A body that hovers is attracted the more, the lower it is, and lacks more on
+        its whole way to where it touches: it goes there at once.
         """
 
-        def at(travel: float, begin: Ints | None) -> tuple[float, StepSolution, Floats]:
+        def at(travel: float) -> tuple[float, StepSolution, Floats]:
             bone = step.bone.copy()
             bone[step.unknowns[0].axis] += travel
-            found = self.solve(replace(step, bone=bone, unknowns=(), begin=begin))
+            found = self.solve(replace(step, bone=bone, unknowns=()))
             return step.lacking(found, travel), found, bone
 
-        first = best = at(0.0, None)
+        first = best = at(0.0)
         travel = 0.0
         way = float(np.copysign(SEARCH_START * self.longest, first[0]))
         falls = first[0] < 0.0 and not first[1].status.any()
         for _ in range(SEARCH_LIMIT):
             try:
-                new = at(travel + way, best[1].status)
+                new = at(travel + way)
             except ContactNotSolved:
                 way *= 0.5
                 continue
@@ -106,6 +96,6 @@ class Travel:
         if travel == 0.0 and falls:
             for part in range(SEARCH_LIMIT):
                 with suppress(ContactNotSolved):
-                    best = at(-(0.5**part) * self._longest_flight(state), best[1].status)
+                    best = at(-(0.5**part) * self._longest_flight(state))
                     break
         return best[1], best[2]

@@ -154,16 +154,6 @@ def test_prescribed_forces_are_reached_on_any_profile(seed, curved, unknowns):
     assert (found.status != OPEN).any()
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_a_solution_is_sought_first_where_one_is_told_to_begin(seed):
-    step, _, _ = step_of(np.random.default_rng(seed), 1.0)
-    found = step.solve()
-    again = replace(step, begin=found.status).solve()
-    assert again.solves == 1 < found.solves
-    np.testing.assert_array_equal(again.status, found.status)
-    np.testing.assert_allclose(again.moved, found.moved, rtol=1e-12, atol=1e-14)
-
-
 def test_friction_that_grows_along_the_way_is_felt():
     rng = np.random.default_rng(3)
     step, *matrices = step_of(rng, 1.0, 0.0, ("force",), friction_slope=rng.uniform(0.5, 1.0, K))

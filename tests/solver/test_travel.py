@@ -16,23 +16,10 @@ class Hovering:
 
     lacks: float
     bone: np.ndarray
-    begin: np.ndarray | None = None
     unknowns: tuple = (SimpleNamespace(axis=1),)
 
     def lacking(self, found, travel):
         return self.lacks + 0.1 * travel
-
-
-@pytest.mark.parametrize(("pushed", "way"), [(-1e-3, -0.1), (1e-3, 0.6), (0.0, -0.1)])
-def test_a_body_flies_off_only_if_it_is_pushed_against_its_travel_at_rest(pushed, way):
-    """It may still lack force the other way while its tissue is out of balance."""
-    target = SimpleNamespace(height=SimpleNamespace(free=True, missing=lambda height, reaction: 1e-12))
-    state = SimpleNamespace(bone=np.zeros(2), reaction=np.zeros(2))
-    open_gap = SimpleNamespace(gap=np.array([0.3, 5.0]))
-    found = SimpleNamespace(status=np.zeros(2, dtype=int), extra=np.array([-0.1]))
-    travel = Travel(SimpleNamespace(surface_at=lambda state: open_gap), lambda step: found, 1.0)
-    _, bone = travel.limited(Hovering(pushed, np.zeros(2)), found, state, target)
-    assert bone.tolist() == pytest.approx([0.0, way])
 
 
 @pytest.mark.parametrize(
