@@ -185,8 +185,9 @@ class NotConverged(EvfemError, RuntimeError):
 
     def __init__(self, step: int, residuals: list[float], advice: str, result: object = None) -> None:
         self.step, self.residuals, self.advice, self.result = step, residuals, advice, result
-        tail = ", ".join(f"{r:.1e}" for r in residuals[-4:])
-        super().__init__(f"step {step} did not converge (last residuals: {tail}); {advice}")
+        last = ", ".join(f"{r:.1e}" for r in residuals[-4:])
+        tail = f" (last residuals: {last})" if last else ""
+        super().__init__(f"step {step} did not converge{tail}; {advice}")
 
     def __reduce__(self) -> tuple[Any, ...]:
         """For pickle, so that the error reaches another process."""

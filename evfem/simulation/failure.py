@@ -7,10 +7,8 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.constants import VERGE, VERGE_LOST
-from evfem.contact.stability import Verge
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
-from evfem.solver.control import Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 
 FINER = "less friction or a finer mesh"
@@ -30,8 +28,13 @@ def _lost(model: Model, failed: StepFailed) -> str:
     if isinstance(failed, LiftedOff):
         return f"{failed.reason}; it was lost at {_place(model, failed.last[0])}"
     state, target = failed.last
-    verge = failed.verge or _approached(model, failed, state, target)
-    if verge is None:
+    try:
+        with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
+            verge = model.equilibrium.verge(state, target)
+    except StepFailed:  # the tangent there is singular
+        return ""
+    # a trial far from equilibrium may give way too: alone that shows nothing
+    if verge is None or verge.share < (VERGE_LOST if failed.unstable else VERGE):
         return ""
     passing = model.body.dynamics is not None and target.duration > 0.0
     rest = "within a time step as short as this" if passing else "at rest"
@@ -40,19 +43,6 @@ def _lost(model: Model, failed: StepFailed) -> str:
         f"there is no equilibrium {rest} near here: {verge.cause}, {verge.share:.3g} times as hard as its "
         f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
     )
-
-
-def _approached(model: Model, failed: StepFailed, state: State, target: Target) -> Verge | None:
-    """What takes the last equilibrium its stability, if it is close enough to that."""
-    try:
-        with np.errstate(invalid="ignore"):  # a law of one's own may have become infinite
-            verge = model.equilibrium.verge(state, target)
-    except StepFailed:  # the tangent there is singular
-        return None
-    # a trial far from equilibrium may give way too: alone that shows nothing
-    if verge is None or verge.share < (VERGE_LOST if failed.unstable else VERGE):
-        return None
-    return verge
 
 
 def _place(model: Model, state: State) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from evfem.common import notices
+from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
@@ -221,7 +222,8 @@ class Run:
         row = {"position_z": 0.0} | self.rows[rows_before - 1]
         names = ("position", "position_z", "indentation", "applied_force", "voltage")
         start = {name: row[name] for name in names}
-        start["loose"] = float(row["normal_force"] == 0.0 and row["electrostatic_force"] == 0.0)
+        least = self.model.equilibrium.tolerance * SMALLEST_FORCE
+        start["loose"] = float(row["normal_force"] <= least and row["electrostatic_force"] == 0.0)
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
 
     def _driven(self, rows_before: int) -> float:
@@ -260,18 +262,23 @@ class Run:
             force = start["applied_force"]
         bone = self.model.bone(position, indentation, position_z)
         height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
-        if force is not None and self._resting(motion, start, voltage):
-            height = Loose()
+        if force is not None and self._resting(motion, start, voltage, time):
+            height = Loose(float(bone[1]))
         drive: VoltageControl = GivenVoltage(voltage)
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
         return Target(position, height, drive, z=along, hand=self._grip)
 
-    def _resting(self, motion: Motion, start: dict[str, float], voltage: float) -> bool:
-        """Whether a force is held that the finger has at any height: it is loose, and no voltage acts."""
-        held = not isinstance(motion, Press) and not isinstance(self.voltage, FollowForce)
-        return held and voltage == 0.0 and bool(start["loose"])
+    def _resting(self, motion: Motion, start: dict[str, float], voltage: float, time: float) -> bool:
+        """Whether a force is held that the finger has at any height: it is loose, and nothing is to
+        attract it at `time` (s).
+        """
+        if isinstance(motion, Press) or isinstance(self.voltage, FollowForce):
+            return False
+        if isinstance(self.voltage, ChargeControl):
+            return bool(start["loose"]) and self.voltage.charge_at(time) == 0.0
+        return bool(start["loose"]) and voltage == 0.0
 
     @property
     def _grip(self) -> Grip | None:
@@ -324,8 +331,7 @@ class Run:
             said = advice(self.scene, self.model, error)
             raise NotConverged(request.step, error.residuals, said, self.result()) from error
         except Unresolved as error:
-            residuals = self.model.equilibrium.record.residuals
-            raise NotConverged(request.step, residuals, str(error), self.result()) from error
+            raise NotConverged(request.step, [], str(error), self.result()) from error
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps

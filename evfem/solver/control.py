@@ -10,7 +10,7 @@ control             known                        unknown                       e
 ==================  ===========================  ============================  ====================
 `Indentation`       height of the bone                                         none
 `Force`                                          travel of the bone            F_y = -force
-`Loose`             height of the bone           none, or that of `Force`      F_y = 0
+`Loose`             height of the bone           travel of the bone            F_y = 0, if touched
 `GivenVoltage`      voltage                                                    none
 `KeptCharge`        charge of the electrode      voltage                       found by the stepper
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
@@ -76,7 +76,7 @@ class Indentation:
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
         return ()
 
-    def towards(self, end: HeightControl, fraction: float) -> Indentation:
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
         assert isinstance(end, Indentation)
         return Indentation(self.height + fraction * (end.height - self.height))
 
@@ -98,27 +98,23 @@ class Force:
         return (ExtraUnknown(-tangent.schur[:, 1 - tangent.dim], 1, -self.force),)
 
     def towards(self, end: HeightControl, fraction: float) -> Force:
+        if isinstance(end, Loose):
+            return self
         assert isinstance(end, Force)
         return Force(self.force + fraction * (end.force - self.force))
 
 
 class Loose(Indentation):
-    """A finger that carries no force and that nothing touches stays at the height where it is; touched
-    by tissue that recovers, it gives way (`evfem.solver.equilibrium`).
+    """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
+    begins; touched on the way, by a crest or by tissue that recovers, it gives way
+    (`Equilibrium.step`).
 
-    >>> Loose().known(0.3)
-    0.3
+    >>> Loose(0.3).towards(Force(0.0), 0.5)
+    Force(force=0.0)
     """
 
-    def __init__(self) -> None:
-        super().__init__(np.nan)
-
-    def known(self, height: float) -> float:
-        return height
-
-    def towards(self, end: HeightControl, fraction: float) -> Loose:
-        assert isinstance(end, Loose)
-        return self
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
+        return end
 
 
 @dataclass(frozen=True)

@@ -57,17 +57,9 @@ from evfem.solver.state import (
 from evfem.solver.strategy import Strategy, stuck
 
 #: why an equilibrium is refused that the body leaves
-NOT_STABLE = "the equilibrium that was found is not stable"
+NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
-
-
-class Left(Unstable):
-    """What was found is an equilibrium that the body leaves, by `verge`."""
-
-    def __init__(self, verge: Verge) -> None:
-        super().__init__(NOT_STABLE)
-        self.verge = verge
 
 
 class LinearisedBody(Protocol):
@@ -221,16 +213,24 @@ class Equilibrium(Statics):
         of the current one if given; iterations begin at `start` (default `old`). A loose finger that
         is touched gives way. Raises `StepFailed`.
         """
-        found = self._followed(old, target, frozen, start)
-        if not isinstance(target.height, Loose) or not found.touching.any():
-            return found
-        lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, found)
+        if not isinstance(target.height, Loose):
+            return self._followed(old, target, frozen, start)
+        held = replace(target, height=Indentation(float(old.bone[1])))
+        found = self._followed(old, held, frozen, start)
+        return self._given_way(old, held, frozen, found) if found.touching.any() else found
+
+    def _given_way(self, old: State, target: Target, frozen: Floats | None, touched: State) -> State:
+        """Where a finger without a force stands that is touched at `target`, from the iterate `touched`.
+
+        Without mass every height above is an equilibrium too: its lowest node then just does not touch.
+        """
+        lifted = self._followed(old, replace(target, height=Force(0.0)), frozen, touched)
         gap = float(self.interface.surface_at(lifted).gap.min())
         if gap <= TOUCHING:
             return lifted
-        # without a force every height above is an equilibrium too
         height = Indentation(float(lifted.bone[1]) - gap + TOUCHING)
-        return self._followed(old, replace(target, height=height), frozen, lifted)
+        lowered = self._followed(old, replace(target, height=height), frozen, lifted)
+        return lowered if abs(lowered.reaction[1]) < SMALLEST_FORCE else lifted
 
     def _followed(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
         """The equilibrium at `target`, with the voltage as its control wants it."""
@@ -274,7 +274,6 @@ class Equilibrium(Statics):
             kind = Folded if isinstance(error, Folded) else StepFailed
             failed = kind(reason, self.record.residuals)
             failed.unstable = isinstance(error, Unstable)
-            failed.verge = error.verge if isinstance(error, Left) else None
             failed.findings = "" if self._seen is None else self.body.findings(*self._seen)
             raise failed from error
 
@@ -298,7 +297,7 @@ class Equilibrium(Statics):
                 if self._accepts(old, state, target):
                     self._refuse_fold(state)
                     if (verge := self.body.leaves(old, state, target)) is not None:
-                        raise Left(verge)
+                        raise Unstable(NOT_STABLE.format(verge.cause, verge.share))
                     return self._settled(old, self.body.accepted(old, state), target)
                 if len(history) > refused + 1:  # what follows is another problem: nodes let go or admitted
                     refused = len(history)

@@ -9,7 +9,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.signorini import OPEN
-from evfem.contact.stability import Verge
 from evfem.solver.strategy import Strategy
 
 #: the pressure where it is no unknown of the iterations
@@ -25,9 +24,8 @@ NO_CHARGES: Floats = np.zeros((2, 0))
 class StepFailed(ArithmeticError):
     """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
     `findings` how the last iterate looked; `unstable`: the linearised body gives way the more, the
-    more it is loaded; `verge`: what makes it leave the equilibrium that was found. Of a step that was
-    given up, `last` is the state it was tried from and its target, and `released` whether the body was
-    released there.
+    more it is loaded. Of a step that was given up, `last` is the state it was tried from and its
+    target, and `released` whether the body was released there.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
@@ -35,7 +33,6 @@ class StepFailed(ArithmeticError):
         self.reason, self.residuals, self.findings = reason, residuals, ""
         self.unstable = self.released = False
         self.last: tuple[State, Any] | None = None
-        self.verge: Verge | None = None
 
 
 class Folded(StepFailed):

@@ -38,14 +38,15 @@ def smooth(result: Result) -> bool:
 def free_of_path(scene: Scene) -> bool:
     """Whether the end of a scene does not depend on the steps towards it.
 
-    Friction, time and penalties (whose nodes yield by the lengths of the step before) make it
-    depend on them, and so do attractions that lag behind by a step.
+    Friction, time, penalties (whose nodes yield by the lengths of the step before) and charges that
+    move in time make it depend on them, and so do attractions that lag behind by a step.
     """
     return (
         not scene.has_friction
         and scene.solver.dynamics == "quasistatic"
         and scene.solver.contact == "exact"
         and scene.air_layer
+        and not (scene.drive is not None and scene.drive.resolved)
         and scene.coupling != "staggered_once"
     )
 

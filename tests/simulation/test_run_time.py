@@ -56,19 +56,53 @@ def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
         assert result.contact_width[7] > 0.0  # nothing holds it against an attraction
 
 
-def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it():
+@pytest.mark.parametrize("along", [ev.Wait(0.1, steps=8, hold="force"), ev.Slide(0.4, 8, 4.0, "force")])
+def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it(along):
     """Without a force the tissue creeps back at its own rate, and the bone stands as high as that needs: once
     little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau.
     """
-    body, tau, wait = finger(block(8, 3, sag=0.4), viscosity=5e-3), 5e-3, 0.1
+    body, tau = finger(block(8, 3, sag=0.4), viscosity=5e-3), 5e-3
     motion = [ev.Press(indentation=0.4, steps=4, speed=20.0), ev.Press(indentation=0.2, steps=4, speed=400.0)]
-    motion.append(ev.Wait(wait, steps=8, hold="force"))
+    motion.append(along)
     result = ev.simulate(scene(*motion, voltage=0.0, body=body, solver=ev.Solver(dynamics="viscous")))
     assert np.abs(result.applied_force[4:]).max() < 1e-12
     left = result.indentation[7:]
     assert left[0] == 0.2
     factor = left[6:] / left[5:-1]
-    np.testing.assert_allclose(factor, 1.0 / (1.0 + wait / 8 / tau), rtol=1e-3)
+    np.testing.assert_allclose(factor, 1.0 / (1.0 + 0.1 / 8 / tau), rtol=1e-3)
+
+
+def test_a_loose_finger_is_lifted_by_crests_and_stays_there():
+    """It slides from a trough over the crest, halfway, and on: no step goes down again."""
+    wave = ev.Sinusoid(terms=[[0.1, 2.0 * np.pi / 3.0, -0.5 * np.pi]], friction=0.0)
+    lifted = [ev.Press(indentation=0.1, steps=2), ev.Press(indentation=-0.005, steps=1)]
+    body = finger(block(8, 3, sag=0.4))
+    over = [*lifted, ev.Slide(2.4, steps=16, hold="force"), ev.Slide(0.6, steps=4, hold="force")]
+    result = ev.simulate(ev.Scene(body, wave, motion=over))
+    assert np.abs(result.applied_force[3:]).max() < 1e-12
+    assert result.min_gap.min() > -1e-9
+    assert (np.diff(result.indentation[2:]) < 1e-12).all()  # nothing pulls it down again
+    assert result.indentation[-1] == result.indentation[12] < result.indentation[4] < -0.005
+
+
+def test_a_finger_that_just_touches_is_loose():
+    """Its force is rounding, which would be held in the next motion."""
+    going = Run(scene(PRESS, ev.Wait(0.1), voltage=0.0), None)
+    row = dict.fromkeys(("position", "indentation", "applied_force", "voltage", "electrostatic_force"), 0.0)
+    for force, loose in ((0.0, True), (1e-17, True), (-1e-17, True), (1e-8, False)):
+        going.rows = [row | {"normal_force": force}]
+        assert going._start_of(1)["loose"] == loose
+
+
+@pytest.mark.parametrize("ends", [(1000.0, 0.0), (0.0, 1000.0)])
+def test_a_voltage_that_comes_or_goes_within_a_step_finds_a_loose_finger(ends):
+    """Parts of a step have the controls of both its ends."""
+    off = [ev.Press(indentation=0.1, steps=2), ev.Press(indentation=-0.05, steps=1)]
+    ramps = [ev.VoltageRamp(voltage, steps=2, hold="force") for voltage in ends]
+    steps = ev.Solver(strategy=ev.Strategy(steps="auto"))
+    result = ev.simulate(scene(*off, *ramps, voltage=0.0, solver=steps))
+    assert np.abs(result.applied_force[3:]).max() < 1e-8
+    assert (result.contact_width[3:] > 0.0).any()
 
 
 def test_an_equilibrium_does_not_depend_on_how_long_it_took():

@@ -217,10 +217,9 @@ def test_an_equilibrium_that_the_body_leaves_is_refused():
     script = Script([new], (0.0, 0.0))
     script.left = Verge(1.5, SLOPES)
     solver = Equilibrium(script, interface, None, Limits(TOLERANCE))
-    with pytest.raises(StepFailed, match="the equilibrium that was found is not stable") as failed:
+    with pytest.raises(StepFailed, match=f"not stable: {SLOPES}, 1.5 times as hard") as failed:
         solver.step(old, Target.held(old.bone, 0.0))
     assert failed.value.unstable
-    assert failed.value.verge is script.left
 
 
 def test_an_outline_that_folds_over_itself_is_refused():

@@ -7,7 +7,15 @@ import pytest
 
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target, VoltageProblem
+from evfem.solver.control import (
+    FollowFriction,
+    Force,
+    GivenVoltage,
+    Indentation,
+    Loose,
+    Target,
+    VoltageProblem,
+)
 
 REACTION = np.array([0.2, -3.0])
 
@@ -142,3 +150,10 @@ def test_only_at_the_limit_of_a_pad_that_sticks_the_old_voltage_is_kept(wish, st
     assert control.fallback(old, found) == (GivenVoltage(321.0) if kept else None)
     assert control.fallback(old, None) == GivenVoltage(321.0)
     assert GivenVoltage(5.0).fallback(old, None) is None
+
+
+def test_a_force_acts_on_the_way_from_or_to_a_loose_finger():
+    """The ends themselves keep their own controls (`Run._path`)."""
+    for force in (0.0, 1e-9):
+        assert Loose(0.3).towards(Force(force), 0.5) == Force(force)
+        assert Force(force).towards(Loose(0.3), 0.5) == Force(force)

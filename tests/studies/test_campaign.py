@@ -322,6 +322,11 @@ def test_steps_count_only_where_there_is_a_path(correct):
     assert not twins.free_of_path(scene)
     plain = SCENE | {"surface": {"kind": "flat", "friction": 0.0}, "motion": SCENE["motion"][:1]}
     assert twins.free_of_path(tables.scene_of(plain))
+    force = {"law": "strong_troxel", "insulator": "film", "waveform": "sine", "frequency": 100.0}
+    for drive, free in (("mean", True), ("resolved", False)):
+        motion = [*plain["motion"], {"kind": "wait", "duration": 0.01, "steps": 2}]
+        charged = plain | {"electrostatics": force | {"amplitude": 100.0, "drive": drive}, "motion": motion}
+        assert twins.free_of_path(tables.scene_of(charged)) is free
     one, finer = (simulate(tables.scene_of(t)) for t in (plain, tables.with_half_steps(plain)))
     assert twins.steps_broken(one, finer) is None
     pushed = finer.normal_force.copy()
