@@ -96,6 +96,8 @@ HAIR                    how far inside the rougher side a node is pinned to a ju
                         mm: far above rounding, far below any mesh
 NEAR                    a slip that has changed by less than this fraction of it in one           rates
                         iteration is near the end
+BACK                    a node's speed goes to and fro if it changes back by at least this        rates
+                        fraction of its last change
 SHORT_RAMP              ramps of friction shorter than this fraction of a node distance are       jumps
                         jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps
@@ -184,6 +186,7 @@ UNHELD = 1e-10
 TURNED = 1e-9
 HAIR = 1e-9
 NEAR = 0.3
+BACK = 0.5
 SHORT_RAMP = 0.5
 CHANGES = 3
 WEDGED = 2

@@ -320,9 +320,16 @@ class LinearContactStep:
     def _solve_following(
         self, near: Ints, free: Floats, status: Ints, follower: FollowerStiffness
     ) -> tuple[ContactSolution, Floats]:
-        """The same with this follower stiffness."""
+        """The same with this follower stiffness.
+
+        What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
+        friction that rises with the speed for example, multiplies that and not the whole free motion.
+        """
         known, rows = self.candidates, y_before_x(near)
-        C, W = follower.apply(self.body.among(near), free[rows])
+        among, own, held = self.body.among(near), free[rows], self._present[rows]
+        own[:, 0] += among @ held
+        C, W = follower.apply(among, own)
+        ahead, W[:, 0] = W[:, 0].copy(), W[:, 0] - C @ held
         axes = known.axes[near]
         start = local(axes, W[:, :1])[:, 0] + np.concatenate(
             [known.surface.normal_gap[near], known.slip[near]]
@@ -349,7 +356,7 @@ class LinearContactStep:
         pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
         if follower.loaded.size:
-            force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
+            force = force + follower.force(ahead + C @ (force - held) + W[:, 1:] @ found.extra)
         return found, force
 
     def _bone_balance(

@@ -3,7 +3,7 @@ r"""Nodes that go to and fro under a law of friction, in the iterations of one s
 The contact problem sees a law by its tangent at the iterate. Where a node comes back to where it has
 been, the tangents do not lead to the law, and what has been seen of it takes their place:
 
-- friction that rises steeply from rest with the speed and levels off, or has a kink there: `Returned`,
+- friction that rises steeply from rest with the speed and levels off, or has a kink: `Returned`,
 - friction that grows less and less with the load, of a node that it presses: `Wedged`. With the load
   :math:`\lambda_n = \alpha + \beta T` under the shear force T, equilibria are the roots of
   :math:`b(\alpha + \beta T) = T`. Where the node would leave the surface without friction,
@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import NEAR, WEDGED
+from evfem.common.constants import BACK, NEAR, WEDGED
 from evfem.contact.friction import Linearised, Slipping
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
@@ -30,7 +30,7 @@ HALVINGS = 60
 
 
 class Returned:
-    """Nodes that have slipped and stick again: `nodes` (P,) bool.
+    """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
 
     Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
     a node at rest which the friction of rest does not: the iterations would let it slip and stick by
@@ -45,6 +45,7 @@ class Returned:
     def __init__(self, size: int) -> None:
         self.nodes = np.zeros(size, dtype=bool)
         self._slipped = np.zeros(size, dtype=bool)
+        self._speed, self._change = np.full(size, np.nan), np.zeros(size)
         self._slope, self._slip = np.zeros(size), np.full(size, np.nan)
         self._fastest = np.zeros(size)
 
@@ -52,7 +53,7 @@ class Returned:
         self, law: FrictionLaw, moving: Slipping, c: Ints, status: Ints, force: Floats
     ) -> Linearised:
         """The law as the nodes c (k,) shall see it at an iterate with statuses and shear forces (k,)."""
-        self.watch(c, status)
+        self.watch(c, status, moving.speed)
         self._fastest[c] = np.maximum(self._fastest[c], moving.speed)
         seen = moving.linearised(law)
         seen = replace(seen, by_speed=self.slopes(c, moving.speed, seen.by_speed, moving.chord(law)))
@@ -73,10 +74,14 @@ class Returned:
             np.where(slips, share * tangent.by_mu, seen.by_mu),
         )
 
-    def watch(self, c: Ints, status: Ints) -> None:
-        """Look at the statuses (k,) of the nodes c (k,) at an iterate."""
+    def watch(self, c: Ints, status: Ints, speed: Floats) -> None:
+        """Look at the statuses (k,) and speeds (k,) of the nodes c (k,) at an iterate."""
         self.nodes[c] |= self._slipped[c] & (status == STICK)
         self._slipped[c] |= status >= FORWARD
+        change = np.where(status >= FORWARD, speed - self._speed[c], 0.0)
+        self.nodes[c] |= change * self._change[c] < -BACK * self._change[c] ** 2
+        self._speed[c] = np.where(status >= FORWARD, speed, np.nan)
+        self._change[c] = np.nan_to_num(change)
 
     def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
         """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an

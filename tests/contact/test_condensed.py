@@ -173,6 +173,32 @@ def test_friction_that_rises_with_the_slip_holds_whatever_the_own_compliance(own
     np.testing.assert_allclose(falling.follower_rate(np.full(K, own))[:, 0], left, rtol=1e-14)
 
 
+def test_steep_friction_of_soft_tissue_balances_near_the_equilibrium():
+    """Tissue yields by 1e3 mm per N/mm, friction rises by 1e3 N/mm per mm of slip: of a free motion of
+    1 mm in which forces are found, and not their changes, 1e-8 N/mm would be left.
+    """
+    rng = np.random.default_rng(5)
+    step, schur, between = step_of(rng, 0.0, 0.0)
+    status = np.array([STICK, FORWARD, FORWARD, STICK, FORWARD])
+    shear = np.where(status == FORWARD, -0.4, 0.1)
+    schur = 1e-3 * schur
+    known = replace(
+        step.candidates,
+        surface=SurfaceState(np.zeros(K), np.zeros(K), np.zeros(K)),
+        status=status,
+        force=1e-3 * np.stack([np.ones(K), shear], axis=1),
+        slip=np.where(status == FORWARD, 1e-3, 0.0),
+        slip_stiffness=np.where(status == FORWARD, 1e3, 0.0),
+        cohesion=np.zeros(K),
+    )
+    body, still = CondensedTangent.make(schur, None), 1e-10 * rng.normal(size=2 * K + 2)
+    step = replace(step, body=body, candidates=known, residual=still, bone=np.zeros(2))
+    found = step.solve()
+    assert found.status.tolist() == status.tolist()
+    nodes, _ = residuals(step, schur, between, found)
+    np.testing.assert_allclose(nodes, 0.0, atol=1e-12)
+
+
 @pytest.mark.parametrize("unknowns", [(), ("force",)])
 def test_an_interface_that_yields_adds_its_own_way(unknowns):
     compliance = np.random.default_rng(4).uniform(0.01, 0.1, (K, 2))
