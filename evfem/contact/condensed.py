@@ -329,7 +329,7 @@ class LinearContactStep:
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
-        ahead, W[:, 0] = W[:, 0].copy(), W[:, 0] - C @ held
+        W[:, 0] -= C @ held
         axes = known.axes[near]
         start = local(axes, W[:, :1])[:, 0] + np.concatenate(
             [known.surface.normal_gap[near], known.slip[near]]
@@ -356,7 +356,7 @@ class LinearContactStep:
         pressed = (found.force + found.attraction_drop).reshape(2, -1)
         force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
         if follower.loaded.size:
-            force = force + follower.force(ahead + C @ (force - held) + W[:, 1:] @ found.extra)
+            force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
 
     def _bone_balance(
