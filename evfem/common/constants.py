@@ -126,6 +126,10 @@ STEADY                  after a step of a release that went more than this fract
 NUDGE                   what would leave its rest is pushed aside by so much once, mm: far above  crests
                         what iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
+ROUND                   a released body is back where it was within this fraction of how far it    circles
+                        had been away
+ROUNDS                  so many times back, it goes round in circles                               circles
+NOT_SMALLER             unless one of them is smaller than this fraction of the one before         circles
 PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near; the second, where
@@ -199,6 +203,7 @@ DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_MOST, DRAG_STEPS = 1e6, 100
 STEADY = 0.6
 NUDGE = 1e-5
+ROUND, ROUNDS, NOT_SMALLER = 0.1, 2, 0.75
 PATIENT = 16
 VERGE, VERGE_LOST = 0.9, 0.5
 STAGGERED_LIMIT = 60

@@ -37,6 +37,11 @@ but the least push makes it leave. In the plane such an equilibrium is refused
 A hand with a mass or a damper goes on in its own time: in the first step of a release, and then the
 bone stays at that x, while the tissue, which has no time of its own, comes to rest below it.
 
+*Circles*: with a traction that is the derivative of an energy, energy can only fall on the way, and the
+body comes to rest. The vertical attraction of the paper is none: a node that moves changes what its
+neighbours carry without work (`evfem.contact.attraction`), and a finger without friction on slopes may go
+round for ever. A body that has come back to where it was `ROUNDS` times is given up (`Rounds`).
+
 A wished friction force is not followed on the way, where drag would be part of it: the voltage
 stays as it is until the end.
 
@@ -59,13 +64,16 @@ from evfem.common.constants import (
     DRAG_MOST,
     DRAG_REST,
     DRAG_STEPS,
+    NOT_SMALLER,
     NUDGE,
     PATIENT,
+    ROUND,
+    ROUNDS,
     SMALLEST_J,
     STEADY,
 )
 from evfem.solver.control import GivenVoltage, Target
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
+from evfem.solver.state import Circling, Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
 #: why a release ends in the air
@@ -106,7 +114,7 @@ class Relaxation:
         end, held = target, target if moving else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
-        pace = Pace()
+        pace, rounds = Pace(), Rounds()
         for _ in range(DRAG_STEPS):
             self.body.release(state.u + pace.nudge * self._aside, pace.rate)
             try:
@@ -123,6 +131,8 @@ class Relaxation:
             _refuse_flight(new, held)
             calm = pace.went(float(np.abs(new.u - state.u).max()))
             state = new
+            if rounds.closed(state.u):
+                raise Circling("the released finger goes round in circles", [])
             if calm:
                 rest, left = self._rest(state, end)
                 if rest is not None:
@@ -173,6 +183,38 @@ def _refuse_flight(state: State, target: Target) -> None:
     pull = target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
     if pull > max(held, 0.0) and not state.touching.any():
         raise LiftedOff(LIFTED.format(pull, held), [])
+
+
+class Rounds:
+    """How often a released body came back to where it had been.
+
+    >>> rounds, angles = Rounds(), np.linspace(0.0, 4.2 * np.pi, 43)
+    >>> [rounds.closed(np.array([np.cos(angle), np.sin(angle)])) for angle in angles].index(True)
+    40
+    >>> rest = Rounds()
+    >>> any(rest.closed(np.array([np.exp(-0.2 * step) * np.cos(step)])) for step in range(100))
+    False
+    """
+
+    def __init__(self) -> None:
+        self._places: list[Floats] = []
+        self._away, self._farthest = np.zeros(0), np.zeros(0)
+        self._came_back = np.zeros(0, dtype=int)
+
+    def closed(self, u: Floats) -> bool:
+        """Whether the body, now at displacements u, has come back somewhere `ROUNDS` times, to within the
+        fraction `ROUND` of how far it had been away, and the rounds do not become smaller.
+        """
+        apart = np.array([float(np.abs(u - place).max()) for place in self._places])
+        back = apart < ROUND * self._away
+        smaller = self._away < NOT_SMALLER * self._farthest
+        self._came_back = np.where(back, np.where(smaller, 1, self._came_back + 1), self._came_back)
+        self._farthest = np.where(back, self._away, self._farthest)
+        self._away = np.where(back, 0.0, np.maximum(self._away, apart))
+        self._places.append(u)
+        self._away, self._farthest = np.append(self._away, 0.0), np.append(self._farthest, 0.0)
+        self._came_back = np.append(self._came_back, 0)
+        return bool((self._came_back >= ROUNDS).any())
 
 
 @dataclass

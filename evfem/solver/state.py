@@ -25,13 +25,14 @@ class StepFailed(ArithmeticError):
     """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
     `findings` how the last iterate looked; `unstable`: the linearised body gives way the more, the
     more it is loaded. Of a step that was given up, `last` is the state it was tried from and its
-    target, and `released` whether the body was released there.
+    target, `released` whether the body was released there, and `circles` whether it came back to
+    where it had been.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
         super().__init__(reason)
         self.reason, self.residuals, self.findings = reason, residuals, ""
-        self.unstable = self.released = False
+        self.unstable = self.released = self.circles = False
         self.last: tuple[State, Any] | None = None
 
 
@@ -41,6 +42,10 @@ class Folded(StepFailed):
 
 class LiftedOff(StepFailed):
     """A released finger that is pulled harder than the attraction holds has lost the surface."""
+
+
+class Circling(StepFailed):
+    """A released finger comes back to where it was again and again."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -38,7 +38,7 @@ from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation
-from evfem.solver.state import Folded, LiftedOff, State, StepFailed
+from evfem.solver.state import Circling, Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
 from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
@@ -245,6 +245,7 @@ class Stepper:
             if isinstance(error, Folded | LiftedOff):
                 error.last = failed.last
                 raise
+            failed.circles = isinstance(error, Circling)
             return None
         self.relaxations += 1
         return rest

@@ -9,6 +9,7 @@ from tools.meshes import block
 
 from evfem.contact.stability import SLOPES, Verge
 from evfem.contact.surfaces import Flat
+from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.errors import NotConverged
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
@@ -19,7 +20,9 @@ from evfem.solver.state import Folded, LiftedOff, StepFailed
 from evfem.solver.strategy import Strategy
 
 
-def said(share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, **solver):
+def said(
+    share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, circles=False, **solver
+):
     """What is said of a step from a pressed finger whose loss is at `share`."""
     body = finger(block(4, 2), viscosity=1e-3)
     motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
@@ -27,6 +30,7 @@ def said(share=1.2, duration=0.0, released=False, unstable=False, failure=StepFa
     going.advance(next(going.requests()))
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
+    failed.circles = circles
     failed.last = going.state, replace(Target.held(going.state.bone, 0.0), duration=duration)
     going.model.equilibrium.verge = lambda state, target: Verge(share, SLOPES)
     return advice(going.scene, going.model, failed).split("; ")
@@ -43,6 +47,29 @@ def test_the_sentence_names_the_force_its_amount_and_the_place():
     assert said(released=True)[0].endswith("released there it does not come to rest")
     off = Strategy(relaxation=False)
     assert "relaxation of the strategy switched on" in said(strategy=off)[-1]
+
+
+def test_a_finger_that_goes_round_in_circles_is_told_of():
+    assert said(released=True, circles=True)[0].endswith("released there it goes round in circles")
+    lost = said(share=0.5, released=True, circles=True)[0]
+    assert lost.startswith(
+        "there is no equilibrium at rest near here that holds: the finger, released at pos"
+    )
+    assert "direction = normal" not in said(released=True, circles=True)[-1]
+
+
+@pytest.mark.parametrize(
+    ("circles", "direction"), [(True, "vertical"), (False, "vertical"), (True, "normal")]
+)
+def test_an_attraction_with_an_energy_is_advised_where_one_without_keeps_the_finger_going(circles, direction):
+    surface = Flat(insulator=Layer(0.05, 3.0))
+    scene = Scene(
+        coarse_pad(), surface, Kaczmarek(), 100.0, Press(indentation=0.5, steps=1), direction=direction
+    )
+    failed = StepFailed("nodes keep changing", [1.0])
+    failed.circles = circles
+    asked = "direction = normal" in advice(scene, None, failed)
+    assert asked == (circles and direction == "vertical")
 
 
 def test_nothing_is_claimed_of_an_equilibrium_that_is_held():

@@ -28,6 +28,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Pace, Patience, Relaxation
+from evfem.solver.state import Circling, StepFailed
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
 
@@ -283,6 +284,26 @@ def test_steps_of_a_release_begin_ahead_on_the_last_ones_way():
     height = model.body.space.mesh.points[:, 1]
     squeezed = np.column_stack([np.zeros_like(height), -height])
     assert release._ahead(replace(rest, last_increment=squeezed), 1.0) is None
+
+
+@pytest.mark.parametrize(("turns", "circles"), [(1.0, True), (0.02, False)])
+def test_a_body_that_comes_back_to_where_it_was_is_given_up(turns, circles):
+    """Led round a circle ten steps long, or along an arc of a fifth of it, in steps that fail at low drag."""
+    model = make_model(scene())
+    rest = model.equilibrium.rest(np.zeros(2), 0.0)
+    asked = []
+
+    def led(state, target, start):
+        if model.body.drag_rate < 0.5:
+            raise StepFailed("faster than the way is known", [])
+        asked.append(2.0 * np.pi * turns * len(asked) / 10)
+        place = 0.1 * np.array([np.cos(asked[-1]), np.sin(asked[-1])])
+        return replace(state, u=np.zeros_like(state.u) + place, bone=place)
+
+    release = Relaxation(model.body, led)
+    with pytest.raises(Circling if circles else StepFailed, match="circles" if circles else "come to rest"):
+        release.follow(rest, Target.held(rest.bone, 0.0), lambda old, new: None)
+    assert (len(asked) < 25) == circles
 
 
 def test_friction_on_the_way_is_counted(point):
