@@ -59,7 +59,8 @@ def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
 @pytest.mark.parametrize("along", [ev.Wait(0.1, steps=8, hold="force"), ev.Slide(0.4, 8, 4.0, "force")])
 def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it(along):
     """Without a force the tissue creeps back at its own rate, and the bone stands as high as that needs: once
-    little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau.
+    little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau. A step that was
+    cut has shorter ones.
     """
     body, tau = finger(block(8, 3, sag=0.4), viscosity=5e-3), 5e-3
     motion = [ev.Press(indentation=0.4, steps=4, speed=20.0), ev.Press(indentation=0.2, steps=4, speed=400.0)]
@@ -68,7 +69,8 @@ def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it(along):
     assert np.abs(result.applied_force[4:]).max() < 1e-12
     left = result.indentation[7:]
     assert left[0] == 0.2
-    factor = left[6:] / left[5:-1]
+    factor = (left[5:] / left[4:-1])[result.substeps[-4:] == 1]
+    assert factor.size
     np.testing.assert_allclose(factor, 1.0 / (1.0 + 0.1 / 8 / tau), rtol=1e-3)
 
 
