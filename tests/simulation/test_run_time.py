@@ -59,8 +59,8 @@ def test_a_loose_finger_stays_at_its_height_until_a_voltage_acts():
 @pytest.mark.parametrize("along", [ev.Wait(0.1, steps=8, hold="force"), ev.Slide(0.4, 8, 4.0, "force")])
 def test_a_loose_finger_is_lifted_by_the_tissue_that_recovers_below_it(along):
     """Without a force the tissue creeps back at its own rate, and the bone stands as high as that needs: once
-    little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau. A step that was
-    cut has shorter ones.
+    little is left of the indentation, it falls in each step of backward Euler by 1 + dt / tau, where that
+    was not cut.
     """
     body, tau = finger(block(8, 3, sag=0.4), viscosity=5e-3), 5e-3
     motion = [ev.Press(indentation=0.4, steps=4, speed=20.0), ev.Press(indentation=0.2, steps=4, speed=400.0)]
