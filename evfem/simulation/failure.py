@@ -4,9 +4,12 @@ what may be tried.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from evfem.common.constants import VERGE, VERGE_LOST
+from evfem.errors import InputError
 from evfem.scene.scene import Scene
 from evfem.simulation.model import Model
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -59,6 +62,17 @@ def _place(model: Model, state: State) -> str:
     )
 
 
+def _may_have_an_energy(scene: Scene) -> bool:
+    """Whether its vertical attraction may also be along the normal, with an energy: not in every scene."""
+    if scene.law is None or scene.direction != "vertical" or scene.field == "full":
+        return False
+    try:
+        replace(scene, direction="normal")
+    except InputError:
+        return False
+    return True
+
+
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
     """What may help a scene of its kind."""
     dynamics = scene.solver.dynamics
@@ -70,7 +84,7 @@ def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
         passing = failed.last is None or failed.last[1].duration > 0.0
         time = "a larger viscosity of the finger" if passing else "a motion with a speed"
         return f"try smaller steps, {time}, {FINER}"
-    if failed.circles and scene.law is not None and scene.direction == "vertical":
+    if failed.circles and _may_have_an_energy(scene):
         return (
             "try direction = normal, an attraction with an energy, or time: a speed, with dynamics = viscous"
         )

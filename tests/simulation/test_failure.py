@@ -9,7 +9,7 @@ from tools.meshes import block
 
 from evfem.contact.stability import SLOPES, Verge
 from evfem.contact.surfaces import Flat
-from evfem.electrostatics.laws import Kaczmarek, Layer
+from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
@@ -58,18 +58,30 @@ def test_a_finger_that_goes_round_in_circles_is_told_of():
     assert "direction = normal" not in said(released=True, circles=True)[-1]
 
 
+class NoPotential:
+    """A law whose attraction cannot be along the normal."""
+
+    @staticmethod
+    def traction(gap, voltage, layers):
+        return Kaczmarek().traction(gap, voltage, layers)
+
+
 @pytest.mark.parametrize(
-    ("circles", "direction"), [(True, "vertical"), (False, "vertical"), (True, "normal")]
+    ("circles", "law", "options", "advised"),
+    [
+        (True, Kaczmarek(), {}, True),
+        (False, Kaczmarek(), {}, False),
+        (True, Kaczmarek(), {"direction": "normal"}, False),
+        (True, NoPotential(), {}, False),
+        (True, StrongTroxel(), {"field": "full"}, False),
+    ],
 )
-def test_an_attraction_with_an_energy_is_advised_where_one_without_keeps_the_finger_going(circles, direction):
+def test_an_attraction_with_an_energy_is_advised_where_it_may_be_had(circles, law, options, advised):
     surface = Flat(insulator=Layer(0.05, 3.0))
-    scene = Scene(
-        coarse_pad(), surface, Kaczmarek(), 100.0, Press(indentation=0.5, steps=1), direction=direction
-    )
+    scene = Scene(coarse_pad(), surface, law, 100.0, Press(indentation=0.5, steps=1), **options)
     failed = StepFailed("nodes keep changing", [1.0])
     failed.circles = circles
-    asked = "direction = normal" in advice(scene, None, failed)
-    assert asked == (circles and direction == "vertical")
+    assert ("direction = normal" in advice(scene, None, failed)) == advised
 
 
 def test_nothing_is_claimed_of_an_equilibrium_that_is_held():
