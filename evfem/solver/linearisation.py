@@ -288,7 +288,9 @@ class Linearisation:
             ]
             for s in (state, everywhere)
         )
-        return np.asarray(np.maximum(now - closed, 0.0))
+        place = self.interface.resting(state)
+        share = self.attraction.share_of_columns(place, state.voltage, self.touching, pressing)
+        return np.asarray(share * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
         """How the attraction of every pad node depends on its contact force, where rough faces come
@@ -308,13 +310,15 @@ class Linearisation:
             attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
             for each in (None, pressing)
         )
+        lost = attraction.share_of_columns(place, state.voltage, self.touching, pressing)
+        lost = lost * (unpressed - pressed)
         surface = self.interface.surface_at(state)
         along = np.stack([1.0 / surface.stretch, surface.slope / surface.stretch])
         if attraction.direction == "normal":
             along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
         gain = steadied(gain * along[0]) / along[0]
-        return Roughness((gain * along).ravel(), ((unpressed - pressed) * along).ravel(), pressing)
+        return Roughness((gain * along).ravel(), (lost * along).ravel(), pressing)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own

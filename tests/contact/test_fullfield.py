@@ -10,6 +10,7 @@ from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
 from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
 from evfem.contact.pad import Pad
+from evfem.electrostatics.roughness import ExponentialRoughness
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
 
@@ -427,3 +428,50 @@ def test_the_exact_encoding_drives_the_full_field():
     assert result.applied_tangential_force[-2:] == pytest.approx([0.016] * 2, rel=1e-6)
     left = result.normal_force - result.electrostatic_force
     assert result.applied_force == pytest.approx(left, rel=1e-6)
+
+
+def between_rough_faces(pad, points):
+    """By columns and by the full field, on a thin insulator."""
+    surface = ev.Display(insulator=ev.TOUCHSCREEN, y=0.0)
+    skin = ev.Layer(np.full(len(points), 0.38), 1650.0)
+    rough = ExponentialRoughness(decay=5e-4, pressure=4.0, open_gap=4e-3)
+    of = (ev.StrongTroxel(), ev.Layers.of(skin, surface.insulator), pad, surface, "vertical", True, rough)
+    return Attraction(*of), FieldAttraction(*of, edges=facing(pad, points), skin=skin)
+
+
+@pytest.mark.parametrize("curvature", [1.0, 4.0, 10.0])
+def test_on_a_summit_the_attraction_gains_less_than_the_columns(curvature):
+    """A middle node touches, or stands 2 um off, and its neighbours farther."""
+    pad, points = arc(24, 3.0, 2.0)
+    summit, volts = 25, 300.0
+    points[:, 1] = curvature * (points[:, 0] - points[summit, 0]) ** 2
+    columns, full = between_rough_faces(pad, points)
+    pressing, more = np.zeros((2, len(points)))
+    pressing[summit], more[summit] = 4e-3, 1e-6
+
+    forces = [full.forces(points, volts, None, pressing + k * more)[summit, 1] for k in (-1, 1)]
+    gain = (forces[0] - forces[1]) / 2e-6
+    known = [a.gain_on_pressing(points, volts, None, pressing)[summit] for a in (columns, full)]
+    assert known[0] > 2.0 * gain
+    assert 0.9 * gain < known[1] < gain + 0.35 * (known[0] - gain)
+
+    points[:, 1] += 2e-3
+    apart = np.zeros_like(points)
+    apart[summit, 1] = 1e-6
+    forces = [full.forces(points + k * apart, volts, None)[summit, 1] for k in (-1, 1)]
+    weakening = (forces[1] - forces[0]) / 2e-6
+    known = [a.negative_stiffness(points, volts, None)[summit] for a in (columns, full)]
+    assert abs(known[1] - weakening) < 0.7 * abs(known[0] - weakening)
+
+
+def test_ridges_that_touch_with_one_node_are_pressed_between_rough_faces():
+    """Seed 1801122, scene 752: with the columns' tangent such a node closed and opened by turns."""
+    finger = ev.FingerPad(
+        resolution="coarse", ridge_width=0.475, ridge_height=0.0664, ridge_exponent=3.8, ridge_phase=-0.31
+    )
+    surface = ev.Sinusoid(friction=0.3, insulator=ev.Layer(0.0093, 18.0))
+    rough = ExponentialRoughness(decay=5e-4, pressure=4.0, open_gap=4e-3)
+    motion, drive = [ev.Press(force=0.074, steps=2)], {"voltage": 380.0, "field": "full"}
+    of = (finger, surface, ev.StrongTroxel())
+    found = ev.simulate(ev.Scene(*of, motion=motion, roughness_gap=rough, **drive))
+    assert found.newton_iterations.sum() < 60
