@@ -291,6 +291,23 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     assert across[0] == pytest.approx(-plate, rel=0.2)
 
 
+@pytest.mark.parametrize("open_gap", [None, 2e-3])
+def test_without_an_electrode_below_no_attraction_is_gained(open_gap):
+    pad, points = arc(40, 40.0, 4.0)
+    points[:, 1] += 0.05
+    surface = ev.Display(y=0.0, electrodes=[[-20.0, 0.0, 1.0]])
+    _, full = attractions(pad, points, surface)
+    if open_gap is not None:
+        rough = ExponentialRoughness(decay=2e-4, pressure=4.0, open_gap=open_gap)
+        full = replace(full, roughness=rough)
+    left, right = points[:, 0] < -0.8, points[:, 0] > 0.8
+    share = full.share_of_columns(points, 300.0, None)
+    assert share[left] == pytest.approx(1.0, abs=0.1)
+    assert share[right] == pytest.approx(0.0, abs=0.01)
+    weakening = full.negative_stiffness(points, 300.0, None)
+    assert weakening[right].max() < 0.01 * weakening[left].min()
+
+
 def test_the_force_does_not_waver_when_nodes_pass_an_edge():
     """A flat pad: all the same wherever the edge is between two columns 0.025 mm apart."""
     pad, points = arc(40, 40.0, 4.0)
