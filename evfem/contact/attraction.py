@@ -146,10 +146,10 @@ class Attraction:
         sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
-    def share_of_columns(
+    def tangent_factor(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Any:
-        """The part of `column_forces` that the forces are (P,), or 1: all of it without fringes."""
+        """Factor (P,), or 1, of the derivatives of `column_forces` in the tangent of the forces."""
         return 1.0
 
     def way_forces(

@@ -12,7 +12,7 @@ Nodal forces are derivatives of the discrete energy
 
 with tangential parts. The outer iteration of a step takes them as they are; its tangent is that of
 the column law, which they are close to, so contact, friction and controls know nothing of the
-field; between rough faces it is taken in proportion to the forces (`share_of_columns`).
+field; between rough faces it is scaled by the ratio of the forces (`tangent_factor`).
 Where that tangent leads nowhere, among ridges or steep waves close to a thin insulator, it is
 replaced by the field's own (`fringe_stiffness`), by differences: a node's field decays within a few
 nodes, so every `APART`-th one is moved at once. In every accepted state C lies between its bounds
@@ -192,13 +192,15 @@ class FieldAttraction(Attraction):
         """Without rough faces, whose gap depends on the contact forces."""
         return self.roughness is None
 
-    def share_of_columns(
+    def tangent_factor(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """What the electrode below leaves of the column law's force (P,). Between rough faces the part
-        of it that pulls a node down, from 0 to 1: on a summit, whose neighbours stand off, the attraction
-        grows by less than the columns' as faces come closer. Not so without them: beside a node that
-        touches, the field may pull less than columns and yet weaken faster with the gap.
+        """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node.
+
+        Between rough faces it is the ratio of the field's force on the node to the columns', at most 1:
+        on a summit, whose neighbours stand off, the field pulls less and also gains less as the faces
+        come closer. Without rough faces the forces are no measure of the derivatives: beside a node
+        that touches, the field may pull less than columns and yet weaken faster with the gap.
         """
         if self.roughness is None:
             return self.share(position[:, 0]) ** 2
@@ -208,16 +210,16 @@ class FieldAttraction(Attraction):
         return np.where(pulled, np.clip(forces / np.where(pulled, columns, 1.0), 0.0, 1.0), 1.0)
 
     def gain_on_pressing(self, position: Floats, voltage: float, touching: Any, pressing: Floats) -> Floats:
-        """The column law's, as far as its force is the field's."""
+        """The column law's, times the `tangent_factor`."""
         gain = super().gain_on_pressing(position, voltage, touching, pressing)
-        return np.asarray(gain * self.share_of_columns(position, voltage, touching, pressing))
+        return np.asarray(gain * self.tangent_factor(position, voltage, touching, pressing))
 
     def negative_stiffness(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """The column law's, as far as its force is the field's."""
+        """The column law's, times the `tangent_factor`."""
         weakening = super().negative_stiffness(position, voltage, touching, pressing)
-        return np.asarray(weakening * self.share_of_columns(position, voltage, touching, pressing))
+        return np.asarray(weakening * self.tangent_factor(position, voltage, touching, pressing))
 
     def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
         """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal

@@ -281,16 +281,10 @@ class Linearisation:
         if self.attraction is None or not self.attraction.acts(state.voltage) or self.frozen:
             return np.zeros(self.pad.nodes.size)
         everywhere = replace(state, status=np.full_like(state.status, STICK))
-        pressing = state.contact_force[:, 0]
-        now, closed = (
-            self.attraction.column_forces(self.interface.resting(s), state.voltage, self.touching, pressing)[
-                :, 1
-            ]
-            for s in (state, everywhere)
-        )
-        place = self.interface.resting(state)
-        share = self.attraction.share_of_columns(place, state.voltage, self.touching, pressing)
-        return np.asarray(share * np.maximum(now - closed, 0.0))
+        places = [self.interface.resting(s) for s in (state, everywhere)]
+        at = (state.voltage, self.touching, state.contact_force[:, 0])
+        now, closed = (self.attraction.column_forces(place, *at)[:, 1] for place in places)
+        return np.asarray(self.attraction.tangent_factor(places[0], *at) * np.maximum(now - closed, 0.0))
 
     def roughness(self, state: State) -> Roughness | None:
         """How the attraction of every pad node depends on its contact force, where rough faces come
@@ -310,8 +304,8 @@ class Linearisation:
             attraction.column_forces(place, state.voltage, self.touching, each)[:, 1]
             for each in (None, pressing)
         )
-        lost = attraction.share_of_columns(place, state.voltage, self.touching, pressing)
-        lost = lost * (unpressed - pressed)
+        factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
+        lost = factor * (unpressed - pressed)
         surface = self.interface.surface_at(state)
         along = np.stack([1.0 / surface.stretch, surface.slope / surface.stretch])
         if attraction.direction == "normal":

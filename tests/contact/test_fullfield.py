@@ -4,27 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.meshes import arc
 
 import evfem as ev
 from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
 from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
-from evfem.contact.pad import Pad
-from evfem.electrostatics.roughness import ExponentialRoughness
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
-
-
-def arc(number, radius, width, quadratic=True):
-    """A pad like the bottom of a cylinder, its nodes from left to right."""
-    x = np.linspace(-0.5 * width, 0.5 * width, 2 * number + 1)
-    points = np.stack([x, radius - np.sqrt(radius**2 - x**2)], axis=1)
-    start = 2 * np.arange(number)
-    edges = np.stack([start, start + 2, start + 1], axis=1)
-    if not quadratic:
-        start = np.arange(2 * number)
-        edges = np.stack([start, start + 1], axis=1)
-    return Pad(np.arange(x.size), edges, np.ones(x.size, bool)), points
 
 
 def attractions(pad, points, surface, skin_thickness=0.38):
@@ -291,23 +278,6 @@ def test_a_pad_beside_the_electrode_is_pulled_towards_it():
     assert across[0] == pytest.approx(-plate, rel=0.2)
 
 
-@pytest.mark.parametrize("open_gap", [None, 2e-3])
-def test_without_an_electrode_below_no_attraction_is_gained(open_gap):
-    pad, points = arc(40, 40.0, 4.0)
-    points[:, 1] += 0.05
-    surface = ev.Display(y=0.0, electrodes=[[-20.0, 0.0, 1.0]])
-    _, full = attractions(pad, points, surface)
-    if open_gap is not None:
-        rough = ExponentialRoughness(decay=2e-4, pressure=4.0, open_gap=open_gap)
-        full = replace(full, roughness=rough)
-    left, right = points[:, 0] < -0.8, points[:, 0] > 0.8
-    share = full.share_of_columns(points, 300.0, None)
-    assert share[left] == pytest.approx(1.0, abs=0.1)
-    assert share[right] == pytest.approx(0.0, abs=0.01)
-    weakening = full.negative_stiffness(points, 300.0, None)
-    assert weakening[right].max() < 0.01 * weakening[left].min()
-
-
 def test_the_force_does_not_waver_when_nodes_pass_an_edge():
     """A flat pad: all the same wherever the edge is between two columns 0.025 mm apart."""
     pad, points = arc(40, 40.0, 4.0)
@@ -445,50 +415,3 @@ def test_the_exact_encoding_drives_the_full_field():
     assert result.applied_tangential_force[-2:] == pytest.approx([0.016] * 2, rel=1e-6)
     left = result.normal_force - result.electrostatic_force
     assert result.applied_force == pytest.approx(left, rel=1e-6)
-
-
-def between_rough_faces(pad, points):
-    """By columns and by the full field, on a thin insulator."""
-    surface = ev.Display(insulator=ev.TOUCHSCREEN, y=0.0)
-    skin = ev.Layer(np.full(len(points), 0.38), 1650.0)
-    rough = ExponentialRoughness(decay=5e-4, pressure=4.0, open_gap=4e-3)
-    of = (ev.StrongTroxel(), ev.Layers.of(skin, surface.insulator), pad, surface, "vertical", True, rough)
-    return Attraction(*of), FieldAttraction(*of, edges=facing(pad, points), skin=skin)
-
-
-@pytest.mark.parametrize("curvature", [1.0, 4.0, 10.0])
-def test_on_a_summit_the_attraction_gains_less_than_the_columns(curvature):
-    """A middle node touches, or stands 2 um off, and its neighbours farther."""
-    pad, points = arc(24, 3.0, 2.0)
-    summit, volts = 25, 300.0
-    points[:, 1] = curvature * (points[:, 0] - points[summit, 0]) ** 2
-    columns, full = between_rough_faces(pad, points)
-    pressing, more = np.zeros((2, len(points)))
-    pressing[summit], more[summit] = 4e-3, 1e-6
-
-    forces = [full.forces(points, volts, None, pressing + k * more)[summit, 1] for k in (-1, 1)]
-    gain = (forces[0] - forces[1]) / 2e-6
-    known = [a.gain_on_pressing(points, volts, None, pressing)[summit] for a in (columns, full)]
-    assert known[0] > 2.0 * gain
-    assert 0.9 * gain < known[1] < gain + 0.35 * (known[0] - gain)
-
-    points[:, 1] += 2e-3
-    apart = np.zeros_like(points)
-    apart[summit, 1] = 1e-6
-    forces = [full.forces(points + k * apart, volts, None)[summit, 1] for k in (-1, 1)]
-    weakening = (forces[1] - forces[0]) / 2e-6
-    known = [a.negative_stiffness(points, volts, None)[summit] for a in (columns, full)]
-    assert abs(known[1] - weakening) < 0.7 * abs(known[0] - weakening)
-
-
-def test_ridges_that_touch_with_one_node_are_pressed_between_rough_faces():
-    """Seed 1801122, scene 752: with the columns' tangent such a node closed and opened by turns."""
-    finger = ev.FingerPad(
-        resolution="coarse", ridge_width=0.475, ridge_height=0.0664, ridge_exponent=3.8, ridge_phase=-0.31
-    )
-    surface = ev.Sinusoid(friction=0.3, insulator=ev.Layer(0.0093, 18.0))
-    rough = ExponentialRoughness(decay=5e-4, pressure=4.0, open_gap=4e-3)
-    motion, drive = [ev.Press(force=0.074, steps=2)], {"voltage": 380.0, "field": "full"}
-    of = (finger, surface, ev.StrongTroxel())
-    found = ev.simulate(ev.Scene(*of, motion=motion, roughness_gap=rough, **drive))
-    assert found.newton_iterations.sum() < 60

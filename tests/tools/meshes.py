@@ -1,9 +1,10 @@
 """Meshes of the tests: cells between rows of points, blocks, half a finger, what is fine near a
-contact.
+contact, and pads without a body.
 """
 
 import numpy as np
 
+from evfem.contact.pad import Pad
 from evfem.mesh.mesh import Mesh
 
 KINDS = ("quad", "quad9", "triangle", "triangle6")
@@ -124,3 +125,15 @@ def contact_block(x, y, pad, lower=np.zeros_like):
     across, up = np.meshgrid(x, y)
     mesh = between(across, up + lower(across) * (1.0 - up / y[-1]), "quad9")
     return held(mesh, pad=np.flatnonzero(np.abs(x) <= pad + 1e-12))
+
+
+def arc(number, radius, width, quadratic=True):
+    """A pad like the bottom of a cylinder, its nodes from left to right."""
+    x = np.linspace(-0.5 * width, 0.5 * width, 2 * number + 1)
+    points = np.stack([x, radius - np.sqrt(radius**2 - x**2)], axis=1)
+    start = 2 * np.arange(number)
+    edges = np.stack([start, start + 2, start + 1], axis=1)
+    if not quadratic:
+        start = np.arange(2 * number)
+        edges = np.stack([start, start + 1], axis=1)
+    return Pad(np.arange(x.size), edges, np.ones(x.size, bool)), points
