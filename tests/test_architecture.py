@@ -44,7 +44,8 @@ ROOMS = {
     "contact": (
         {"numpy", "scipy"},
         "friction surfaces textures own pad edge skin charging attraction fullfield drivenfield "
-        "changes elimination updated signorini follower condensed coulomb sweeps disc spatial stability",
+        "changes attracted elimination updated signorini follower condensed coulomb sweeps disc spatial "
+        "stability",
     ),
     "solver": (
         {"numpy", "scipy", "pypardiso"},

@@ -64,8 +64,8 @@ MORE                    so many times the iterations may be used where the resid
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
-HOPELESS                where the body gives way, an active set with more violated nodes after a    attraction
-                        third of its solves is given up
+HOPELESS                where the body gives way, and between rough faces, an active set with       attraction
+                        more violated nodes after a third of its solves is given up
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs

@@ -36,18 +36,17 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
+from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
-    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
-    Roughness,
     Unstable,
     solve_with_attraction,
 )
@@ -109,18 +108,26 @@ class Candidates:
         return turned + self.friction_growth(own)[:, None] * axes[:, 1]
 
     def by_chords(self) -> Candidates:
-        """The same with the chord of each node's friction law, from zero to the present load, instead of
-        its tangent.
+        """The same with chords from zero to the present load instead of tangents; itself, where there are
+        none to take.
 
-        The tangent of a concave law has friction at zero load (`cohesion`), an open node has none. Where
-        that friction lifts a node off, and without it the node sinks in, the problem has no solution. The
-        law itself vanishes with the load, and so does its chord.
+        Friction: the tangent of a concave law has friction at zero load (`cohesion`), an open node has
+        none. Where that friction lifts a node off, and without it the node sinks in, the problem has no
+        solution. The law itself vanishes with the load, and so does its chord.
+
+        Rough faces: where the attraction grows faster and faster with the load, its tangent puts it too
+        low at zero load. Where that lifts a node off, and the attraction of the open node pulls it in
+        again, there is no solution either.
         """
-        assert self.cohesion is not None
-        pressed = (self.force[:, 0] > 0.0) & (self.cohesion > 0.0)
-        chord = self.cohesion / np.where(pressed, self.force[:, 0], 1.0)
-        friction = np.where(pressed, self.friction + chord, self.friction)
-        return replace(self, friction=friction, cohesion=np.where(pressed, 0.0, self.cohesion))
+        known = self
+        if self.cohesion is not None and self.cohesion.any():
+            pressed = (self.force[:, 0] > 0.0) & (self.cohesion > 0.0)
+            chord = self.cohesion / np.where(pressed, self.force[:, 0], 1.0)
+            friction = np.where(pressed, self.friction + chord, self.friction)
+            known = replace(known, friction=friction, cohesion=np.where(pressed, 0.0, self.cohesion))
+        if self.roughness is not None and (chords := self.roughness.by_chords()) is not self.roughness:
+            known = replace(known, roughness=chords)
+        return known
 
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force per x displacement, (c,)."""
@@ -304,10 +311,9 @@ class LinearContactStep:
         try:
             return self._solve_following(near, free, status, follower)
         except ContactNotSolved as failed:
-            if self.candidates.cohesion is not None and self.candidates.cohesion.any():
-                by_chords = replace(self, candidates=self.candidates.by_chords())
+            if (by_chords := self.candidates.by_chords()) is not self.candidates:
                 with suppress(ContactNotSolved):
-                    return by_chords._solve_following(near, free, status, follower)
+                    return replace(self, candidates=by_chords)._solve_following(near, free, status, follower)
             if self.timed:
                 raise
             held = self.candidates.axes[near], status, self.candidates.friction[near]

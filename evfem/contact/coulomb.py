@@ -28,7 +28,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import DISC_OWN
-from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ExtraUnknowns
+from evfem.contact.attracted import AttractionStiffness
+from evfem.contact.signorini import OPEN, STICK, ExtraUnknowns
 
 #: status of a node that slips in any direction
 SLIP = 2

@@ -57,8 +57,9 @@ from evfem.common.constants import (
     ROUNDING,
     STABLE,
 )
+from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution, Forces, Projected, projected
-from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved
+from evfem.contact.signorini import OPEN, STICK, ContactNotSolved
 from evfem.contact.sweeps import sweeps
 
 

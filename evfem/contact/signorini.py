@@ -21,7 +21,8 @@ has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A 
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
 only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
 closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
+gained. Tangent of a concave law, the first never falls below the second: one of the two holds; for
+another law chords see to that (`evfem.contact.attracted`).
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -32,7 +33,8 @@ Algorithm (`solve_contact`), a primal-dual active set::
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
         change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
-            round in a circle, or many are left when one at a time begins and the body gives way
+            round in a circle, or many are left when one at a time begins and the body gives way, or
+        between rough faces
     start again from all nodes sticking, then from all open, before giving up
 
 After a few solves the drops of the attraction are taken out of the equations
@@ -71,6 +73,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, HOPELESS, ROUNDING, STABLE
+from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.changes import Changes
 from evfem.contact.elimination import Elimination, Motions, bordered
 from evfem.contact.updated import ClosedNodes, Relations
@@ -96,35 +99,6 @@ class ExtraUnknowns:
     rows: Floats
     pivot: Floats
     right: Floats
-
-
-@dataclass(frozen=True)
-class Roughness:
-    """Attraction between rough faces, along normals, then tangents: stronger by `gain` (2 k,) times
-    what a contact force has beyond `present` (k,), weaker by `loss_on_opening` (2 k,) N/mm where open.
-    """
-
-    gain: Floats
-    loss_on_opening: Floats
-    present: Floats
-
-    def of(self, nodes: Ints) -> Roughness:
-        """Of these nodes alone."""
-        gain, loss = (each.reshape(2, -1)[:, nodes].ravel() for each in (self.gain, self.loss_on_opening))
-        return Roughness(gain, loss, self.present[nodes])
-
-
-@dataclass(frozen=True)
-class AttractionStiffness:
-    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
-    per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
-    `gain_on_closing` (k,) at g = 0. `roughness` says how it depends on the contact force there.
-    """
-
-    negative_stiffness: Floats
-    reference_gap: Floats
-    gain_on_closing: Floats
-    roughness: Roughness | None = None
 
 
 @dataclass(frozen=True)
@@ -165,6 +139,11 @@ class ContactProblem:
             return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
         except np.linalg.LinAlgError:
             return True
+
+    @property
+    def seldom_ends(self) -> bool:
+        """Whether an active set seldom ends that has many violated nodes left when one at a time begins."""
+        return self.gives_way or (self.attraction is not None and self.attraction.roughness is not None)
 
     @property
     def resists(self) -> Any:
@@ -259,7 +238,7 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
             continue
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        if solves == ACTIVE_SET_LIMIT // 3 and violated.size > HOPELESS and problem.gives_way:
+        if solves == ACTIVE_SET_LIMIT // 3 and violated.size > HOPELESS and problem.seldom_ends:
             break
         picked = changes.picked(status, violated, violation)
         if not picked.size:

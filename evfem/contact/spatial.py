@@ -18,10 +18,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import STABLE
+from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution
 from evfem.contact.disc import solve_attracted_disc
-from evfem.contact.signorini import AttractionStiffness, ContactNotSolved, ExtraUnknowns
+from evfem.contact.signorini import ContactNotSolved, ExtraUnknowns
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,6 +26,7 @@ from evfem.common.constants import (
     SMALLEST_FORCE,
     WEAK,
 )
+from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import Candidates
 from evfem.contact.pad import surface_state
@@ -34,7 +35,6 @@ from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
-    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,

@@ -43,10 +43,11 @@ from evfem.common.constants import (
     STEEP,
     TAKEN,
 )
+from evfem.contact.attracted import Roughness
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
 from evfem.contact.pad import normals, surface_state
-from evfem.contact.signorini import OPEN, STICK, Roughness
+from evfem.contact.signorini import OPEN, STICK
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
@@ -311,8 +312,10 @@ class Linearisation:
         if attraction.direction == "normal":
             along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
-        gain = steadied(gain * along[0]) / along[0]
-        return Roughness((gain * along).ravel(), (lost * along).ravel(), pressing)
+        gain = gain * along
+        gain[1] = np.where(gain[0] > STABLE, 0.0, gain[1])
+        gain[0] = steadied(gain[0])
+        return Roughness(gain.ravel(), (lost * along).ravel(), pressing)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own

@@ -179,10 +179,14 @@ def _refuse_flight(state: State, target: Target) -> None:
     """Raise `LiftedOff` where nothing touches, the bone is pulled, and the attraction, which only
     falls on the way up, holds less than that.
     """
-    held = -float(state.attraction[:, 1].sum())
-    pull = target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
-    if pull > max(held, 0.0) and not state.touching.any():
-        raise LiftedOff(LIFTED.format(pull, held), [])
+    held, force = -float(state.attraction[:, 1].sum()), pull(state, target)
+    if force > max(held, 0.0) and not state.touching.any():
+        raise LiftedOff(LIFTED.format(force, held), [])
+
+
+def pull(state: State, target: Target) -> float:
+    """Force (N/mm) upwards on the bone at `target`, negative where it is pressed, 0 where it is held."""
+    return target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
 
 
 class Rounds:

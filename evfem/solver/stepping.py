@@ -37,7 +37,7 @@ from evfem.contact.charging import Charging
 from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
-from evfem.solver.relaxation import Relaxation
+from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Circling, Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
 from evfem.solver.voltage import VoltageSearch
@@ -258,6 +258,8 @@ class Stepper:
             return
         relaxation = Relaxation(self.body, self.solve)
         if relaxation.applies(target) or self.body.dynamics is None or self.body.dynamics.mass is not None:
+            return
+        if pull(state, target) <= 0.0:
             return
         try:
             relaxation.follow(state, replace(target, duration=0.0), Unbooked().accept)

@@ -43,14 +43,21 @@ class Travel:
         if not target.height.free:
             return found, bone
         missing = target.height.missing(float(state.bone[1]), state.reaction)
-        flies = not found.status.any() and bone[1] * missing < 0.0
+        flies = not found.status.any() and bone[1] * missing < 0.0 and self._drawn(step, bone[1])
         if abs(bone[1]) > self.longest or flies:
-            # a long way may rest on a single node, and an attracted body that nothing holds flies off: go
+            # a long way may rest on a single node, and a body whose attraction wins flies off: go
             # part of the way, the way the missing force pushes
             longest = self._longest_flight(state) if flies else self.longest
             bone[1] = np.copysign(longest, missing if flies else bone[1])
             found = self.solve(replace(step, bone=bone, unknowns=()))
         return found, bone
+
+    def _drawn(self, step: LinearContactStep, travel: float) -> bool:
+        """Whether this travel of the bone goes against the force that it lacks once the tissue has come to
+        rest: the attraction grows faster on the way than anything that holds the body.
+        """
+        found = self.solve(replace(step, unknowns=()))
+        return travel * step.lacking(found, 0.0) < 0.0
 
     def _longest_flight(self, state: State) -> float:
         """How far (mm) a body that touches nothing moves in one iteration: to the surface and as

@@ -7,14 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
-    AttractionStiffness,
     ContactProblem,
     ExtraUnknowns,
-    Roughness,
     solve_with_attraction,
 )
 
@@ -186,3 +185,14 @@ def test_the_bone_carries_the_attraction_that_contact_forces_add():
     whole = ContactProblem(problem.start, problem.compliance, problem.friction, extra)
     found = solve_with_attraction(whole, pull, np.array([STICK]))
     assert found.force[0] == pytest.approx(2.0 / 0.25, rel=1e-12)
+
+
+def test_chords_are_below_tangents_where_the_attraction_grows_faster_and_faster():
+    """At 2 N/mm: 0.8 per N/mm, where 1 N/mm is gained since none; 0.3 and 1 N/mm; and a node without load."""
+    gain, lost, present = np.array([0.8, 0.3, 5.0]), np.array([1.0, 1.0, 0.0]), np.array([2.0, 2.0, 0.0])
+    rough = Roughness(np.append(gain, 0.5 * gain), np.append(lost, 0.5 * lost), present)
+    chords = rough.by_chords()
+    np.testing.assert_allclose(chords.gain, [0.5, 0.3, 5.0, 0.25, 0.15, 2.5], rtol=1e-12)
+    np.testing.assert_array_equal(chords.loss_on_opening, rough.loss_on_opening)
+    concave = rough.of(np.array([1, 2]))
+    assert concave.by_chords() is concave

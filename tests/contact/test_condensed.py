@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.contact.attracted import Roughness
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
 from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Unstable
@@ -263,6 +264,30 @@ def test_a_node_that_the_tangent_of_its_friction_lifts_off_is_held_by_the_chord(
     assert found.status.tolist() == [BACKWARD]
     load = 0.2 / 1.45
     np.testing.assert_allclose(found.force, [[load, 0.5 * load]], rtol=1e-12)
+
+
+def test_a_node_that_the_tangent_of_its_attraction_lifts_off_is_held_by_the_chord():
+    """Pulled in by 1.3 mm. Under its present 2 N/mm the attraction gains 1 N/mm and grows by 0.8 per
+    N/mm: by that tangent it is 1.6 N/mm less at no load and lets go, open it is 1 N/mm less and pulls
+    in. With 0.5 per N/mm the node is held by (1.3 - 1) / (1 - 0.5).
+    """
+    zero, schur = np.zeros(1), np.eye(4)
+    known = Candidates(
+        surface=SurfaceState(zero, zero, zero),
+        slip=zero,
+        force=np.array([[2.0, 0.0]]),
+        status=np.array([STICK]),
+        friction=0.5 * np.ones(1),
+        interface_compliance=np.zeros((1, 2)),
+        negative_stiffness=zero,
+        gain_on_closing=zero,
+        friction_slope=zero,
+        roughness=Roughness(np.array([0.8, 0.0]), np.array([1.0, 0.0]), np.array([2.0])),
+    )
+    residual = np.array([0.0, 2.0 - 1.3, 0.0, 0.0])
+    found = LinearContactStep(CondensedTangent.make(schur, None), known, residual, np.zeros(2)).solve()
+    assert found.status.tolist() == [STICK]
+    np.testing.assert_allclose(found.force, [[0.6, 0.0]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(3))

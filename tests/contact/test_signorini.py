@@ -9,12 +9,12 @@ from scipy.optimize import nnls
 
 from evfem.common.constants import ACTIVE_SET_LIMIT
 from evfem.contact import signorini
+from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
     STICK,
-    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ExtraUnknowns,
@@ -413,3 +413,24 @@ def test_many_violated_nodes_of_a_body_that_gives_way_are_given_up(monkeypatch, 
     with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
         solve_contact(ContactProblem(start, compliance, np.zeros(30)), np.full(30, OPEN))
     assert (len(solves) == ACTIVE_SET_LIMIT // 3) == given_up
+
+
+@pytest.mark.parametrize(("hopeless", "given_up"), [(12, True), (30, False)])
+def test_many_violated_nodes_between_rough_faces_are_given_up(monkeypatch, hopeless, given_up):
+    """Each of thirty is lifted off by its tangent, which is below what an open one is drawn by, and turns
+    between the two; the body itself, of random compliance, holds. From each of three starts.
+    """
+    solve, solves = signorini._solve_statuses, []
+    monkeypatch.setattr(signorini, "_solve_statuses", lambda *known: solves.append(1) or solve(*known))
+    monkeypatch.setattr(signorini, "HOPELESS", hopeless)
+    rng, compliance, zero = np.random.default_rng(1), np.eye(60), np.zeros(30)
+    random = rng.normal(size=(30, 30))
+    compliance[:30, :30] += 0.01 * random @ random.T
+    gain, loss = np.append(np.full(30, 0.8), zero), np.append(np.ones(30), zero)
+    rough = AttractionStiffness(zero, zero, zero, Roughness(gain, loss, np.full(30, 2.0)))
+    start = np.append(-rng.uniform(1.1, 1.5, 30), zero)
+    problem = ContactProblem(start, compliance, zero, attraction=rough)
+    assert not problem.gives_way
+    with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
+        solve_contact(problem, np.full(30, OPEN))
+    assert (len(solves) == 3 * (ACTIVE_SET_LIMIT // 3)) == given_up

@@ -327,6 +327,26 @@ def test_beyond_a_fold_the_tangent_repels_and_before_it_is_exact():
             assert count < 40
 
 
+def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_it():
+    """The same wave at twenty times the voltage: most gains are above 0.9 now."""
+    rough = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
+    wave = Sinusoid(terms=[[0.15, 2.0, 0.4]], y=-0.2, insulator=THIN)
+    linear, _, state = made(wave, voltage=1200.0, law=StrongTroxel(), roughness_gap=rough)
+    pressing = 0.002 + 0.001 * np.arange(state.status.size)
+    force = np.column_stack([pressing, np.zeros_like(pressing)])
+    state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
+    place, slope = linear.interface.resting(state), linear.interface.surface_at(state).slope
+    whole = linear.attraction.gain_on_pressing(place, 1200.0, linear.touching, pressing)
+    normal, tangent = linear.roughness(state).gain.reshape(2, -1)
+    folded = whole > STABLE * np.hypot(1.0, slope)
+    assert folded.any()
+    assert (slope[folded] != 0.0).all()
+    assert (normal[folded] <= 0.99 + 1e-12).all()
+    np.testing.assert_array_equal(tangent[folded], 0.0)
+    held = ~folded & (whole > 0.0)
+    np.testing.assert_allclose(tangent[held], slope[held] * normal[held], rtol=1e-12)
+
+
 @pytest.mark.parametrize("direction", ["vertical", "normal"])
 def test_the_coupling_knows_lengths_but_not_the_nodes_own_gaps(direction):
     """Over level ground the stiffness that the attraction adds vanishes for a pad that slides as a

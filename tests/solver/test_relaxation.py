@@ -26,6 +26,7 @@ from evfem.simulation.model import make_model
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Pace, Patience, Relaxation
 from evfem.solver.state import Circling, StepFailed
@@ -233,6 +234,24 @@ def test_a_viscous_finger_without_mass_is_pulled_off_at_once():
     with pytest.raises(NotConverged, match=r"lifts off, where the attraction .* try more voltage") as lost:
         simulate(Scene(pad, Display(), Kaczmarek(), falling, motion, solver=viscous))
     assert lost.value.step > 1
+
+
+def test_a_viscous_finger_that_is_pressed_is_not_released_to_see_whether_it_flies(monkeypatch):
+    """Every part of the step fails; what is said is why."""
+    motion = [Press(indentation=1e-4, steps=1), Wait(duration=0.1, steps=2, hold="force")]
+    pad = finger(block(8, 2, sag=0.01), E=0.02, viscosity=1e-3)
+    scene = Scene(pad, Display(), None, 0.0, motion, solver=Solver(dynamics="viscous"))
+    step = Equilibrium.step
+
+    def failing(self, old, target, frozen=None, start=None):
+        if target.height.free:
+            raise StepFailed("no equilibrium", [1.0])
+        return step(self, old, target, frozen, start)
+
+    monkeypatch.setattr(Equilibrium, "step", failing)
+    monkeypatch.setattr(Relaxation, "follow", None)
+    with pytest.raises(NotConverged, match="no equilibrium"):
+        simulate(scene)
 
 
 def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
