@@ -114,7 +114,7 @@ class Relaxation:
         end, held = target, target if moving else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
-        pace, rounds = Pace(), Rounds()
+        pace, rounds, pad = Pace(), Rounds(), self.body.space.mesh.node_sets["pad"]
         for _ in range(DRAG_STEPS):
             self.body.release(state.u + pace.nudge * self._aside, pace.rate)
             try:
@@ -131,7 +131,7 @@ class Relaxation:
             _refuse_flight(new, held)
             calm = pace.went(float(np.abs(new.u - state.u).max()))
             state = new
-            if rounds.closed(state.u):
+            if rounds.closed(state.u[pad]):
                 raise Circling("the released finger goes round in circles", [])
             if calm:
                 rest, left = self._rest(state, end)
@@ -206,8 +206,8 @@ class Rounds:
         self._came_back = np.zeros(0, dtype=int)
 
     def closed(self, u: Floats) -> bool:
-        """Whether the body, now at displacements u, has come back somewhere `ROUNDS` times, to within the
-        fraction `ROUND` of how far it had been away, and the rounds do not become smaller.
+        """Whether the pad, now at displacements u (P, dim), has come back somewhere `ROUNDS` times, to
+        within the fraction `ROUND` of how far it had been away, and the rounds do not become smaller.
         """
         apart = np.array([float(np.abs(u - place).max()) for place in self._places])
         back = apart < ROUND * self._away

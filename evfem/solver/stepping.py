@@ -88,12 +88,14 @@ class Part:
 class Release:
     """Below which part of the present step the body is released, and the part that worked last;
     whether a part from the present state failed because the body gives way the more, the more it is
-    loaded: shorter ones may fail otherwise.
+    loaded: shorter ones may fail otherwise; and whether the body, released there, goes round in circles:
+    it would do so again.
     """
 
     least: float
     trusted: float
     unstable: bool = False
+    circles: bool = False
 
 
 @dataclass
@@ -143,7 +145,7 @@ class Stepper:
                 continue
             if not self._keeps(error, fraction - done):
                 continue
-            self._release.trusted, self._release.unstable = self.substep, False
+            self._release = replace(self._release, trusted=self.substep, unstable=False, circles=False)
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
@@ -237,7 +239,9 @@ class Stepper:
             raise failed
         if not relaxation.applies(target):
             return None
-        failed.released, mark = True, accounts.mark()
+        failed.released, failed.circles, mark = True, self._release.circles, accounts.mark()
+        if failed.circles:
+            return None
         try:
             rest = relaxation.follow(state, target, accounts.accept)
         except StepFailed as error:
@@ -245,7 +249,7 @@ class Stepper:
             if isinstance(error, Folded | LiftedOff):
                 error.last = failed.last
                 raise
-            failed.circles = isinstance(error, Circling)
+            failed.circles = self._release.circles = isinstance(error, Circling)
             return None
         self.relaxations += 1
         return rest

@@ -13,7 +13,7 @@ from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
-from evfem.solver.state import Record, StepFailed
+from evfem.solver.state import Circling, Record, StepFailed
 from evfem.solver.stepping import Stepper, Unbooked
 from evfem.solver.strategy import Strategy
 
@@ -205,6 +205,26 @@ def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tri
     none = Stepper(Steps(Strategy(), 1 / 5000), body=object())
     with pytest.raises(StepFailed):
         none.follow(0.0, lambda _, share: share, Kept())
+
+
+@pytest.mark.parametrize(("end", "times"), [(Circling, 1), (StepFailed, 2)])
+def test_a_body_that_goes_round_in_circles_is_not_released_there_again(monkeypatch, end, times):
+    """One that only comes to no rest is, at the smallest part."""
+    released = []
+
+    class Restless(Applying):
+        def follow(self, state, target, accept):
+            released.append(target)
+            raise end("no rest", [])
+
+    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
+    stepper = Stepper(Steps(Strategy(), 1 / 5000), body=object())
+    with pytest.raises(StepFailed) as failed:
+        stepper.follow(0.0, lambda _, share: share, Unbooked())
+    assert len(released) == times
+    assert failed.value.released
+    assert failed.value.circles == (end is Circling)
+    assert failed.value.last == (0.0, 1 / 1024)
 
 
 @pytest.mark.parametrize("found", [False, True])
