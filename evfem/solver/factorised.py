@@ -15,9 +15,9 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless the
-        attraction's negative stiffness had to be scaled down; a part of the way where nodes have opened
-        and closed by turns
+    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless a volume
+        shrinks too far in it, or the attraction's negative stiffness had to be scaled down; a part of
+        the way where nodes have opened and closed by turns
 
 Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
 """
@@ -222,6 +222,9 @@ class FactorisedBody:
         if target.reached(state.bone):
             after = self._turning.next_iterate(state, after, to_and_fro(residuals))
         mixed = self._anderson.next_iterate(state, after)
+        if not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J:  # a combination may turn cells inside out
+            self._anderson.reset()
+            return after
         # what is given is kept to the last digit
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]

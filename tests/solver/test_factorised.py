@@ -236,3 +236,21 @@ def test_a_field_that_contact_does_not_hold_gives_way_to_columns(pressed, monkey
     after = body.advance(state, state, target, balance)
     assert tried == [True, False]
     assert np.abs(after.u - state.u).max() < 1e-6
+
+
+@pytest.mark.parametrize(("squeeze", "taken"), [(0.9, True), (0.96, False), (1.2, False)])
+def test_a_combination_of_iterates_that_collapses_cells_is_not_taken(pressed, monkeypatch, squeeze, taken):
+    """A block pressed flat along y has J = 1 - squeeze everywhere, and 0.05 must be left."""
+    body, state, target = pressed
+    points = body.body.space.mesh.points
+    flat = np.column_stack([np.zeros(len(points)), -squeeze * points[:, 1]])
+    combined = replace(state, u=flat)
+    monkeypatch.setattr(Anderson, "next_iterate", lambda self, before, after: combined)
+    monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3])
+    balance = body.balance(state, state.attraction, target)[1]
+    begun, forgotten = body.begin(state, target, False, state), []
+    monkeypatch.setattr(Anderson, "reset", lambda self: forgotten.append(1))
+    after = body.advance(state, begun, target, balance)
+    assert np.array_equal(after.u, flat) == taken
+    assert body.body.tissue.smallest_J(after.u) > 0.05
+    assert len(forgotten) == 1 + (not taken)  # once for the new tangent
