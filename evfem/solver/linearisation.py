@@ -313,6 +313,7 @@ class Linearisation:
             along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
         gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
         gain = gain * along
+        # whole, it could pull a node on a slope in again by more than the steadied gain leaves to hold it
         gain[1] = np.where(gain[0] > STABLE, 0.0, gain[1])
         gain[0] = steadied(gain[0])
         return Roughness(gain.ravel(), (lost * along).ravel(), pressing)
