@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Roughness:
         """
         k = self.present.size
         linear, lost = self.gain[:k] * self.present, self.loss_on_opening[:k]
-        convex = (linear > lost) & (lost > 0.0)
+        convex = linear > (1.0 + ROUNDING) * lost
         if not convex.any():
             return self
         share = np.where(convex, lost / np.where(convex, linear, 1.0), 1.0)

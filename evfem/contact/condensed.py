@@ -119,12 +119,12 @@ class Candidates:
         low at zero load. Where that lifts a node off, and the attraction of the open node pulls it in
         again, there is no solution either.
         """
-        known = self
-        if self.cohesion is not None and self.cohesion.any():
-            pressed = (self.force[:, 0] > 0.0) & (self.cohesion > 0.0)
-            chord = self.cohesion / np.where(pressed, self.force[:, 0], 1.0)
+        known, cohesion = self, np.zeros_like(self.friction) if self.cohesion is None else self.cohesion
+        pressed = (self.force[:, 0] > 0.0) & (cohesion > 0.0)
+        if pressed.any():
+            chord = cohesion / np.where(pressed, self.force[:, 0], 1.0)
             friction = np.where(pressed, self.friction + chord, self.friction)
-            known = replace(known, friction=friction, cohesion=np.where(pressed, 0.0, self.cohesion))
+            known = replace(known, friction=friction, cohesion=np.where(pressed, 0.0, cohesion))
         if self.roughness is not None and (chords := self.roughness.by_chords()) is not self.roughness:
             known = replace(known, roughness=chords)
         return known

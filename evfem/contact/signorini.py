@@ -33,8 +33,8 @@ Algorithm (`solve_contact`), a primal-dual active set::
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
         change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
-            round in a circle, or many are left when one at a time begins and the body gives way, or
-        between rough faces
+                round in a circle, or many are left when one at a time begins and the body gives way, or the
+            attraction grows with the contact forces
     start again from all nodes sticking, then from all open, before giving up
 
 After a few solves the drops of the attraction are taken out of the equations
@@ -143,7 +143,8 @@ class ContactProblem:
     @property
     def seldom_ends(self) -> bool:
         """Whether an active set seldom ends that has many violated nodes left when one at a time begins."""
-        return self.gives_way or (self.attraction is not None and self.attraction.roughness is not None)
+        rough = None if self.attraction is None else self.attraction.roughness
+        return self.gives_way or (rough is not None and bool(rough.gain.any()))
 
     @property
     def resists(self) -> Any:

@@ -15,8 +15,8 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless a volume
-        shrinks too far in it, or the attraction's negative stiffness had to be scaled down; a part of
+    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless it goes
+        too far, or the attraction's negative stiffness had to be scaled down; a part of
         the way where nodes have opened and closed by turns
 
 Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
@@ -222,7 +222,7 @@ class FactorisedBody:
         if target.reached(state.bone):
             after = self._turning.next_iterate(state, after, to_and_fro(residuals))
         mixed = self._anderson.next_iterate(state, after)
-        if not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J:  # a combination may turn cells inside out
+        if mixed is not after and self._goes_too_far(state, mixed, target):
             self._anderson.reset()
             return after
         # what is given is kept to the last digit
@@ -232,6 +232,13 @@ class FactorisedBody:
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
+
+    def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
+        """Whether a combination of iterates turns cells inside out, or the bone leaves: where nothing holds
+        it, all steps are equally long, and combined they lead anywhere.
+        """
+        travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
+        return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
         """The next iterate, where candidates follow the contact: nodes that have sunk in on the way join

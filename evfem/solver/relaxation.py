@@ -40,7 +40,7 @@ bone stays at that x, while the tissue, which has no time of its own, comes to r
 *Circles*: with a traction that is the derivative of an energy, energy can only fall on the way, and the
 body comes to rest. The vertical attraction of the paper is none: a node that moves changes what its
 neighbours carry without work (`evfem.contact.attraction`), and a finger without friction on slopes may go
-round for ever. A body that has come back to where it was `ROUNDS` times is given up (`Rounds`).
+round for ever. A body whose pad has come back to where it was `ROUNDS` times is given up (`Rounds`).
 
 A wished friction force is not followed on the way, where drag would be part of it: the voltage
 stays as it is until the end.
@@ -207,10 +207,11 @@ class Rounds:
 
     def closed(self, u: Floats) -> bool:
         """Whether the pad, now at displacements u (P, dim), has come back somewhere `ROUNDS` times, to
-        within the fraction `ROUND` of how far it had been away, and the rounds do not become smaller.
+        within the fraction `ROUND` of how far it had been away, and the rounds do not become smaller. A
+        pad that sticks while the tissue above it moves goes no round, whatever its rounding.
         """
         apart = np.array([float(np.abs(u - place).max()) for place in self._places])
-        back = apart < ROUND * self._away
+        back = (apart < ROUND * self._away) & (self._away > NUDGE)
         smaller = self._away < NOT_SMALLER * self._farthest
         self._came_back = np.where(back, np.where(smaller, 1, self._came_back + 1), self._came_back)
         self._farthest = np.where(back, self._away, self._farthest)

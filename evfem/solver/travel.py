@@ -54,9 +54,12 @@ class Travel:
 
     def _drawn(self, step: LinearContactStep, travel: float) -> bool:
         """Whether this travel of the bone goes against the force that it lacks once the tissue has come to
-        rest: the attraction grows faster on the way than anything that holds the body.
+        rest, or that has no solution: the attraction grows faster on the way than what holds the body.
         """
-        found = self.solve(replace(step, unknowns=()))
+        try:
+            found = replace(step, unknowns=()).solve()
+        except ContactNotSolved:
+            return True
         return travel * step.lacking(found, 0.0) < 0.0
 
     def _longest_flight(self, state: State) -> float:

@@ -196,3 +196,13 @@ def test_chords_are_below_tangents_where_the_attraction_grows_faster_and_faster(
     np.testing.assert_array_equal(chords.loss_on_opening, rough.loss_on_opening)
     concave = rough.of(np.array([1, 2]))
     assert concave.by_chords() is concave
+
+
+def test_an_attraction_in_proportion_to_the_load_has_no_chords():
+    """Its tangents are its chords, but for rounding."""
+    present = np.random.default_rng(3).uniform(0.1, 3.0, 1000)
+    gain = np.random.default_rng(4).uniform(0.1, 0.9, 1000)
+    lost = (1.0 + gain) * present - present
+    assert (gain * present > lost).any()
+    linear = Roughness(np.append(gain, gain), np.append(lost, lost), present)
+    assert linear.by_chords() is linear

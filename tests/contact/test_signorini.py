@@ -434,3 +434,12 @@ def test_many_violated_nodes_between_rough_faces_are_given_up(monkeypatch, hopel
     with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
         solve_contact(problem, np.full(30, OPEN))
     assert (len(solves) == 3 * (ACTIVE_SET_LIMIT // 3)) == given_up
+
+
+def test_rough_faces_that_stay_apart_give_no_active_set_up():
+    """Where the attraction does not depend on the contact force."""
+    zero = np.zeros(2)
+    for gain, seldom in ((0.0, False), (0.5, True)):
+        rough = Roughness(np.array([gain, 0.0]), zero, np.ones(1))
+        pull = AttractionStiffness(zero[:1], zero[:1], zero[:1], rough)
+        assert ContactProblem(zero, np.eye(2), zero[:1], attraction=pull).seldom_ends == seldom

@@ -254,3 +254,19 @@ def test_a_combination_of_iterates_that_collapses_cells_is_not_taken(pressed, mo
     assert np.array_equal(after.u, flat) == taken
     assert body.body.tissue.smallest_J(after.u) > 0.05
     assert len(forgotten) == 1 + (not taken)  # once for the new tangent
+
+
+@pytest.mark.parametrize(("far", "taken"), [(0.5, True), (2.0, False)])
+def test_a_combination_of_iterates_whose_bone_leaves_is_not_taken(pressed, monkeypatch, far, taken):
+    """It may go as far as a linear step; where its height is given it does not count."""
+    body, state, target = pressed
+    free = replace(target, height=Force(float(-state.reaction[1])))
+    aside = np.array([0.0, far * body.travel.longest])
+    combined = replace(state, u=state.u + aside, bone=state.bone + aside)
+    monkeypatch.setattr(Anderson, "next_iterate", lambda self, before, after: combined)
+    monkeypatch.setattr(body.record, "residuals", [1e-3, 2e-3])
+    for asked, moved in ((free, taken), (target, True)):
+        begun = body.begin(state, asked, False, state)
+        balance = body.balance(state, state.attraction, asked)[1]
+        after = body.advance(state, begun, asked, balance)
+        assert np.array_equal(after.u, combined.u) == moved

@@ -28,7 +28,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.hand import Hand
-from evfem.solver.relaxation import Pace, Patience, Relaxation
+from evfem.solver.relaxation import Pace, Patience, Relaxation, Rounds
 from evfem.solver.state import Circling, StepFailed
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
@@ -323,6 +323,13 @@ def test_a_body_that_comes_back_to_where_it_was_is_given_up(turns, circles):
     with pytest.raises(Circling if circles else StepFailed, match="circles" if circles else "come to rest"):
         release.follow(rest, Target.held(rest.bone, 0.0), lambda old, new: None)
     assert (len(asked) < 25) == circles
+
+
+def test_a_pad_that_sticks_goes_no_round_by_its_rounding():
+    """Its last digit goes to and fro; a pad that goes 1 um to and fro does go round."""
+    for far, round_trip in ((1e-17, False), (1e-3, True)):
+        rounds = Rounds()
+        assert any(rounds.closed(np.array([far * (step % 2)])) for step in range(20)) == round_trip
 
 
 def test_friction_on_the_way_is_counted(point):
