@@ -33,8 +33,8 @@ Algorithm (`solve_contact`), a primal-dual active set::
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
         change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
-                round in a circle, or many are left when one at a time begins and the body gives way, or the
-            attraction grows with the contact forces
+            round in a circle, or many are left when one at a time begins and the body gives way or
+            the attraction grows with the contact forces
     start again from all nodes sticking, then from all open, before giving up
 
 After a few solves the drops of the attraction are taken out of the equations
