@@ -227,6 +227,29 @@ def test_a_body_that_goes_round_in_circles_is_not_released_there_again(monkeypat
     assert failed.value.last == (0.0, 1 / 1024)
 
 
+def test_a_body_that_went_round_in_circles_is_released_again_elsewhere(monkeypatch):
+    """Parts of 1/100 work up to the middle of the step, none beyond."""
+    released = []
+
+    class Restless(Applying):
+        def follow(self, state, target, accept):
+            released.append(state)
+            raise Circling("no rest", [])
+
+    class Half(Steps):
+        def step(self, old, target, frozen=None, start=None):
+            if target > 0.5:
+                raise StepFailed("fails", [1.0])
+            return super().step(old, target, frozen, start)
+
+    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
+    with pytest.raises(StepFailed):
+        Stepper(Half(Strategy(), 1 / 100), body=object()).follow(0.0, lambda _, share: share, Unbooked())
+    assert released[0] == 0.0
+    assert len(released) == 2
+    assert released[1] == pytest.approx(0.5, abs=1 / 100)
+
+
 @pytest.mark.parametrize("found", [False, True])
 def test_a_part_that_failed_for_stability_is_not_forgotten_until_one_works(found):
     """Whole and half fail, the half because the body gives way; 1/4 works or fails, and all after it."""
