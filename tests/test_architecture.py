@@ -43,7 +43,7 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction fullfield drivenfield "
+        "friction surfaces textures own pad edge skin charging attraction sight fullfield drivenfield "
         "changes attracted elimination updated signorini follower condensed coulomb sweeps disc spatial "
         "stability",
     ),

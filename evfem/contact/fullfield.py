@@ -34,6 +34,7 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import Pad, surface_state
+from evfem.contact.sight import Sight
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns
 from evfem.electrostatics.laws import Layer, eps_0
@@ -51,8 +52,6 @@ SKIN = np.linspace(0.0, 1.0, 6) ** 2
 MARGIN = 1e-3
 #: columns below an edge with a middle node
 PARTS = 4
-#: columns follow an outline up to this slope
-STEEP = 6.0
 #: solutions that are remembered
 KEPT = 3
 #: nodes of a line that are moved at once for differences: one of so many, by this length (mm)
@@ -124,6 +123,7 @@ class FieldAttraction(Attraction):
     edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     skin: Any = None
     floating: bool = False
+    sight: Sight = field(default_factory=Sight)
     solved: OrderedDict[bytes, tuple[Capacitance | None, Floats]] = field(default_factory=OrderedDict)
 
     @property
@@ -245,7 +245,7 @@ class FieldAttraction(Attraction):
 
     def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
         """Field and forces, anew where they are not among the last `KEPT`."""
-        key = position.tobytes()
+        key = position.tobytes() + (b"" if self.sight.kept is None else self.sight.kept.tobytes())
         if self.roughness is not None and pressing is not None:
             key += pressing.tobytes()
         found = self.solved.get(key)
@@ -326,22 +326,18 @@ class FieldAttraction(Attraction):
             return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
         return Columns((insulator, gap), (INSULATOR, AIR))
 
+    def begin(self) -> None:
+        """A step begins: where columns stand is free again."""
+        self.sight.begin()
+
+    def watch(self, position: Floats) -> bool:
+        """See an iterate at `position` (P, 2); whether its columns are kept from now on."""
+        return self.sight.watch(self._lines @ position)
+
     def seen(self, position: Floats) -> Any:
-        """The lines (sparse, L x P) at which columns stand: between two that stand one above the other,
-        or nearly so, the higher one is behind an overhang, or deep in a groove.
-        """
-        place = self._lines @ position
-        apart, rise = np.diff(place, axis=0).T
-        if np.all(apart >= np.abs(rise) / STEEP):
-            return self._lines
-        x, y = place.T.tolist()
-        kept: list[int] = []
-        for k in range(len(x)):
-            while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:
-                kept.pop()
-            if not kept or x[k] - x[kept[-1]] > max(0.0, (y[k] - y[kept[-1]]) / STEEP):
-                kept.append(k)
-        return self._lines[kept]
+        """The lines (sparse, L x P) at which columns stand (`evfem.contact.sight`)."""
+        kept = self.sight.of(self._lines @ position)
+        return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
     def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
         """x (L,) of columns at `lines` (L, P) and the curves' heights (n + 1, L): electrode, insulator,

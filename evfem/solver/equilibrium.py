@@ -281,10 +281,14 @@ class Equilibrium(Statics):
         target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.drive.begin(old)
+        if self.attraction is not None:
+            self.attraction.begin()
         state = self.body.begin(old, target, frozen is not None, start)
         history: list[float] = []
         self.record.residuals, self.record.weakened, front, refused = history, 0, Front(), 0
         while len(history) < self.strategy.iterations or self._nearly(history):
+            if self._keeps_columns(state, frozen):
+                refused = len(history)
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
@@ -310,6 +314,12 @@ class Equilibrium(Statics):
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(history)} iterations", history)
+
+    def _keeps_columns(self, state: State, frozen: Floats | None) -> bool:
+        """Whether the attraction keeps its columns from this iterate on: what follows is another problem."""
+        if self.attraction is None or frozen is not None or state.voltage == 0.0:
+            return False
+        return self.attraction.watch(self.interface.resting(state))
 
     def _settled(self, old: State, state: State, target: Target) -> State:
         """The accepted state with what friction and hand remember of it."""

@@ -19,7 +19,7 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
         too far, or the attraction's negative stiffness had to be scaled down; a part of
         the way where nodes have opened and closed by turns
 
-Where contact has no solution under an older tangent, the iteration is done again with a fresh one.
+Where contact has no solution, the iteration is done again with `Linearisation.another` tangent.
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Recor
 from evfem.solver.travel import Travel
 from evfem.tissue.body import Body
 
-#: whether a travel of the bone is searched for that the contact problem does not settle
-Search = Literal["never", "if needed", "only"]
+#: whether a travel of the bone is searched for that the contact problem is known not to settle
+Search = Literal["never", "only"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,20 +206,14 @@ class FactorisedBody:
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)
-        except ContactNotSolved:
-            # an older tangent may ask for what no contact can give
-            older = self.linearisation.leave_fringes() or not self.linearisation.made_at(state)
-            if older:
-                self.linearisation.factorise(state)
-            elif not target.height.free:
-                raise
+        except ContactNotSolved as error:
             self._anderson.reset()
-            after = self._linear_step(old, state, target, balance, "if needed" if older else "only")
+            after = self._linear_step_anew(old, state, target, balance, error)
         after = self._grown(old, state, target, balance, after)
         if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
             self._anderson.reset()
             return after
-        if target.reached(state.bone):
+        if target.reached(state.bone) and not self.linearisation.fringes:
             after = self._turning.next_iterate(state, after, to_and_fro(residuals))
         mixed = self._anderson.next_iterate(state, after)
         if mixed is not after and self._goes_too_far(state, mixed, target):
@@ -232,6 +226,19 @@ class FactorisedBody:
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
+
+    def _linear_step_anew(
+        self, old: State, state: State, target: Target, balance: Balance, error: ContactNotSolved
+    ) -> State:
+        """The next iterate after the `error`: with other tangents, at last with the travel searched for."""
+        while self.linearisation.another(state):
+            try:
+                return self._linear_step(old, state, target, balance)
+            except ContactNotSolved as again:
+                error = again
+        if not target.height.free:
+            raise error
+        return self._linear_step(old, state, target, balance, "only")
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
         """Whether a combination of iterates turns cells inside out, or the bone leaves: where nothing holds
@@ -395,8 +402,7 @@ class FactorisedBody:
         if linearisation.refused:
             linearisation.factorise(state)
         found = self._pushed_out(old, state, target)
-        if found is not None and not linearisation.made_at(state):
-            linearisation.factorise(state)
+        if found is not None and linearisation.sharpen(state):
             found = self._pushed_out(old, state, target)
         return found
 

@@ -10,8 +10,8 @@ A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_
     S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
 
 The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
-nodes; under the full field, once iterations gain nothing, that of the field itself, as long as
-contact has a solution with it.
+nodes; under the full field, once iterations gain nothing or contact has no solution, that of the
+field itself, as long as contact has a solution with it.
 
 A tangent only leads to the equilibrium, and what is accepted is balanced in double precision: so its
 factors are of single precision, which takes two thirds of the time and half of the memory. They are
@@ -54,8 +54,15 @@ from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint
 from evfem.tissue.body import Body
 
 
-def in_vain(residuals: list[float]) -> bool:
-    """Whether the last four iterations have gained nothing, with the bone where it should be."""
+def in_vain(residuals: list[float], same: bool) -> bool:
+    """Whether iterations gain nothing: the last two with the `same` nodes in contact, or the last four with
+    the bone where it should be.
+
+    >>> in_vain([1e-2, 2e-2, 5e-2], True), in_vain([1e-2, 2e-2, 5e-2], False)
+    (True, False)
+    """
+    if same and len(residuals) > 2 and min(residuals[-2:]) > residuals[-3]:
+        return True
     return len(residuals) > 8 and max(residuals[-4:]) < 1.0 and min(residuals[-4:]) > min(residuals[:-4])
 
 
@@ -104,6 +111,7 @@ class Linearisation:
         self._made_at: TangentPoint | None = None
         self._outdated = self._renewed_near = False
         self._lets_go = True
+        self._status: Ints = np.zeros(0, dtype=np.int64)
         self._drag_rate = 0.0
         self.fringes = self._held_with_fringes = False
 
@@ -174,8 +182,8 @@ class Linearisation:
         """Factorise at the present state where there is no factorisation, the old one stalls, or a
         new one saves iterations; says whether it did.
         """
-        follows = self.attraction is not None and self.attraction.has_fringes and self._held_with_fringes
-        if follows and in_vain(history):
+        same, self._status = np.array_equal(self._status, state.status), state.status
+        if self._held_with_fringes and self._has_fringes(state) and in_vain(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
         if not self.refused and not self._too_old(history):
@@ -195,13 +203,33 @@ class Linearisation:
             self.single, self.factor = False, None
         self._renewed_near = near
 
-    def leave_fringes(self) -> bool:
-        """Go back to the columns' stiffness for the rest of a step in which contact has no solution
-        with the field's own; says whether that was in use.
+    def _has_fringes(self, state: State) -> bool:
+        """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
+        has = self.attraction is not None and self.attraction.has_fringes
+        return has and state.voltage != 0.0 and not self.frozen
+
+    def another(self, state: State) -> bool:
+        """Factorise otherwise where contact has no solution: at `state`, then with the field's own stiffness,
+        at last with the columns' for the rest of the step; says whether there was another way.
         """
-        left, self.fringes = self.fringes, False
-        self._held_with_fringes = self._held_with_fringes and not left
-        return left
+        if self.made_at(state):
+            if not self._held_with_fringes or not self._has_fringes(state):
+                return False
+            self._held_with_fringes = not self.fringes
+            self.fringes = not self.fringes
+        self.factorise(state)
+        return True
+
+    def sharpen(self, state: State) -> bool:
+        """Factorise at `state`, under the full field with its own stiffness; says whether the factorisation
+        at hand was another one.
+        """
+        fringes = self._has_fringes(state)
+        if self.made_at(state) and self.fringes == fringes:
+            return False
+        self.fringes = fringes
+        self.factorise(state)
+        return True
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""

@@ -10,6 +10,7 @@ import evfem as ev
 from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
 from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
+from evfem.contact.sight import STEEP
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
 
@@ -129,6 +130,25 @@ def test_what_is_behind_an_overhang_has_no_column():
     assert full.seen(points).shape == (8, 9)
     assert 5 not in full.seen(points).indices
     assert full.forces(points, 1.0, None)[5] == pytest.approx([0.0, 0.0])
+
+
+def test_forces_do_not_jump_where_a_place_goes_out_of_sight_again_and_again():
+    """A place at the edge of sight: with its column and without, the forces differ. Once it has come back
+    twice they are those of one choice on either side, and of a free one in the next step.
+    """
+    pad, points = arc(4, 3.0, 2.0, quadratic=False)
+    _, full = attractions(pad, points, ev.Display(y=-0.1))
+    rise = np.array([0.05, 0.05 * STEEP])
+    inside, outside = points.copy(), points.copy()
+    inside[5], outside[5] = points[4] + rise * [1.0, 0.9999], points[4] + rise * [1.0, 1.0001]
+    apart = [np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max()]
+    kept = [full.watch(place) for place in (inside, outside, inside, outside)]
+    assert kept == [False, False, False, True]
+    apart.append(np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max())
+    assert apart[1] < 0.01 * apart[0]
+    full.begin()
+    again = np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max()
+    assert again == apart[0]
 
 
 def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch):

@@ -10,7 +10,8 @@ from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
 from evfem.common.constants import TURNED_BACK
-from evfem.contact.signorini import OPEN, ContactNotSolved
+from evfem.contact.signorini import FORWARD, OPEN, ContactNotSolved
+from evfem.contact.stability import Verge
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Hover, Press
@@ -217,25 +218,45 @@ def test_iterations_in_which_a_node_opens_and_closes_by_turns_go_a_part_of_their
     assert after.voltage == state.voltage
 
 
-def test_a_field_that_contact_does_not_hold_gives_way_to_columns(pressed, monkeypatch):
-    """And the step goes on from the same iterate."""
+def test_where_contact_has_no_solution_another_tangent_is_tried(pressed, monkeypatch):
+    """And the step goes on from the same iterate; the last error is told where there is no other one."""
     body, state, target = pressed
     balance = body.balance(state, state.attraction, target)[1]
     body.begin(state, target, False, state)
     body.linearisation.factorise(state)
-    step, tried = body._linear_step, []
+    step, tried, others = body._linear_step, [], iter([True, True, False])
+    monkeypatch.setattr(body.linearisation, "another", lambda state: next(others))
 
-    def by_columns_only(*given):
-        tried.append(body.linearisation.fringes)
-        if tried[-1]:
-            raise ContactNotSolved("1 of 10 nodes keep changing")
+    def third(*given):
+        tried.append(given)
+        if len(tried) < 3:
+            raise ContactNotSolved(f"{len(tried)} nodes keep changing")
         return step(*given)
 
-    monkeypatch.setattr(body, "_linear_step", by_columns_only)
-    body.linearisation.fringes = True
+    monkeypatch.setattr(body, "_linear_step", third)
     after = body.advance(state, state, target, balance)
-    assert tried == [True, False]
+    assert len(tried) == 3
     assert np.abs(after.u - state.u).max() < 1e-6
+    others = iter([True, False])
+    tried.clear()
+    with pytest.raises(ContactNotSolved, match="2 nodes"):
+        body.advance(state, state, target, balance)
+
+
+@pytest.mark.parametrize("fringes", [False, True])
+def test_with_the_fields_own_stiffness_the_whole_way_is_gone(pressed, monkeypatch, fringes):
+    """Turning back is what the stiffness of columns does; its eighth of the way takes Newton's rate."""
+    body, state, target = pressed
+    shortened = []
+    monkeypatch.setattr(
+        Turning, "next_iterate", lambda self, before, after, stalled: shortened.append(1) or after
+    )
+    balance = body.balance(state, state.attraction, target)[1]
+    body.begin(state, target, False, state)
+    body.linearisation.factorise(state)
+    body.linearisation.fringes = fringes
+    body.advance(state, state, target, balance)
+    assert bool(shortened) is not fringes
 
 
 @pytest.mark.parametrize(("squeeze", "taken"), [(0.9, True), (0.96, False), (1.2, False)])
@@ -270,3 +291,17 @@ def test_a_combination_of_iterates_whose_bone_leaves_is_not_taken(pressed, monke
         balance = body.balance(state, state.attraction, asked)[1]
         after = body.advance(state, begun, asked, balance)
         assert np.array_equal(after.u, combined.u) == moved
+
+
+@pytest.mark.parametrize(("sharper", "leaves"), [(True, False), (False, True)])
+def test_a_finger_leaves_an_equilibrium_only_by_the_sharpest_tangent(pressed, monkeypatch, sharper, leaves):
+    """Columns may say that slopes win where the field's own stiffness holds the finger."""
+    body, state, _ = pressed
+    verges = iter([Verge(1.03, "slopes"), None])
+    frame = replace(body.interface.surface_at(state), curvature=np.full(state.status.size, -1.0))
+    monkeypatch.setattr(body.interface, "surface_at", lambda state: frame)
+    monkeypatch.setattr(body, "_pushed_out", lambda *given: next(verges))
+    monkeypatch.setattr(body.linearisation, "sharpen", lambda state: sharper)
+    slipping = replace(state, status=np.where(state.status == OPEN, OPEN, FORWARD))
+    found = body.leaves(state, slipping, None)
+    assert (found is not None) is leaves

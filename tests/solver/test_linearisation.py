@@ -456,10 +456,17 @@ VAIN = [0.5, 0.02, 0.01, 0.03, 0.02, 0.03, 0.02, 0.03, 0.02]
 
 
 def test_iterations_in_vain_are_known_from_the_residuals():
-    assert in_vain(VAIN)
-    assert not in_vain(VAIN[:8])
-    assert not in_vain([*VAIN, 9e-3])
-    assert not in_vain([*VAIN, 2.0])  # the bone is still on its way
+    assert in_vain(VAIN, False)
+    assert not in_vain(VAIN[:8], False)
+    assert not in_vain([*VAIN, 9e-3], False)
+    assert not in_vain([*VAIN, 2.0], False)  # the bone is still on its way
+
+
+def test_with_the_same_nodes_in_contact_two_iterations_say_it():
+    assert in_vain([3.0, 1e-3, 2e-3, 5e-3], True)
+    assert not in_vain([3.0, 1e-3, 2e-3, 5e-3], False)
+    assert not in_vain([3.0, 1e-3, 2e-3, 9e-4], True)
+    assert not in_vain([1e-3, 2e-3], True)
 
 
 @pytest.fixture
@@ -506,13 +513,49 @@ def test_the_fields_stiffness_serves_one_step(under_the_field):
     assert linear.reusable is not None
 
 
-def test_a_field_that_contact_does_not_hold_is_left_for_the_step(under_the_field):
+def test_the_same_nodes_in_contact_are_those_of_the_iterate_before(under_the_field):
     linear, _, state = under_the_field
-    assert not linear.leave_fringes()
-    coupled(linear, state)
-    assert linear.leave_fringes()
-    coupled(linear, state)
-    assert not linear.fringes
-    linear.begin(state, False)
-    coupled(linear, state)
+    opened = replace(state, status=np.where(np.arange(state.status.size) == 0, 1, state.status))
+    for iterate in (opened, state, opened):
+        linear.refactorise_if_needed(iterate, [1e-3, 2e-3, 3e-3])
+        assert not linear.fringes
+    linear.refactorise_if_needed(opened, [1e-3, 2e-3, 3e-3])
     assert linear.fringes
+
+
+def test_without_a_solution_the_tangent_is_a_fresh_one_then_the_fields_then_that_of_columns(under_the_field):
+    linear, _, state = under_the_field
+    moved = replace(state, u=state.u + 1e-3)
+    ways = []
+    while linear.another(moved):
+        assert linear.made_at(moved)
+        ways.append(linear.fringes)
+    assert ways == [False, True, False]
+    assert not linear.another(moved)
+    coupled(linear, moved)
+    assert not linear.fringes  # for the rest of the step
+    linear.begin(moved, False)
+    coupled(linear, moved)
+    assert linear.fringes
+
+
+@pytest.mark.parametrize("change", [{"voltage": 0.0}, {"frozen": True}])
+def test_without_a_field_there_is_a_fresh_tangent_alone(under_the_field, change):
+    linear, _, state = under_the_field
+    linear.begin(state, change.pop("frozen", False))
+    state = replace(state, u=state.u + 1e-3, **change)
+    assert linear.another(state)
+    assert not linear.another(state)
+    assert not linear.fringes
+
+
+def test_a_sharp_tangent_is_made_here_with_the_fields_own_stiffness(under_the_field):
+    linear, _, state = under_the_field
+    assert linear.sharpen(state)
+    assert linear.fringes
+    assert linear.made_at(state)
+    assert not linear.sharpen(state)
+    assert linear.sharpen(replace(state, u=state.u + 1e-3))
+    unloaded = replace(state, voltage=0.0)
+    assert linear.sharpen(unloaded)
+    assert not linear.fringes
