@@ -46,6 +46,16 @@ class Capacitance:
 
 
 @dataclass(frozen=True, eq=False)
+class Nearby:
+    """What solutions of outlines close to a solved one start from: its potential `phi` (L, rows) and the
+    factor of its matrix.
+    """
+
+    phi: Floats
+    factor: Floats
+
+
+@dataclass(frozen=True, eq=False)
 class Columns:
     """Layers of relative permittivity `eps_r` (n,), from the electrode up, each with rows at the
     shares `shares[l]` of its height, from 0 to 1.
@@ -55,13 +65,19 @@ class Columns:
     shares: tuple[Floats, ...]
 
     def solve(
-        self, x: Floats, levels: Floats, electrodes: Floats | None = None, floating: bool = False
+        self,
+        x: Floats,
+        levels: Floats,
+        electrodes: Floats | None = None,
+        floating: bool = False,
+        near: Nearby | None = None,
     ) -> Capacitance:
         """Solve between curves of heights `levels` (n + 1, L) at the lines `x` (L,) in mm.
 
         `electrodes` (K, 3) are pieces of the lowest curve, from and to in mm and their voltage over U;
         between them nothing crosses it. Without, all of it is one electrode. The highest curve is at
-        0, or, `floating`, at the potential at which it has no charge.
+        0, or, `floating`, at the potential at which it has no charge. From what is `near` the potential
+        is exact to the second order in what has moved, and takes less than half of the time.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
@@ -69,7 +85,7 @@ class Columns:
         (10.0, -100.0)
         """
         cells, strips = self.cells(x, levels, electrodes)
-        phi = cells.potential(strips, floating)
+        phi = cells.potential(strips, floating) if near is None else cells.corrected(near.phi, near.factor)
         found = cells.squares(phi)
         value = cells.energy(found)
         by_x = cells.by_x(found, np.ones_like(cells.share), np.zeros_like(cells.rise))
@@ -80,6 +96,11 @@ class Columns:
             by_level[1] += THIN * by_level[0]
             by_level[0] *= 1.0 - THIN
         return Capacitance(eps_0 * value, eps_0 * by_x, eps_0 * by_level, phi, cells.heights())
+
+    def nearby(self, x: Floats, levels: Floats) -> Nearby:
+        """What outlines close to this one start from, under one electrode and a grounded finger."""
+        cells, _ = self.cells(x, levels, None)
+        return Nearby(cells.potential(None, False), cells.factor())
 
     def cells(self, x: Floats, levels: Floats, electrodes: Floats | None) -> tuple[Cells, Strips | None]:
         """The cells, and what stands for the lowest ones on electrodes that end."""

@@ -435,3 +435,18 @@ def test_the_exact_encoding_drives_the_full_field():
     assert result.applied_tangential_force[-2:] == pytest.approx([0.016] * 2, rel=1e-6)
     left = result.normal_force - result.electrostatic_force
     assert result.applied_force == pytest.approx(left, rel=1e-6)
+
+
+def test_the_stiffness_under_an_electrode_that_ends_is_solved_anew(monkeypatch):
+    """A field that starts from nearby knows of one electrode without end alone."""
+    pad, points = arc(12, 3.0, 1.0)
+    points[:, 1] += 0.01
+    _, full = attractions(pad, points, ev.Display(y=0.0, electrodes=[[-20.0, 0.13, 1.0]]))
+    monkeypatch.setattr(fullfield, "APART", len(points))
+    found = full.fringe_stiffness(points, 300.0, None).toarray()
+    node, step = len(points) // 2, 1e-6
+    way = np.zeros_like(points)
+    way[node, 1] = step
+    ends = [full.forces(points + sign * way, 300.0, None).ravel() for sign in (1.0, -1.0)]
+    exact = (ends[0] - ends[1]) / (2.0 * step)
+    assert found[:, 2 * node + 1] == pytest.approx(exact, abs=1e-4 * np.abs(exact).max())
