@@ -77,7 +77,7 @@ class Columns:
         `electrodes` (K, 3) are pieces of the lowest curve, from and to in mm and their voltage over U;
         between them nothing crosses it. Without, all of it is one electrode. The highest curve is at
         0, or, `floating`, at the potential at which it has no charge. From what is `near` the potential
-        is exact to the second order in what has moved, and takes less than half of the time.
+        is exact to the second order in what has moved, and takes half of the time.
 
         >>> plate = Columns((1.0,), (np.array([0.0, 0.5, 1.0]),))
         >>> found = plate.solve(np.linspace(0.0, 1.0, 5), np.array([[0.0] * 5, [0.1] * 5]))
