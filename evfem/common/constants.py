@@ -120,6 +120,7 @@ DRAG_GROWTH             where its speed grows less or more than these factors in
 DRAG_REST               drag of a rate below this is nearly none: a body that slows down may      snaps
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
+DRAG_LEAST              what comes to rest with drag of such a rate, but not without, is given up     snaps
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 STEADY                  after a step of a release that went more than this fraction of the one      snaps
                         before, the next begins ahead
@@ -200,7 +201,7 @@ RELEASED = 1.0 / 32.0
 COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
-DRAG_MOST, DRAG_STEPS = 1e6, 400
+DRAG_LEAST, DRAG_MOST, DRAG_STEPS = 1e-9, 1e6, 400
 STEADY = 0.6
 NUDGE = 1e-5
 ROUND, ROUNDS, NOT_SMALLER = 0.1, 2, 0.75

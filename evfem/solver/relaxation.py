@@ -17,6 +17,7 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
             give up where a finger that is pulled has lost the surface: nothing brings it back
         while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
             it is found; the body is nudged where it would leave that
+        give up where even the least drag holds the body and none does not
 
 Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
 finger that swings may jump over the equilibrium next to it, so the way would depend on a density
@@ -34,8 +35,9 @@ but the least push makes it leave. In the plane such an equilibrium is refused
 (`evfem.solver.equilibrium`), with drag as without. Drag of the next step then holds the body at a place
 `NUDGE` aside, and the motion that is lost grows from there.
 
-A hand with a mass or a damper goes on in its own time: in the first step of a release, and then the
-bone stays at that x, while the tissue, which has no time of its own, comes to rest below it.
+A hand with a mass or a damper goes on in its own time, and charge flows in its own: in the first step
+of a release. Then the bone stays at that x, and each node keeps its charge, while the tissue, which has no
+time of its own, comes to rest below.
 
 *Circles*: with a traction that is the derivative of an energy, energy can only fall on the way, and the
 body comes to rest. The vertical attraction of the paper is none: a node that moves changes what its
@@ -61,6 +63,7 @@ from evfem.common.constants import (
     DRAG_CALMER,
     DRAG_CHANGE,
     DRAG_GROWTH,
+    DRAG_LEAST,
     DRAG_MOST,
     DRAG_REST,
     DRAG_STEPS,
@@ -86,11 +89,12 @@ LIFTED = (
 @dataclass
 class Relaxation:
     """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included, with
-    iterations that begin at a third argument, or there if that is None.
+    iterations that begin at a third argument, or there if that is None; `charged` where charge flows.
     """
 
     body: Body
     solve: Callable[[State, Target, State | None], State]
+    charged: bool = False
 
     def applies(self, target: Target) -> bool:
         """Whether the tissue takes no time on its way to `target`, so that nothing but an equilibrium is
@@ -110,8 +114,8 @@ class Relaxation:
             self.body.release(state.u, 0.0)
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
-        moving = target.duration > 0.0 and target.hand is not None and target.hand.hand.timed
-        end, held = target, target if moving else replace(target, duration=0.0)  # a snap takes no time
+        passing = self.charged or (target.hand is not None and target.hand.hand.timed)
+        end, held = target, target if passing else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
         pace, rounds, pad = Pace(), Rounds(), self.body.space.mesh.node_sets["pad"]
@@ -126,8 +130,8 @@ class Relaxation:
                     raise
                 continue
             accept(state, new)
-            if held.hand is not None and moving:
-                held, end = (_below(new.bone, each) for each in (held, end))
+            if held.duration > 0.0:
+                held, end = (_at_once(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
             calm = pace.went(float(np.abs(new.u - state.u).max()))
             state = new
@@ -140,6 +144,8 @@ class Relaxation:
                     return rest
                 pace.refused(left)
             pace.choose()
+            if pace.rate < DRAG_LEAST:
+                break
         raise StepFailed("the released finger does not come to rest", [])
 
     def _ahead(self, state: State, fraction: float) -> State | None:
@@ -170,8 +176,10 @@ class Relaxation:
             return None, failed.unstable
 
 
-def _below(bone: Floats, target: Target) -> Target:
-    """The target with the bone (dim,) at the x where it is, while no time passes."""
+def _at_once(bone: Floats, target: Target) -> Target:
+    """The target while no time passes: below a hand the bone (dim,) stays at the x where it is."""
+    if target.hand is None:
+        return replace(target, duration=0.0)
     return replace(target, x=float(bone[0]), duration=0.0, hand=None)
 
 

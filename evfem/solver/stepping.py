@@ -185,7 +185,7 @@ class Stepper:
         with viscosity or inertia is the stiffer, the shorter the part.
         """
         least = self.equilibrium.strategy.smallest_part
-        timed = self.body is not None and not Relaxation(self.body, self.solve).applies(target)
+        timed = self.body is not None and not self._relaxation(self.body).applies(target)
         return least**2 if timed else least
 
     def _keeps(self, error: float, part: float) -> bool:
@@ -227,6 +227,11 @@ class Stepper:
         if self.body is not None and self.body.dynamics is not None:
             self.body.dynamics.begin(old.u, old.velocity, target.duration)
 
+    def _relaxation(self, body: Body) -> Relaxation:
+        """How `body` is released."""
+        attraction = self.equilibrium.attraction
+        return Relaxation(body, self.solve, attraction is not None and attraction.charging is not None)
+
     def _released(self, state: State, target: Target, accounts: Accounts, failed: StepFailed) -> State | None:
         """The equilibrium to which the body snaps from `state`, None where it comes to none; raises
         `Folded` or `LiftedOff` where there can be none.
@@ -234,7 +239,7 @@ class Stepper:
         self.substep, failed.last = 1.0, (state, target)
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return None
-        relaxation = Relaxation(self.body, self.solve)
+        relaxation = self._relaxation(self.body)
         if isinstance(failed, Folded):
             raise failed
         if not relaxation.applies(target):
@@ -260,7 +265,7 @@ class Stepper:
         """
         if self.body is None or not self.equilibrium.strategy.relaxation:
             return
-        relaxation = Relaxation(self.body, self.solve)
+        relaxation = self._relaxation(self.body)
         if relaxation.applies(target) or self.body.dynamics is None or self.body.dynamics.mass is not None:
             return
         if pull(state, target) <= 0.0:

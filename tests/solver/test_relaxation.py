@@ -325,6 +325,45 @@ def test_a_body_that_comes_back_to_where_it_was_is_given_up(turns, circles):
     assert (len(asked) < 25) == circles
 
 
+@pytest.mark.parametrize(("charged", "seconds"), [(True, [0.1, 0.1, 0.0, 0.0]), (False, [0.0] * 4)])
+def test_charge_flows_in_the_first_step_of_a_release_and_is_kept_after_it(charged, seconds):
+    """So what the body comes to rest with is what its end without drag has. The first one fails here."""
+    model = make_model(scene())
+    rest = model.equilibrium.rest(np.zeros(2), 0.0)
+    passed, ends = [], []
+
+    def solve(state, target, start):
+        if model.body.drag_rate == 0.0:
+            ends.append(target.duration)
+            return state
+        passed.append(target.duration)
+        if len(passed) == 1:
+            raise StepFailed("too fast", [])
+        return replace(state, u=state.u + 0.1 * 0.5 ** len(passed))
+
+    target = replace(Target.held(rest.bone, 0.0), duration=0.1)
+    Relaxation(model.body, solve, charged).follow(rest, target, lambda old, new: None)
+    assert passed[:4] == seconds
+    assert ends == [0.0 if charged else 0.1]
+
+
+def test_a_body_that_rests_with_the_least_drag_but_never_without_is_given_up():
+    """Asked a dozen times, not until 400 steps are over."""
+    model = make_model(scene())
+    rest, asked = model.equilibrium.rest(np.zeros(2), 0.0), []
+
+    def solve(state, target, start):
+        asked.append(model.body.drag_rate)
+        if model.body.drag_rate == 0.0:
+            raise StepFailed("not without drag", [])
+        return state
+
+    with pytest.raises(StepFailed, match="does not come to rest"):
+        Relaxation(model.body, solve).follow(rest, Target.held(rest.bone, 0.0), lambda old, new: None)
+    assert min(rate for rate in asked if rate > 0.0) < 1e-8
+    assert asked.count(0.0) < 12
+
+
 def test_a_pad_that_sticks_goes_no_round_by_its_rounding():
     """Its last digit goes to and fro; a pad that goes 1 um to and fro does go round."""
     for far, round_trip in ((1e-17, False), (1e-3, True)):

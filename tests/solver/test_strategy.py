@@ -140,7 +140,7 @@ class Snapping(Steps):
 class Applying:
     """A release that applies everywhere."""
 
-    def __init__(self, body, solve):
+    def __init__(self, body, solve, charged):
         pass
 
     def applies(self, target):
@@ -171,6 +171,15 @@ def test_releases_of_one_step_come_at_longer_and_longer_parts(monkeypatch):
     held = Stepper(Snapping(Strategy(relaxation=False), 1.0), body=object())
     with pytest.raises(StepFailed):
         held.follow(0.0, lambda _, share: share, Unbooked())
+
+
+@pytest.mark.parametrize(("attraction", "charged"), [(None, False), (None, True), (1, False), (1, True)])
+def test_a_release_knows_whether_charge_flows(attraction, charged):
+    """Which only an attraction does whose drive is resolved."""
+    steps = Steps(Strategy(), 1.0)
+    steps.attraction = attraction and SimpleNamespace(charging=object() if charged else None)
+    flows = attraction is not None and charged
+    assert Stepper(steps)._relaxation(None).charged is flows
 
 
 def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tried(monkeypatch):
