@@ -96,6 +96,7 @@ def _study_options(study: argparse.ArgumentParser) -> None:
     drawn.add_argument("--scenes", type=int, metavar="N", help="how many; default: 300, 6 with --quick")
     drawn.add_argument("--seed", type=int, metavar="S", help="which ones; default: 0")
     drawn.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+    drawn.add_argument("--limit", type=int, metavar="SECONDS", help="CPU time of a scene; default: 60")
 
 
 def _mesh_options(mesh: argparse.ArgumentParser) -> None:

@@ -272,7 +272,7 @@ def _study(given: argparse.Namespace) -> int:
 
 def _sample(given: argparse.Namespace) -> Any:
     """Which scenes are drawn; None where nothing is said."""
-    said = {name: getattr(given, name) for name in ("scenes", "seed", "workers")}
+    said = {name: getattr(given, name) for name in ("scenes", "seed", "workers", "limit")}
     said = {name: value for name, value in said.items() if value is not None}
     return studies().Sample(**said) if said else None
 

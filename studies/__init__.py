@@ -52,15 +52,16 @@ MODULES = {
 @dataclass(frozen=True)
 class Sample:
     """What a study that draws scenes draws: how many (None: its own number), of which seed, in how
-    many processes (None: one for each core).
+    many processes (None: one for each core), and the CPU seconds after which a scene is given up.
     """
 
     scenes: int | None = None
     seed: int = 0
     workers: int | None = None
+    limit: int = 60
 
     def __post_init__(self) -> None:
-        for key, least in (("scenes", 1), ("seed", 0), ("workers", 1)):
+        for key, least in (("scenes", 1), ("seed", 0), ("workers", 1), ("limit", 1)):
             value = getattr(self, key)
             if value is not None and value < least:
                 raise InputError(key, quoted(value), f"a whole number, at least {least}")
@@ -77,6 +78,8 @@ def run(
     if name not in NAMES:
         raise InputError("study", quoted(name), ", ".join(NAMES))
     if sample is not None and name != "campaign":
-        raise InputError("study", f"scenes, seed or workers for {name}", "these options with campaign alone")
+        raise InputError(
+            "study", f"scenes, seed, workers or limit for {name}", "these options with campaign alone"
+        )
     main = import_module(f".{MODULES.get(name, name)}", __package__).main
     return main(quick=quick, out=out) if sample is None else main(quick=quick, out=out, sample=sample)

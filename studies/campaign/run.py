@@ -17,29 +17,29 @@ from .records import Key, Records
 from .shrinking import shrunk
 from .tables import Tables, steps_of
 
-#: CPU seconds after which a scene is given up
-LIMIT_S = 60.0
 #: every so many scenes is run with its twins, which take as long again or longer
 TWINS = 4
 
 Task = Callable[[Apart, Key], None]
 
 
-def run(keys: Sequence[Key], records: Records, workers: int) -> None:
-    """Judge the scenes that have no end yet and shrink those that failed; what is done is on disk."""
-    todo = [key for key in keys if records.known(key, draw(*key)) is None]
+def run(keys: Sequence[Key], records: Records, workers: int, limit_s: float) -> None:
+    """Judge the scenes that have no end yet, or were given up earlier than after `limit_s` CPU seconds, and
+    shrink those that failed; what is done is on disk.
+    """
+    todo = [key for key in keys if not _ended(records.known(key, draw(*key)), limit_s)]
     apart = [Apart() for _ in range(workers)]
 
     def end(one: Apart, key: Key) -> None:
         tables = draw(*key)
-        ending = one.judge(tables, _with_twins(key), LIMIT_S)
+        ending = one.judge(tables, _with_twins(key), limit_s)
         # a process that came to its limit could not say how large its scene is
         requested = sum(map(steps_of, tables["motion"]))
         records.add(key, tables, replace(ending, requested=requested))
 
     def shrink(one: Apart, key: Key) -> None:
-        def judge(tables: Tables, limit_s: float) -> Ending:
-            return one.judge(tables, _with_twins(key), limit_s)
+        def judge(tables: Tables, seconds: float) -> Ending:
+            return one.judge(tables, _with_twins(key), seconds)
 
         records.add_minimal(key, *shrunk(draw(*key), records.ends[key], judge))
 
@@ -49,6 +49,10 @@ def run(keys: Sequence[Key], records: Records, workers: int) -> None:
     finally:
         for one in apart:
             one.stop()
+
+
+def _ended(known: Ending | None, limit_s: float) -> bool:
+    return known is not None and (known.outcome != "timeout" or known.cpu_s >= limit_s)
 
 
 def _with_twins(key: Key) -> bool:

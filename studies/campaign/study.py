@@ -24,17 +24,19 @@ from ..common import Series, Study, make_folder
 from .ending import OUTCOMES, Ending
 from .figure import draw as figure_of
 from .records import Records
-from .run import LIMIT_S, TWINS, run
+from .run import TWINS, run
 
 #: scenes unless said otherwise, and in the quick study
 SCENES, QUICK = 300, 6
 #: how many scenes of about the same size a scene's time is compared with
 NEIGHBOURS = 21
+TIME = (
+    "CPU seconds of a scene alone, at most {}, relative to the median of the "
+    f"{NEIGHBOURS} scenes nearest in requested steps"
+)
 ASSUMPTIONS = {
     "outcomes": "equilibrium; explained: no equilibrium exists, and the sentence says why; not_converged; "
     "invariants_broken; timeout; refused: a mistake of the generator; error",
-    "time": f"CPU seconds of a scene alone, at most {LIMIT_S:g}, relative to the median of the "
-    f"{NEIGHBOURS} scenes nearest in requested steps",
     "twins": f"every {TWINS}th scene is also mirrored, and where no path counts run with half the steps",
     "remainder": "works less stored, kinetic and dissipated energy over the largest of them, in any row",
     "meshes": "coarse ones of any size, with 6,000 displacement unknowns or so",
@@ -49,17 +51,17 @@ def main(quick: bool = False, out: Path | None = None, sample: Sample | None = N
     count = sample.scenes or (QUICK if quick else SCENES)
     keys = [(sample.seed, number) for number in range(count)]
     records = Records(None if out is None else make_folder(out) / "campaign")
-    run(keys, records, min(sample.workers or cores(), count))
+    run(keys, records, min(sample.workers or cores(), count), float(sample.limit))
     ends = [records.ends[key] for key in keys]
     kinds = Counter(f"{one.outcome}: {one.kind}" for one in ends if not one.good)
     study = Study(
         "campaign",
         numbers(ends),
         {},
-        ASSUMPTIONS | {"kinds": dict(kinds.most_common())},
+        ASSUMPTIONS | {"time": TIME.format(sample.limit), "kinds": dict(kinds.most_common())},
         series(ends),
         lambda: figure_of(ends, slowness(ends)),
-        {"scenes": count, "seed": sample.seed},
+        {"scenes": count, "seed": sample.seed, "limit": sample.limit},
     )
     return study.finish(out, quick)
 

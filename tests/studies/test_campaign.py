@@ -528,6 +528,27 @@ def test_finished_scenes_are_not_run_again_unless_the_code_is_another(fake, tmp_
     assert again.known((0, 3), drawing.draw(0, 3)) is None
 
 
+def test_a_scene_that_was_given_up_is_run_again_with_a_longer_limit_alone(fake, tmp_path, monkeypatch):
+    limits = []
+
+    def judge(self, one, with_twins, limit_s):
+        limits.append(limit_s)
+        late = one == drawing.draw(0, 1) and limit_s < 100.0
+        return Ending("timeout", cpu_s=limit_s) if late else Ending("equilibrium", cpu_s=0.1)
+
+    monkeypatch.setattr(Fake, "judge", judge)
+
+    def found(limit):
+        limits.clear()
+        sample = studies.Sample(scenes=3, workers=1, limit=limit)
+        numbers = studies.run("campaign", out=tmp_path, sample=sample)["numbers"]
+        return limits, numbers["timeout"], numbers["equilibrium"]
+
+    assert found(60) == ([60.0] * 3, 1.0, 2.0)
+    assert found(30) == ([], 1.0, 2.0)
+    assert found(300) == ([300.0], 0.0, 3.0)
+
+
 def test_what_is_done_is_kept_when_a_campaign_is_interrupted(fake, tmp_path, monkeypatch):
     def judge(self, one, with_twins, limit_s):
         if one == drawing.draw(0, 3):
