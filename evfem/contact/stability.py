@@ -27,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.condensed import LinearContactStep, y_before_x
+from evfem.contact.condensed import Candidates, LinearContactStep, y_before_x
 from evfem.contact.follower import local
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ExtraUnknowns
 
@@ -100,8 +100,18 @@ def _compliance(step: LinearContactStep) -> Floats:
     """
     rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
     C = step.body.compliance[np.ix_(rows, rows)]
-    give = np.where(step.candidates.status == OPEN, 0.0, step.candidates.interface_compliance.T)
-    return local(axes, local(axes, C).T).T + np.diag(give.ravel())
+    return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
+
+
+def _yielding(known: Candidates) -> Floats:
+    """How the interface yields (2, c), normal then tangential. What turns with the profile, or falls along
+    the way, follows the place of a slipping node, and its friction does not stretch the interface the more,
+    the farther it goes; friction that falls with the speed of the slip does.
+    """
+    give = np.where(known.status == OPEN, 0.0, known.interface_compliance.T)
+    falls = np.zeros(known.status.size) if known.slip_stiffness is None else known.slip_stiffness
+    give[1] = np.where((known.status >= FORWARD) & (falls >= 0.0), 0.0, give[1])
+    return give
 
 
 def _bone(step: LinearContactStep) -> ExtraUnknowns:

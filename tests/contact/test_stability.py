@@ -53,6 +53,18 @@ def test_on_a_crest_the_contact_force_turns_against_the_springs(slope, loaded):
     assert found.cause == SLOPES
 
 
+def test_an_interface_that_yields_along_the_tangent_does_not_hold_a_slipping_node_less():
+    """Its spring carries the friction, which does not grow with the way; where friction falls with the
+    speed of the slip, the spring is in series with the tissue's.
+    """
+    yields = np.array([[0.0, 2.0 / KX]])
+    rigid = point(FORWARD, curvature=-0.9, friction=0.8)
+    soft = replace(rigid, candidates=replace(rigid.candidates, interface_compliance=yields))
+    assert verge(soft).share == pytest.approx(verge(rigid).share, rel=1e-12)
+    falls = replace(point(FORWARD).candidates, slip_stiffness=np.array([-0.1]), interface_compliance=yields)
+    assert verge(replace(rigid, candidates=falls)).share == pytest.approx(0.1 * 3.0 / KX, rel=1e-12)
+
+
 def test_friction_turns_with_the_force_that_it_needs():
     """On level ground of friction mu the normal force grows by mu times what turns into it."""
     for status in (FORWARD, BACKWARD):
