@@ -120,7 +120,7 @@ DRAG_GROWTH             where its speed grows less or more than these factors in
 DRAG_REST               drag of a rate below this is nearly none: a body that slows down may      snaps
                         be at rest
 DRAG_CALMER             what was not at rest is asked again at so much less drag
-DRAG_LEAST              what comes to rest with drag of such a rate, but not without, is given up     snaps
+DRAG_LEAST              what rests with drag of such a rate, but not without, is given up         snaps
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
 STEADY                  after a step of a release that went more than this fraction of the one      snaps
                         before, the next begins ahead
