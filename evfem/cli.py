@@ -195,7 +195,9 @@ def _simulate(folder: RunFolder) -> int:
     from evfem.simulation.run import simulate
 
     scene, path, progress = folder.scene, folder.path, sys.stderr.isatty()
-    observers: list[Observer] = [folder] if progress else [folder, _Milestones()]
+    observers: list[Observer] = [folder, _Interruption()]
+    if not progress:
+        observers.append(_Milestones())
     try:
         result = simulate(scene, progress=progress, observers=observers, resume=folder.resume)
     except NotConverged as error:
@@ -228,6 +230,28 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
     seconds = sum(float(row["seconds"]) for row in rows)
     print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
     return DONE
+
+
+class _Interruption:
+    """Ctrl-C or a request to end: ends the run at once, or at the end of the step where Python
+    drops what is raised, as it does in a `__del__`.
+    """
+
+    def __init__(self) -> None:
+        self.met = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._meet)
+
+    def _meet(self, number: int, place: object) -> None:
+        self.met = True
+        raise KeyboardInterrupt
+
+    def started(self, mesh: object, scene: object, total_steps: int) -> None:
+        """Nothing to do."""
+
+    def step(self, row: object, frame: object, checkpoint: object) -> None:
+        if self.met:
+            raise KeyboardInterrupt
 
 
 class _Milestones:

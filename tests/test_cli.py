@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from xml.etree import ElementTree
 
 import meshio
@@ -18,6 +19,7 @@ from tools.meshes import square_mesh
 import evfem
 from evfem import cli
 from evfem.mesh import file as meshfile
+from evfem.runfolder import RunFolder
 from evfem.simulation.result import COLUMNS
 
 pytestmark = pytest.mark.solver
@@ -423,6 +425,23 @@ def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end
     for resumed, row in zip(history(results), uninterrupted, strict=True):
         for name in ("position", "normal_force", "tangential_force", "friction_dissipation", "stored_energy"):
             assert float(resumed[name]) == pytest.approx(float(row[name]), rel=1e-6, abs=1e-9)
+
+
+def test_an_interruption_that_is_dropped_ends_the_run_with_the_step(place, monkeypatch):
+    """As Python drops what is raised in a `__del__`."""
+    step = RunFolder.step
+
+    def dropping(self, row, frame, checkpoint):
+        if row["step"] == 3:
+            with suppress(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+        step(self, row, frame, checkpoint)
+
+    monkeypatch.setattr(RunFolder, "step", dropping)
+    status, _, err = called(place, "run", "square.toml")
+    assert status == 130
+    assert "3 steps are in" in err
+    assert len(history(place / "square-out")) == 3
 
 
 def test_a_checkpoint_of_another_scene_is_refused(place):

@@ -117,9 +117,10 @@ class Pardiso:
     def _call(self, phase: int, b: Any, x: Any) -> int:
         self._phase.value = phase
         handle, before, after = self._fixed
-        self._call_pardiso(
-            handle, *before, self._values.ctypes, *after, b.ctypes, x.ctypes, ctypes.byref(self._error)
-        )
+        # addresses, not `array.ctypes`: ctypes would ask that in Python, and turns a Ctrl-C that comes just
+        # then into an error of its own
+        values, b, x = self._values.ctypes.data, b.ctypes.data, x.ctypes.data
+        self._call_pardiso(handle, *before, values, *after, b, x, ctypes.byref(self._error))
         return self._error.value
 
     def _arguments(self) -> tuple[Any, tuple[Any, ...], tuple[Any, ...]]:

@@ -357,3 +357,21 @@ def test_a_factorisation_may_be_collected_while_numpy_changes_its_error_state(ba
     program = COLLECTED.replace("Pardiso", back_end.__name__)
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
+def test_a_call_to_the_library_asks_nothing_in_python(back_end):
+    """What is interrupted while ctypes asks for an argument ends as an error of ctypes."""
+    called = []
+    pattern = Pattern(np.arange(4)[None], 1)
+    factor = back_end(pattern, np.array([3]))
+    library = factor._call_pardiso
+    factor._call_pardiso = lambda *given: called.append(given) or library(*given)
+    upper = np.zeros(pattern.indices.size)
+    upper[pattern.diagonal] = 2.0
+    factor.factorise(upper)
+    factor.forward(np.ones(4))
+    assert len(called) == 3
+    for given in called:
+        assert not [one for one in given if hasattr(one, "_as_parameter_")]
+        assert {type(one) for one in given[6:7] + given[13:15]} == {int}
