@@ -123,9 +123,8 @@ def columns(run: Run, sizes: Floats, reduced: float, growth: float) -> Floats:
     slope = np.abs(np.diff(run.height) / np.diff(run.x))
     for k, rate in enumerate(slope):
         ends = np.minimum(sizes[k : k + 2], WEDGE * distance[k : k + 2] / rate if rate else np.inf)
-        pace = min(growth, WEDGE) if np.any(ends < sizes[k : k + 2]) else growth
         least = 2 if run.x.size == 2 else 1
-        lines.append(graded(run.x[k], run.x[k + 1], tuple(ends), pace, np.inf, least)[1:])
+        lines.append(graded(run.x[k], run.x[k + 1], tuple(ends), growth, np.inf, least)[1:])
     return np.concatenate(lines)
 
 

@@ -140,7 +140,9 @@ def test_mpeg_haptics_has_the_published_structure_and_the_friction(tmp_path):
     file = json.loads(path.read_text(encoding="utf-8"))
     check_structure(file)
     time, place, mu = curve_of(file)
-    assert file["perceptions"][0]["channels"][0]["bands"][0]["curve_type"] == "Linear"
+    (band,) = file["perceptions"][0]["channels"][0]["bands"]
+    assert band["curve_type"] == "Linear"
+    assert band["upper_frequency_limit"] == file["timescale"] / 2  # two samples for a period
     assert time[-1] == 0.5  # 10 mm at 20 mm/s
     assert place[-1] == pytest.approx(10.0, rel=1e-12)
     np.testing.assert_allclose(place, 20.0 * time, rtol=1e-12)

@@ -437,6 +437,31 @@ def iterations_with(monkeypatch, opens):
     return len(solver.record.residuals)
 
 
+def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
+    """Small ones that stay would end the step earlier."""
+    model, old = pressed(Display())
+    solver = model.equilibrium
+    small = Balance(np.zeros(1), 0.01, old.attraction)
+    monkeypatch.setattr(solver.body, "begin", lambda *_: old)
+    monkeypatch.setattr(solver.body, "balance", lambda state, *_: (state, small))
+    monkeypatch.setattr(solver.body, "advance", lambda old, state, *_: state)
+    monkeypatch.setattr(solver.body, "findings", lambda *_: "")
+    with pytest.raises(StepFailed, match="no equilibrium in"):
+        solver.step(old, Target.held(model.bone(0.0, 0.3), 0.0))
+    assert set(solver.record.residuals) == {1.0}
+
+
+def test_what_follows_without_iterating_is_taken_where_nothing_else_is_asked(monkeypatch):
+    """Not where iterations are to begin elsewhere, or the attraction is given."""
+    model, old = pressed(Display())
+    solver, known = model.equilibrium, replace(old, voltage=7.0)
+    monkeypatch.setattr(solver.body, "known", lambda old, target: known)
+    target = Target.held(model.bone(0.0, 0.2), 0.0)
+    assert solver.step(old, target) is known
+    assert solver.step(old, target, start=old).voltage == 0.0
+    assert solver.step(old, target, frozen=old.attraction).voltage == 0.0
+
+
 def test_iterations_go_on_while_a_front_of_contact_does(monkeypatch):
     at_rest = iterations_with(monkeypatch, lambda i: [0])
     assert at_rest < 20

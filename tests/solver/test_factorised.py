@@ -162,6 +162,16 @@ def test_forces_that_are_rounding_of_stiff_cells_are_no_imbalance():
     assert results[1].electrostatic_force[0] == pytest.approx(results[0].electrostatic_force[0], rel=1e-9)
 
 
+@pytest.mark.parametrize("travel", [25.0, 2500.0])
+def test_the_rounding_of_forces_is_that_of_a_rigid_travel(pressed, travel):
+    """No force changes where a body moves as a whole: what does is rounding, and counts as such."""
+    body, state, _ = pressed
+    body.linearisation.factorise(state)
+    way = np.array([travel, 0.0])
+    rounding = np.abs(body.body.forces(state.u + way) - body.body.forces(state.u)).max()
+    assert rounding < body._rounding(replace(state, bone=state.bone + way)) < 1e3 * rounding
+
+
 def test_forces_that_are_rounding_of_the_attraction_are_no_imbalance(pressed, monkeypatch):
     """Contact carries the attraction, so the force on the bone may be much smaller than both."""
     body, accepted, target = pressed

@@ -73,11 +73,12 @@ class Copy:
             shutil.copytree(CHECKOUT / name, folder / place / name, ignore=ignored)
         shutil.copy(CHECKOUT / "pyproject.toml", folder)
         self.environment = os.environ | {"PYTHONPATH": str(folder), "OMP_NUM_THREADS": "1"}
-        told = self._run("-c", "import evfem, evfem.meshes, evfem.studies; print(evfem.__file__)").stdout
+        told = self.run("-c", "import evfem, evfem.meshes, evfem.studies; print(evfem.__file__)").stdout
         if Path(told.strip()).parent != self.package:
             raise SystemExit(f"the tests would run on {told.strip()} instead of the copy")
 
-    def _run(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+    def run(self, *arguments: str, seconds: float = LONGEST) -> subprocess.CompletedProcess[str]:
+        """Python with these arguments in the copy."""
         words = [sys.executable, *arguments]
         return subprocess.run(
             words,
@@ -85,7 +86,7 @@ class Copy:
             env=self.environment,
             capture_output=True,
             text=True,
-            timeout=LONGEST,
+            timeout=seconds,
         )
 
     def test(self, tests: tuple[str, ...]) -> str | None:
@@ -93,7 +94,7 @@ class Copy:
         options = ("-x", "-q", "-n", "0", "-m", "not types", "-p", "no:cacheprovider")
         places = [f"tests/{test}" for test in tests]
         try:
-            done = self._run("-m", "pytest", *options, *places)
+            done = self.run("-m", "pytest", *options, *places)
         except subprocess.TimeoutExpired:
             return f"no end within {LONGEST:g} s"
         if done.returncode == 0:
@@ -107,13 +108,13 @@ class Copy:
         """The test that sees the mistake, or None."""
         file = self.package / mistake.file
         text = file.read_text(encoding="utf-8")
-        self._write(file, mistake.made_in(text))
+        self.write(file, mistake.made_in(text))
         try:
             return self.test(mistake.tests)
         finally:
-            self._write(file, text)
+            self.write(file, text)
 
-    def _write(self, file: Path, text: str) -> None:
+    def write(self, file: Path, text: str) -> None:
         """New text, and nothing left of what was compiled from the old one."""
         file.write_text(text, encoding="utf-8")
         if file.suffix == ".h":
