@@ -56,7 +56,7 @@ ROOMS = {
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven fieldless scene written keys voltage meanings schema file resolution drift "
-        "sense fieldchoice timescales spatial way symmetry plan",
+        "parts sense fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

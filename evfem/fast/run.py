@@ -14,7 +14,7 @@ from evfem.errors import NotConverged
 from evfem.fast.memory import CondensedPad
 from evfem.fast.step import RememberedPad
 from evfem.mesh.mesh import Mesh
-from evfem.scene.plan import largest_voltage
+from evfem.scene.driven import largest_voltage
 from evfem.scene.scene import Scene
 from evfem.scene.way import allowed_error
 from evfem.simulation.ledger import Ledger

@@ -24,6 +24,8 @@ from evfem.scene.motion import VoltageRamp
 
 #: voltages that follow from the charge of the electrode
 CHARGED = (OpenCircuit, ChargeControl)
+#: thickness of the stratum corneum (mm) where only the mesh knows it
+SKIN = 0.4
 
 
 def applied(scene: Any) -> Any:
@@ -92,6 +94,33 @@ def attracting(scene: Any, skin: Layer, insulator: Layer) -> tuple[Any, Layers]:
         thickness = np.asarray(skin.thickness) + insulator.thickness
         return scene.law, Layers(sandwich(scene, skin, insulator).reference, thickness)
     return mean_law(scene.law, drive, at, (skin, insulator), scene.voltage)
+
+
+def layers_of(scene: Any) -> Layers:
+    """The solid layers, with a usual stratum corneum where only the mesh knows its thickness."""
+    return attracting(scene, *solids(scene, *skin_of(scene)))[1]
+
+
+def skin_of(scene: Any) -> tuple[float, float]:
+    """Thickness (mm) and permittivity of the stratum corneum."""
+    electrical = scene.finger.electrical
+    thickness: Any = getattr(electrical, "stratum_corneum_thickness", None)
+    if thickness is None:
+        thickness = getattr(scene.finger, "stratum_corneum_thickness", SKIN)
+    return float(thickness), float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
+
+
+def largest_voltage(scene: Any) -> float:
+    """Largest magnitude of the voltage anywhere in the scene (V)."""
+    own: Any = applied(scene)
+    if isinstance(own, VoltageProfile):
+        own = own.voltage
+    elif isinstance(own, FollowForce):
+        own = own.largest_voltage
+    elif isinstance(own, TimeSignal):
+        own = own.largest
+    ramps = [abs(motion.voltage) for motion in scene.motion if isinstance(motion, VoltageRamp)]
+    return float(max([np.abs(own).max(), *ramps]))
 
 
 def conducts(scene: Any, skin: Layer, insulator: Layer) -> bool:

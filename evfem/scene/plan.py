@@ -21,11 +21,12 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
-from evfem.scene.driven import applied
+from evfem.scene.driven import applied, largest_voltage, skin_of
 from evfem.scene.motion import Hover, VoltageRamp, Wait
+from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import check_parts, doubts, hover_share, largest_voltage, locking, skin_of
+from evfem.scene.sense import doubts, hover_share, locking
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.symmetry import half_of
 from evfem.scene.terms import Boundary

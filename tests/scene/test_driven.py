@@ -7,9 +7,8 @@ import pytest
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.scene.driven import applied, attracting, frequency, solids
+from evfem.scene.driven import applied, attracting, frequency, largest_voltage, solids
 from evfem.scene.file import dump, loads
-from evfem.scene.sense import largest_voltage
 
 HEAD = """
 version = 1

@@ -17,6 +17,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.fingertip import Fingertip
+from evfem.scene.driven import largest_voltage
 from evfem.scene.keys import (
     MOTIONS,
     SURFACES,
@@ -28,7 +29,6 @@ from evfem.scene.keys import (
     SolverTable,
     StrategyTable,
 )
-from evfem.scene.sense import largest_voltage
 from evfem.scene.voltage import SIGNALS
 from evfem.simulation.run import simulate
 from evfem.tissue.elements import elements_on
