@@ -4,7 +4,8 @@ What the form uses of u and v (gradients, the volume measure) is found in a tria
 displacements, and so is whether it has a potential: then the derivative of its fluxes is
 symmetric. The derivative is exact, by complex step, but the solver's matrix is symmetric: of a
 form without potential it gets the symmetric part, while the residual is complete. The answer is
-the same, in a few iterations more.
+the same, in a few iterations more. What no run could use is refused there: an integrand that is not
+linear in v, not finite at rest, or whose derivative is lost in a complex step.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
-from evfem.tensor import Array, complex_step
+from evfem.tensor import Array, complex_step, difference
 from evfem.tissue.assembly import Points, UserIntegral, points_of
 from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.fields import Field, Integrand, Parts, fluxes
@@ -26,6 +27,9 @@ from evfem.tissue.space import Space, scikit_mesh, shape_functions, shape_gradie
 
 #: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1
+#: relative error of an integrand's linearity in v, and of its derivative by complex step, at most; the step
+#: of differences
+LINEAR, DERIVATIVE, DIFFERENCE = 1e-9, 1e-4, 1e-5
 
 
 def make_term(space: Space, form: Integrand, on: str, boundary: bool, law: Any = None) -> UserIntegral:
@@ -69,20 +73,63 @@ class _Watched(Field):
 
 def tried(mesh: Mesh, form: Integrand, on: str, boundary: bool, law: Any = None) -> Trial:
     """Evaluate a form at a few places of a region or boundary; raises `InputError` for an unknown
-    one.
+    one, and for a form that no run could use.
     """
     x, n = _facet_places(mesh, on) if boundary else _cell_places(mesh, on)
     w = SimpleNamespace(x=x, n=n, law=law)
     all_parts = Parts(len(x), value=True, grad=True, theta=not boundary)
-    random = np.random.default_rng(1).uniform(-SIZE, SIZE, (2, all_parts.size, *x.shape[1:]))
+    state, *tests = np.random.default_rng(1).uniform(-SIZE, SIZE, (3, all_parts.size, *x.shape[1:]))
     used: set[str] = set()
-    u, v = (_watched(all_parts.field(stacked), boundary, used) for stacked in random)
-    form(u, v, w)
-    parts = Parts(len(x), value=True, grad="grad" in used, theta="theta" in used)
-    state = random[0, : parts.size]
-    D = complex_step(lambda x: fluxes(form, parts, x, w), state, rank=1)
+
+    def integrand(stacked: Array, test: Array) -> Array:
+        u, v = (_watched(all_parts.field(one), boundary, used) for one in (stacked, test))
+        return _value(form, form(u, v, w), x.shape[1:])
+
+    try:
+        with np.errstate(all="ignore"):
+            _check_linear(form, *(integrand(state, test) for test in (*tests, tests[0] + tests[1])))
+            integrand(np.zeros_like(state), tests[0])
+            parts = Parts(len(x), value=True, grad="grad" in used, theta="theta" in used)
+            D = _derivative(form, parts, state[: parts.size], w)
+    except InputError:
+        raise
+    except Exception as error:  # whatever a user's code raises
+        given = f"an integrand that raises {type(error).__name__}: {error}"
+        raise _refused(form, given, "functions of numpy and evfem.tensor of u, v and w") from error
     skew = np.abs(D - np.swapaxes(D, 0, 1)).max()
     return Trial(parts, bool(skew <= 1e-12 * np.abs(D).max()))
+
+
+def _refused(form: Integrand, given: str, allowed: str) -> InputError:
+    return InputError(f"form {getattr(form, 'name', '')}".strip(), given, allowed)
+
+
+def _value(form: Integrand, value: Any, shape: tuple[int, ...]) -> Array:
+    """The integrand at every point, finite; one that is the same everywhere may be a number."""
+    found = np.asarray(value, dtype=object if value is None else None)
+    if value is None or found.shape not in ((), shape):
+        given = "no integrand" if value is None else f"an integrand of shape {found.shape}"
+        raise _refused(form, given, f"a number for every point, here of shape {shape}")
+    if not np.isfinite(found).all():
+        raise _refused(form, "an integrand that is infinite or no number", "finite values, at rest too")
+    return np.broadcast_to(found, shape)
+
+
+def _check_linear(form: Integrand, first: Array, second: Array, both: Array) -> None:
+    """Whether the integrand at the sum of two test functions is the sum of those at each."""
+    if np.abs(both - first - second).max() > LINEAR * max(np.abs(part).max() for part in (first, second)):
+        given = "an integrand that is not linear in v"
+        raise _refused(form, given, "one that is 0 for v = 0 and twice as large for 2 v")
+
+
+def _derivative(form: Integrand, parts: Parts, state: Array, w: Any) -> Array:
+    """The derivative of the fluxes (K, K, C, Q) by complex step, which is that of differences."""
+    D = complex_step(lambda x: fluxes(form, parts, x, w), state, rank=1)
+    near = difference(lambda x: fluxes(form, parts, x, w), state, DIFFERENCE, rank=1)
+    if not np.abs(D - near).max() <= DERIVATIVE * max(np.abs(near).max(), np.abs(D).max()):
+        allowed = "functions of numpy and evfem.tensor that take complex numbers: no abs, float or maximum"
+        raise _refused(form, "an integrand whose derivative is lost in a complex step", allowed)
+    return D
 
 
 def _watched(field: Field, boundary: bool, used: set[str]) -> _Watched:

@@ -219,6 +219,44 @@ def test_trial_finds_what_a_form_uses_and_whether_it_has_a_potential(integrand, 
     assert (trial.parts.grad, trial.parts.theta, trial.has_potential) == (grad, theta, potential)
 
 
+REFUSED = {
+    "no v": (lambda u, v, w: 1e-3, "not linear in v"),
+    "a constant beside v": (lambda u, v, w: v[1] + 1e-5, "not linear in v"),
+    "twice v": (lambda u, v, w: ev.dot(v, v), "not linear in v"),
+    "magnitude of v": (lambda u, v, w: np.abs(v[1]), "not linear in v"),
+    "vectors for tensors": (lambda u, v, w: ev.ddot(u, v), r"an integrand of shape \(1,\)"),
+    "whole v": (lambda u, v, w: 1e-5 * v, "an integrand of shape"),
+    "nothing": (lambda u, v, w: None, "no integrand; allowed: a number for every point"),
+    "no such place": (lambda u, v, w: w.t * v[1], "that raises AttributeError"),
+    "two arguments": (lambda u, v: u[0] * v[0], "that raises TypeError"),
+    "infinite at rest": (lambda u, v, w: v[1] / u[1], "infinite or no number"),
+    "steep at rest": (lambda u, v, w: np.sqrt(u[1] ** 2 + 0j).real * v[1], "lost in a complex step"),
+    "magnitude of u": (lambda u, v, w: np.abs(u[1]) * v[1], "lost in a complex step"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_a_form_that_no_run_could_use_is_refused_with_one_sentence(kind):
+    integrand, said = REFUSED[kind]
+    with pytest.raises(ev.InputError, match=said) as caught:
+        tried(rectangle("q1", (3, 2), warp=bend).mesh, ev.form(integrand), "lower", boundary=False)
+    assert str(caught.value).startswith("form <lambda>: given ")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "integrand",
+    [
+        lambda u, v, w: 0.0 * v[0],
+        lambda u, v, w: 10.0 * ev.positive_part(-u[1]) * v[1],
+        lambda u, v, w: 1e-9 * ev.ddot(ev.grad(u), ev.grad(v)),
+        lambda u, v, w: (1.0 + ev.dot(u, u)) ** 2 * ev.dot(u, v) + 1e6 * u.theta * v.theta,
+    ],
+)
+def test_a_form_without_mistakes_is_taken(integrand):
+    tried(rectangle("q1", (3, 2), warp=bend).mesh, ev.form(integrand), "lower", boundary=False)
+
+
 def test_trial_sees_places_and_outward_normals():
     """The lid of a unit square: y = 1, normal upwards; the middle of a region lies inside."""
     seen = []
