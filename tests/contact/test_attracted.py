@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.contact import signorini
 from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
+    ContactNotSolved,
     ContactProblem,
     ExtraUnknowns,
     solve_with_attraction,
@@ -93,6 +95,27 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
     # under the present attraction it would drift by -0.03; the fall is reduced to a feedback of 0.9
     assert found.reduced
     assert found.state[0] == pytest.approx(0.5 - 0.03 / (1.0 - 0.9))
+
+
+def test_a_scaled_attraction_is_told_even_where_other_statuses_solve_its_contact(monkeypatch):
+    """The active set ends nowhere but within `solve_contact`."""
+    problem, pull = lost(gap=0.98)
+    active_set, solve_contact, within = signorini._active_set, signorini.solve_contact, []
+
+    def failing(*known):
+        if not within:
+            raise ContactNotSolved("none")
+        return active_set(*known)
+
+    def solving(*known):
+        within.append(True)
+        return solve_contact(*known)
+
+    monkeypatch.setattr(signorini, "_active_set", failing)
+    monkeypatch.setattr(signorini, "solve_contact", solving)
+    found = solve_with_attraction(problem, pull, np.array([OPEN]))
+    assert within
+    assert found.reduced
 
 
 def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():

@@ -3,6 +3,7 @@ tangent.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -301,3 +302,15 @@ def test_crests_that_push_harder_than_the_body_holds_are_weakened_and_said(seed)
         if pushes:
             with pytest.raises(Unstable):
                 replace(step, timed=True).solve()
+
+
+@pytest.mark.parametrize("rounding", [1e-18, 0.0, -1e-18])
+def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(rounding):
+    """Its row of the balance is zero in exact numbers; one that is held keeps its own."""
+    body = CondensedTangent.make(np.eye(4), None)
+    step = SimpleNamespace(body=body, unknowns=[SimpleNamespace(axis=1)])
+    free = np.ones((2, 2))
+    body.schur[-1, :2] = 0.5
+    (loose,), (held,) = (LinearContactStep._held(step, np.array([[own]]), free)[0] for own in (rounding, 2.0))
+    assert 0.0 < loose < 1e-6
+    assert held == 2.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.meshes import block
 
-from evfem.contact.pad import Pad, fold, make_pad, surface_state
+from evfem.contact.pad import Pad, _near, fold, make_pad, surface_state
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
@@ -172,6 +172,22 @@ def test_a_stroke_beyond_the_end_of_another_crosses_nothing():
     assert folded(overhang) is None
     near = [[0.0, 0.0], [2.0, 1.0], [3.0, -1.0], [4.0, -1.0], [4.0, 2.0], [1.9, 1.2], [2.6, 0.9]]
     assert folded(near) is None
+
+
+@pytest.mark.parametrize("place", [(0.0, 0.0), (20.0, 0.0), (0.0, 20.0), (-30.0, 40.0)])
+def test_segments_are_near_where_their_boxes_overlap(place):
+    random = np.random.default_rng(4)
+    begin = random.uniform(0.0, 2.0, (12, 2)) + place
+    end = begin + random.uniform(-2.0, 2.0, (12, 2))
+
+    def overlap(a, b):
+        """Neither lies wholly to one side of the other, along x or y."""
+        low, high = np.minimum(begin, end), np.maximum(begin, end)
+        return all(high[a, i] >= low[b, i] and high[b, i] >= low[a, i] for i in (0, 1))
+
+    pairs = {(a, b) for a in range(12) for b in range(a + 1, 12) if overlap(a, b)}
+    assert 5 < len(pairs) < 60
+    assert set(zip(*(one.tolist() for one in _near(begin, end)), strict=True)) == pairs
 
 
 def test_neighbours_that_touch_must_not_change_places():

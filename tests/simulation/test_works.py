@@ -258,3 +258,23 @@ def test_what_the_way_of_the_loads_loses_in_a_release_is_no_energy_set_free():
         assert works["integrator_dissipation"] == min(freed, 0.0)
         signs.append(np.sign(freed))
     assert sorted(signs) == [-1.0, 1.0]
+
+
+def test_between_rough_faces_the_attraction_on_the_way_is_that_of_the_forces_on_the_way(monkeypatch):
+    """From those of the begin to those of the end."""
+    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
+    law = ev.PowerRoughness(0.002, 0.01, 0.2, 0.01)
+    motion = Press(indentation=0.01)
+    model = make_model(scene(Display(INSULATOR), StrongTroxel(), 140.0, (motion,), column, roughness_gap=law))
+    rest = model.equilibrium.rest(np.array([0.0, 0.0]), 140.0)
+    nodes = len(rest.contact_force)
+    loads = [np.column_stack([load * np.arange(1.0, nodes + 1), np.zeros(nodes)]) for load in (0.1, 0.4)]
+    old, new = (replace(rest, contact_force=load) for load in loads)
+    seen = []
+    monkeypatch.setattr(
+        type(model.attraction),
+        "way_forces",
+        lambda self, places, volts, touching, p: seen.append(p) or places,
+    )
+    Part(model, old, new)._pulls(np.zeros((nodes, 2)), np.array([0.0, 0.5, 1.0]), (140.0, 140.0))
+    np.testing.assert_allclose(seen[0], [loads[0][:, 0], 2.5 * loads[0][:, 0], loads[1][:, 0]], rtol=1e-12)
