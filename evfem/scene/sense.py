@@ -15,7 +15,7 @@ import numpy as np
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
-from evfem.finger.fingerpad import FingerPad
+from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.scene.driven import largest_voltage, layers_of, lossless, skin_of, solids
@@ -35,6 +35,8 @@ LOCKED = 1e5
 BREAKDOWN = 300.0
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
+#: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
+HEAVIEST = 100.0
 #: change of the attraction by the deformation below which a hovering pad does not come down
 STAYS_UP = 0.1
 #: lengths (mm) that a motion may have, and distance of the places at which a profile's height is looked at
@@ -45,7 +47,8 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
     shear moduli (MPa) of the materials.
     """
-    return (*_hard(scene, moduli), *_small(scene), *_breakdown(scene), *_hovering(scene, mesh))
+    lengths = (*_small(scene, mesh), *_large(scene, mesh, min(moduli.values())))
+    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_hovering(scene, mesh))
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
@@ -65,23 +68,37 @@ def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:
     softest = min(moduli, key=lambda name: moduli[name])
     for name, modulus in moduli.items():
         most = SOFTEST if name == softest else HARD
-        if isinstance(scene.finger, FingerPad):
+        if not isinstance(scene.finger, MeshedFinger):
             most = TIMES_TABLE_2 * NeoHookean(*TABLE_2[name]).mu
         if modulus > most:
             much = f"the shear modulus of {name}, {modulus:.3g} MPa, is beyond that of any tissue"
             yield f"{much}: moduli are in MPa, not in Pa"
 
 
-def _small(scene: Scene) -> Iterator[str]:
-    finger = scene.finger
-    skin = getattr(finger.electrical, "stratum_corneum_thickness", None)
+def _small(scene: Scene, mesh: Mesh) -> Iterator[str]:
+    skin = getattr(scene.finger.electrical, "stratum_corneum_thickness", None)
     if skin is not None and skin < THINNEST_SKIN:
         yield f"a stratum corneum of {skin:g} mm is thinner than any: lengths are in mm, not in m"
     lengths = [abs(getattr(m, name) or 0.0) for m in scene.motion for name in TRAVEL if hasattr(m, name)]
-    travel = max(lengths, default=0.0)
-    if isinstance(finger, FingerPad) and 0.0 < travel < LEAST_TRAVEL * finger.width:
-        width = f"{finger.width:g} mm"
-        yield f"a finger of {width} is moved by {travel:g} mm at most: lengths are in mm, not in m"
+    travel, width = max(lengths, default=0.0), float(np.ptp(mesh.points[:, 0]))
+    if 0.0 < travel < LEAST_TRAVEL * width:
+        yield f"a finger of {width:.4g} mm is moved by {travel:g} mm at most: lengths are in mm, not in m"
+
+
+def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
+    """Presses down to the bone, or with a force over the finger that is many times its `modulus` (MPa)."""
+    bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
+    sides, unit = (mesh.points[:, ::2], "N") if mesh.dim == 3 else (mesh.points[:, :1], "N/mm")
+    size = float(np.prod(np.ptp(sides, axis=0)))
+    for i, motion in enumerate(scene.motion):
+        if not isinstance(motion, Press):
+            continue
+        depth, force = motion.indentation or 0.0, motion.force or 0.0
+        if depth >= bone - pad > 0.0:
+            yield f"motion {i} presses {depth:g} mm deep, but the bone is {bone - pad:.2g} mm above the skin"
+        if force > HEAVIEST * modulus * size:
+            much = f"{force / size:.3g} MPa over the whole finger"
+            yield f"motion {i} presses with {force:g} {unit}, {much}: forces are in {unit}"
 
 
 def _breakdown(scene: Scene) -> Iterator[str]:

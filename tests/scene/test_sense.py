@@ -73,6 +73,36 @@ def test_a_field_that_breaks_solids_down_is_doubted():
     assert "a field of 300 V/um in the insulator" in plan(replace(charged, voltage=1.001 * edge)).warnings[0]
 
 
+@pytest.mark.parametrize(
+    ("press", "said"),
+    [
+        (ev.Press(indentation=6.0), "motion 0 presses 6 mm deep, but the bone is 4.9 mm above the skin"),
+        (ev.Press(indentation=4.8), None),
+        (
+            ev.Press(force=50.0),
+            "motion 0 presses with 50 N/mm, 3 MPa over the whole finger: forces are in N/mm",
+        ),
+        (ev.Press(force=10.0), None),
+    ],
+)
+def test_a_press_that_no_finger_bears_is_doubted(press, said):
+    """Table 2: the bone is 2.5 mm high in the middle of 12.79 mm, 1 mm above it; shear of the softest tissue
+    0.0115 MPa.
+    """
+    found = plan(whole(press)).warnings
+    assert found == (() if said is None else (said,))
+
+
+def test_a_fingertip_is_doubted_like_a_pad():
+    soft = {"hypodermis": ev.NeoHookean(E=34e3, nu=0.48)}
+    tip = ev.Fingertip(ridges=False, resolution="coarse", materials=soft)
+    said = plan(ev.Scene(tip, ev.Display(), motion=ev.Press(indentation=0.0015))).warnings
+    assert [sentence.split(",")[0] for sentence in said if "not in" in sentence] == [
+        "the shear modulus of hypodermis",
+        "a finger of 16.68 mm is moved by 0.0015 mm at most: lengths are in mm",
+    ]
+
+
 def test_lengths_in_metres_are_doubted():
     skin = ev.Electrical(stratum_corneum_thickness=0.38e-3)
     finger = ev.MeshedFinger(block(sag=0.3), {"tissue": ev.NeoHookean(E=0.1, nu=0.4)}, skin)
