@@ -247,6 +247,15 @@ def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
     assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)
 
 
+def test_sweeps_let_the_attraction_of_an_open_node_weaken():
+    """Unit compliance, open at 0.5: g = 0.5 + 0.2 (g - 0.4) gives g = 0.525 and a drop of 0.025."""
+    pull = AttractionStiffness(np.array([0.2]), np.array([0.4]), np.array([0.1]))
+    problem = DiscProblem(np.array([0.5, 0.0, 0.0]), np.eye(3), np.array([0.3]), attraction=pull)
+    swept = sweeps(problem, Forces(np.zeros(3), np.zeros(3), np.zeros(0)), 1)
+    assert_allclose(swept.drop[0], 0.025, rtol=1e-12)
+    assert not swept.contact.any()
+
+
 def test_an_attraction_stiffer_than_the_tissue_is_scaled_down():
     """Compliance 2 and a negative stiffness of 0.8: the feedback is 1.6."""
     problem = DiscProblem(np.array([0.5, 0.0, 0.0]), 2.0 * np.eye(3), np.array([0.3]))

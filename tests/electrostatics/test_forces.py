@@ -118,6 +118,19 @@ def test_two_dimensional_hover_forces():
     )
 
 
+@pytest.mark.parametrize("film", [1e-3, 1e-5], ids=["1 um", "10 nm"])
+@pytest.mark.parametrize("law", [StrongTroxel(), Kaczmarek()])
+def test_a_touching_pad_is_integrated_where_its_insulator_is_thin(law, film):
+    """The traction falls within some micrometres of the pole, where the integral over the angle is split."""
+    layers = Layers.of(Layer(0.38, 1e6), Layer(film, 3.9))
+    pad = EllipsoidalPad(16.68, 12.79, 22.5)
+    half = quad(
+        lambda t: law.traction(12.79 * np.sin(0.5 * t) ** 2, 100.0, layers) * 8.34 * np.cos(t),
+        0.0, np.pi / 2, epsabs=0.0, epsrel=1e-13, limit=2000, points=[1e-4, 1e-3, 1e-2, 1e-1],
+    )[0]  # fmt: skip
+    assert pad_force_per_depth(law, pad, 0.0, 100.0, layers) == pytest.approx(2 * half, rel=1e-10, abs=0)
+
+
 def test_plates_follow_equations_2_to_7():
     assert capacitor_force(100.0, 140.0, 0.2, 5.0) == pytest.approx(
         eps_0 * 5 * 100 * 140**2 / (2 * 0.2**2), rel=1e-14

@@ -3,6 +3,7 @@ definition.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,10 +19,12 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.reference import pull_in_strong_troxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.simulation import works
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.simulation.works import Part
 from evfem.solver.control import GivenVoltage, Indentation, Target
+from evfem.solver.spatial import SkinInterface
 from evfem.tissue.laws import LinearElastic
 
 ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)
@@ -278,3 +281,14 @@ def test_between_rough_faces_the_attraction_on_the_way_is_that_of_the_forces_on_
     )
     Part(model, old, new)._pulls(np.zeros((nodes, 2)), np.array([0.0, 0.5, 1.0]), (140.0, 140.0))
     np.testing.assert_allclose(seen[0], [loads[0][:, 0], 2.5 * loads[0][:, 0], loads[1][:, 0]], rtol=1e-12)
+
+
+def test_in_space_a_way_counts_along_the_slip(monkeypatch):
+    """By hand: 3 and 4 mm of slip along x and z, on a way of 1 and 2 mm; then 2 mm back along z."""
+    slips = np.array([[3.0, 4.0], [0.0, -2.0]])
+    monkeypatch.setattr(works, "slipped", lambda *_: slips)
+    interface = object.__new__(SkinInterface)
+    model = SimpleNamespace(equilibrium=SimpleNamespace(interface=interface))
+    part = SimpleNamespace(model=model, old=None, new=None, _slip_length=np.array([5.0, 2.0]))
+    along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
+    np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
