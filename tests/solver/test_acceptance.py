@@ -363,6 +363,17 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
 
 
+def test_friction_that_falls_with_the_speed_leaves_the_yielding_of_the_interface():
+    """In series it would be stiffer than each; the contact problem knows the fall itself."""
+    interface, old, new = legal(SURFACES[0], PenaltyInterface)
+    interface.penalties, law = (50.0, 2e3), RateFriction(speed=1.0, exponent=-0.2)
+    interface.law, interface.duration = law, 2e-3
+    k, every, nothing = node(FORWARD), np.arange(PAD.nodes.size), np.zeros(PAD.nodes.size)
+    found = interface.candidates(replace(old, age=nothing), new, every, nothing, nothing)
+    assert found.slip_stiffness[k] < 0.0
+    np.testing.assert_allclose(found.interface_compliance, interface.compliance(old), rtol=1e-12)
+
+
 def test_a_node_that_sticks_again_yields_and_slips_in_series():
     """Displaced by dx it slips by s = dx + C (F - F0) under B + K s, or not at all under less: the
     contact problem, which knows F + T dx with the growth T, says both.
