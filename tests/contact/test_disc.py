@@ -256,6 +256,15 @@ def test_sweeps_let_the_attraction_of_an_open_node_weaken():
     assert not swept.contact.any()
 
 
+def test_sweeps_of_a_node_whose_shear_lifts_it_off():
+    """A node that sticks: its three forces close the gap and hold both slips."""
+    compliance = np.array([[1.0, 0.3, -0.4], [0.3, 1.5, 0.1], [-0.4, 0.1, 2.0]])
+    start = np.array([-1.0, 0.2, 0.3])
+    problem = DiscProblem(start, compliance, np.array([5.0]))
+    swept = sweeps(problem, Forces(np.zeros(3), np.zeros(3), np.zeros(0)), 40)
+    assert_allclose(swept.contact, np.linalg.solve(compliance, -start), rtol=1e-9)
+
+
 def test_an_attraction_stiffer_than_the_tissue_is_scaled_down():
     """Compliance 2 and a negative stiffness of 0.8: the feedback is 1.6."""
     problem = DiscProblem(np.array([0.5, 0.0, 0.0]), 2.0 * np.eye(3), np.array([0.3]))
