@@ -8,10 +8,12 @@ interrupted.
 from __future__ import annotations
 
 import argparse
+import errno
 import json
 import os
 import signal
 import sys
+import tomllib
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -32,6 +34,8 @@ if TYPE_CHECKING:
     from evfem.simulation.result import Row
 
 DONE, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 3, 4, 130
+#: what the system says where our output cannot be written; of a file it is a `StorageError`
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -68,9 +72,10 @@ def _status(given: argparse.Namespace) -> int:
         _silence()
         return DONE
     except OSError as error:
-        if not isinstance(error, StorageError):  # our output cannot be written
-            _silence()
-        return _say(error, DISK_FAILED)
+        if isinstance(error, StorageError) or error.filename is not None or error.errno not in FULL:
+            return _say(error, DISK_FAILED)
+        _silence()
+        return _say(f"cannot write the output: {error.strerror or error}", DISK_FAILED)
     except MemoryError:
         return _say("not enough memory for this input; try a coarser one", BAD_INPUT)
     except KeyboardInterrupt:
@@ -123,7 +128,25 @@ def _scene(path: Path | None) -> Scene:
         return default_scene()
     from evfem.scene.file import load
 
-    return load(path)
+    try:
+        return load(path)
+    except InputError:
+        if _kind(path) == "sweep":
+            is_one = f"{path}, a sweep"
+            raise InputError("scene", is_one, f"a scene; evfem sweep {path} runs this one") from None
+        raise
+
+
+def _kind(path: Path) -> str:
+    """What a file is by the keys at its top: "scene", "sweep", or nothing where they say neither."""
+    from evfem.scene.file import read_text
+
+    with suppress(InputError, StorageError, ValueError, RecursionError):
+        keys = set(tomllib.loads(read_text("scene", path)))
+        scene = not keys.isdisjoint(("surface", "motion"))
+        if scene is keys.isdisjoint(("scene", "grid", "samples")):
+            return "scene" if scene else "sweep"
+    return ""
 
 
 def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
@@ -185,7 +208,7 @@ def _run(given: argparse.Namespace) -> int:
             resume = (saved if given.resume else kept)(path, scene)
         folder = RunFolder(path, scene, not given.no_fields, not given.no_plots, resume)
         if resume is not None and finished(path, scene, resume):
-            notices.tell(f"the run in {path} is complete, nothing is left to compute")
+            notices.tell(folder.completed())
             return _report(folder.path, resume.rows, scene)
         return _simulate(folder)
 
@@ -306,7 +329,13 @@ def _sweep(given: argparse.Namespace) -> int:
     from evfem.sweeps.folder import TABLE
     from evfem.sweeps.run import sweep, told
 
-    plan = load(given.sweep)
+    try:
+        plan = load(given.sweep)
+    except InputError:
+        if _kind(given.sweep) == "scene":
+            is_one = f"{given.sweep}, a scene"
+            raise InputError("sweep", is_one, f"a sweep; evfem run {given.sweep} runs this one") from None
+        raise
     path = given.out or Path(f"{plan.name}-out")
     try:
         result = sweep(

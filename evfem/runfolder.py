@@ -4,28 +4,40 @@ step.
 Every file is replaced in one step, so that a run killed at any moment leaves whole files and a
 checkpoint to go on from; what it was writing stays behind under a temporary name and is removed by
 the next run. Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files`
-lists their names. `kept` and `saved` say what of an earlier run is there to go on from.
+lists their names (`evfem.common.listed`). `kept` and `saved` say what of an earlier run is
+there to go on from.
 """
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from evfem.common.listed import Listed
 from evfem.common.notices import LOG
-from evfem.common.storage import disk, names_in, refuse_others, replacing, write_names, write_text
+from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
 from evfem.simulation.history import UNITS, WHOLE_UNITS, columns_of, over_depth, read_rows
-from evfem.simulation.result import Checkpoint, Frame, Result, Row, Saved, csv_header, csv_line, provenance
+from evfem.simulation.result import (
+    ANOTHER,
+    Checkpoint,
+    Frame,
+    Result,
+    Row,
+    Saved,
+    csv_header,
+    csv_line,
+    provenance,
+)
 
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
@@ -74,7 +86,7 @@ class RunFolder:
         self.mesh = mesh
         self.rows = list(self.resume.rows) if self.resume else []
         self._digest = self.scene.digest()
-        refuse_others(self.path / MANIFEST, _present(self.path), "evfem")
+        _refuse_others(self.path)
 
         if self.fields:
             self.files = FieldFiles.of(scene, mesh)
@@ -94,6 +106,10 @@ class RunFolder:
     def _checkpoint(self) -> Checkpoint:
         return Checkpoint(self.path / STATE)
 
+    @cached_property
+    def _listed(self) -> Listed:
+        return Listed(self.path / MANIFEST, OURS)
+
     @property
     def begun(self) -> bool:
         """Whether a step has converged, so that there is something to keep."""
@@ -105,16 +121,26 @@ class RunFolder:
         row, frame, checkpoint = self._pending
         if not self.opened:
             self._open()
-        if frame is not None and self.mesh is not None and self._wants(row):
-            for series in self._series:
-                series.add(row, frame, self.mesh)
+        if frame is not None and self._wants(row):
+            self._add(row, frame)
         if not self.rows or self.rows[-1]["step"] != row["step"]:
-            self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
+            with self._listed.writing(self.path / STATE):
+                self._checkpoint.write(self._digest, checkpoint(), [*self.rows, row])
             self.rows.append(row)
         self._write_history()
-        for series in self._series:
-            series.write_index()
+        self._write_index(self._series)
         self._pending = None
+
+    def _add(self, row: Row, frame: Frame) -> None:
+        assert self.mesh is not None
+        for series in self._series:
+            with self._listed.writing(series.frame_path(row["step"])):
+                series.add(row, frame, self.mesh)
+
+    def _write_index(self, several: Sequence[ParaViewSeries]) -> None:
+        for series in several:
+            with self._listed.writing(series.path):
+                series.write_index()
 
     def _wants(self, row: Row) -> bool:
         return self.files is not None and self.files.wants(row["step"])
@@ -122,7 +148,8 @@ class RunFolder:
     def _write_history(self) -> None:
         self._lines += [csv_line(row) for row in self.rows[len(self._lines) :]]
         header = csv_header(columns_of(self.rows[0])) if self.rows else csv_header()
-        write_text(self.path / HISTORY, header + "".join(self._lines))
+        with self._listed.writing(self.path / HISTORY):
+            write_text(self.path / HISTORY, header + "".join(self._lines))
 
     def close(self, result: Result | None) -> dict[str, Any]:
         """Write history, summary and picture of what has converged; returns the summary.
@@ -135,36 +162,80 @@ class RunFolder:
         self._write_history()
         if result is not None:
             self._write_last(result)
-        if result is None:
-            assert self.mesh is not None
-            result = Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
-        summary = result.summary()
-        write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        result = result or self._of_rows()
+        summary = self._write_summary(result)
         if self.plots and self.rows:
-            _picture(result if result.depth is None else result.total, self.path / PICTURE)
+            self._draw(result)
         return summary
+
+    def _of_rows(self) -> Result:
+        """The result that the rows so far make: without fields, and without what the solver did."""
+        assert self.mesh is not None
+        return Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
+
+    def _write_summary(self, result: Result) -> dict[str, Any]:
+        summary = result.summary()
+        with self._listed.writing(self.path / SUMMARY):
+            write_text(self.path / SUMMARY, json.dumps(summary, indent=2, allow_nan=False) + "\n")
+        return summary
+
+    def _draw(self, result: Result) -> None:
+        with self._listed.writing(self.path / PICTURE):
+            _picture(result if result.depth is None else result.total, self.path / PICTURE)
+
+    def completed(self) -> str:
+        """Write what is missing in the folder of a finished run, as far as its checkpoint has it;
+        returns a sentence about it.
+        """
+        without = _without_fields(self.path) if self.fields else ""
+        told = [f"the run in {self.path} is complete"]
+        if written := self._complete():
+            verb = "is" if len(written) == 1 else "are"
+            told.append(f"{' and '.join(written)} {verb} written from its checkpoint")
+        if without:
+            told.append(f"but it was {without}; --overwrite computes them")
+        return ", ".join(told if len(told) > 1 else [*told, "nothing is left to compute"])
+
+    def _complete(self) -> list[str]:
+        """Names of the files that were missing, and are written now."""
+        from evfem.scene.plan import scene_mesh
+
+        assert self.resume is not None
+        names = (HISTORY, SUMMARY, PICTURE) if self.plots else (HISTORY, SUMMARY)
+        missing = [name for name in names if not (self.path / name).exists()]
+        if not missing:
+            return []
+        _refuse_others(self.path)
+        with disk(f"use {self.path}"):
+            _remove_left(self.path)
+        self.rows, (self.mesh, _) = list(self.resume.rows), scene_mesh(self.scene)
+        if HISTORY in missing or SUMMARY in missing:  # a kill before the end leaves them a row behind
+            self._write_history()
+            series = [ParaViewSeries(self.path / name, self.rows) for name in (FIELDS, SKIN)]
+            self._write_index([one for one in series if one.path.exists()])
+        if SUMMARY in missing:
+            self._write_summary(self._of_rows())
+        if PICTURE in missing:
+            self._draw(self._of_rows())
+        return missing
 
     def _write_last(self, result: Result) -> None:
         """The fields of the last good step, where a run ended between two that are written."""
         last = result.frames[-1] if result.frames else None
         if last is not None and last.step == self.rows[-1]["step"] and not self._wants(self.rows[-1]):
-            for series in self._series:
-                series.add(self.rows[-1], last, result.mesh)
-                series.write_index()
+            self._add(self.rows[-1], last)
+            self._write_index(self._series)
 
     def _open(self) -> None:
         """Make the folder, remove an earlier run's files (or go on from them), start the history."""
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            old = [p.name for p in self.path.iterdir() if LEFT.fullmatch(p.name)]
-            for name in old if self.resume else [*old, *_present(self.path)]:
-                (self.path / name).unlink()
-        steps = range(1, self.scene.total_steps + 1)
+            self._listed = Listed(self.path / MANIFEST, OURS)  # anew, where a first try was interrupted
+            if not self.resume:
+                self._listed.remove()
+            self._listed.begin()
+            _remove_left(self.path)
         self._series = self._paraview()
-        series = [name for one in self._series for name in (one.path.name, *_frames(one, steps))]
-        names = [HISTORY, SUMMARY, FIELDS, PICTURE, STATE, *series]
-        names = sorted({*names, *(names_in(self.path / MANIFEST) if self.resume else ())})
-        write_names(self.path / MANIFEST, names)
         self._write_history()
         self.opened = True
 
@@ -189,7 +260,10 @@ def saved(path: Path, scene: Scene) -> Saved | None:
     version.
     """
     if (path / STATE).is_file():
-        return Checkpoint(path / STATE).read(scene.digest())
+        try:
+            return Checkpoint(path / STATE).read(scene.digest())
+        except InputError as error:
+            raise InputError("--resume", _told(path, error), error.allowed) from error
     if (path / MANIFEST).is_file() and _without_a_row(path / HISTORY):
         return None
     raise InputError("--resume", f"{path} without {STATE}", "a folder with a run that was interrupted")
@@ -202,23 +276,32 @@ def kept(path: Path, scene: Scene) -> Saved | None:
     Raises InputError where results of another scene are, or of a run of this one that is not
     finished.
     """
-    refuse_others(path / MANIFEST, _present(path), "evfem")
+    _refuse_others(path)
     if not (path / STATE).is_file() and _without_a_row(path / HISTORY):
         return None
     try:
         found = Checkpoint(path / STATE).read(scene.digest())
     except InputError as error:
-        raise InputError("--out", error.given, "another folder, or --overwrite to replace it") from error
+        raise InputError(
+            "--out", _told(path, error), "another folder, or --overwrite to replace it"
+        ) from error
     if not finished(path, scene, found):
         done = f"{path}, where {len(found.rows)} of {scene.total_steps} steps of this scene are done"
         raise InputError("--out", done, "--resume to go on there, or --overwrite to begin anew")
     return found
 
 
+def _told(path: Path, error: InputError) -> object:
+    """What is wrong with a checkpoint; where it is another scene's, so is all of the folder."""
+    return f"{path}, {ANOTHER}" if str(error.given).endswith(ANOTHER) else error.given
+
+
 def finished(path: Path, scene: Scene, found: Saved) -> bool:
-    """Whether a run has come to its end, and everything about it is in the folder."""
+    """Whether a run has come to its end, and no summary in the folder says otherwise."""
     if len(found.rows) != scene.total_steps:
         return False
+    if not (path / SUMMARY).exists():
+        return True
     with suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         return json.loads((path / SUMMARY).read_text(encoding="utf-8"))["complete"] is True
     return False
@@ -251,13 +334,30 @@ def _fields_of(path: Path, row: Row) -> Path:
     return ParaViewSeries(path / FIELDS).frame_path(row["step"])
 
 
-def _frames(series: ParaViewSeries, steps: Iterable[int]) -> list[str]:
-    return [series.frame_path(step).name for step in steps]
+def _without_fields(path: Path) -> str:
+    """What is missing of the fields, in words; nothing where they are there."""
+    if not (path / FIELDS).is_file():
+        return "without fields"
+    with disk(f"read {path / FIELDS}"):
+        index = (path / FIELDS).read_text(encoding="utf-8", errors="replace")
+    lost = [name for name in re.findall(r'file="([^"]+)"', index) if not (path / name).is_file()]
+    return f"without the fields in {lost[0]}" if lost else ""
 
 
 def _without_a_row(history: Path) -> bool:
     with disk(f"use {history}"):
         return not history.exists() or history.stat().st_size <= len(csv_header())
+
+
+def _refuse_others(path: Path) -> None:
+    """InputError where a file has a name that a run writes, and evfem did not write it."""
+    manifest = Listed(path / MANIFEST, OURS).manifest  # what a kill left open in it is decided
+    refuse_others(manifest, _present(path), "evfem")
+
+
+def _remove_left(path: Path) -> None:
+    for left in [p for p in path.iterdir() if LEFT.fullmatch(p.name)]:
+        left.unlink()
 
 
 def _present(path: Path) -> list[str]:

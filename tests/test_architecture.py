@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
-        "arrays constants notices views checks digest storage tables",
+        "arrays constants notices views checks digest storage listed tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -56,7 +56,7 @@ ROOMS = {
     "scene": (
         {"numpy", "pydantic", "tomli_w"},
         "motion terms driven fieldless scene written keys voltage meanings schema file resolution drift "
-        "parts sense fieldchoice timescales spatial way symmetry plan",
+        "partchecks parts sense fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

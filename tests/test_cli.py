@@ -1,6 +1,8 @@
 """The command line as users meet it: in a process of its own, by exit status, messages and files."""
 
 import csv
+import errno
+import io
 import json
 import signal
 import subprocess
@@ -158,7 +160,7 @@ def test_another_scene_replaces_results_only_when_told_and_leaves_other_files_al
     status, out, err = called(place, *words)
     assert (status, out) == (2, "")
     assert err == (
-        "evfem: --out: given here/checkpoint.npz, written by another scene; "
+        "evfem: --out: given here, a run of another scene; "
         "allowed: another folder, or --overwrite to replace it\n"
     )
     assert contents(place / "here") == before
@@ -177,6 +179,76 @@ def test_a_finished_result_is_kept_and_said_to_be_complete(finished):
         assert (status, err) == (0, "evfem: the run in square-out is complete, nothing is left to compute\n")
         assert out == finished[2]
         assert contents(folder / "square-out") == before
+
+
+BARE = ("run", "square.toml", "--no-fields", "--no-plots")
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_files_that_a_user_puts_beside_a_run_without_them_are_never_removed(place, other):
+    assert called(place, *BARE)[0] == 0
+    mine = {"forces.png": b"mine", "fields.pvd": b"mine too"}
+    for name, data in mine.items():
+        (place / "square-out" / name).write_bytes(data)
+    before = contents(place / "square-out")
+    if other:
+        (place / "square.toml").write_text(SCENE.replace("steps = 3", "steps = 1"))
+    for more in (("--overwrite",), ("--overwrite", "--no-fields", "--no-plots"), ()):
+        status, out, err = called(place, "run", "square.toml", *more)
+        assert (status, out) == (2, "")
+        assert err == (
+            "evfem: --out: given square-out, where fields.pvd was not written by evfem; "
+            "allowed: another folder, for files of others are never touched\n"
+        )
+        assert contents(place / "square-out") == before
+
+
+def test_what_a_finished_run_lacks_is_written_from_its_checkpoint_or_said(place):
+    assert called(place, *BARE)[0] == 0
+    results, whole = place / "square-out", "evfem: the run in square-out is complete"
+    lacking = ", but it was without fields; --overwrite computes them\n"
+    before = contents(results)
+    status, out, err = called(place, "run", "square.toml")
+    assert (status, err) == (0, f"{whole}, forces.png is written from its checkpoint{lacking}")
+    assert out.splitlines()[-1].startswith("5 of 5 steps in")
+    assert (results / "forces.png").read_bytes()[:4] == b"\x89PNG"
+    assert called(place, "run", "square.toml")[2] == whole + lacking
+    assert called(place, *BARE)[2] == f"{whole}, nothing is left to compute\n"
+    for name in ("history.csv", "summary.json"):
+        (results / name).unlink()
+    told = f"{whole}, history.csv and summary.json are written from its checkpoint\n"
+    assert called(place, *BARE, "--resume")[::2] == (0, told)
+    assert (results / "history.csv").read_bytes() == before["history.csv"]
+    now, then = json.loads((results / "summary.json").read_text()), json.loads(before["summary.json"])
+    assert now.pop("provenance")["parameters"] == then.pop("provenance")["parameters"]
+    assert now == then
+    assert called(place, "run", "square.toml", "--overwrite", "--no-plots")[0] == 0
+    assert files(results) == sorted(
+        {".evfem-files", *RESULTS, *(f"fields_{n:05d}.vtu" for n in (2, 4, 5))} - {"forces.png"}
+    )
+    (results / "fields_00004.vtu").unlink()
+    lacking = ", but it was without the fields in fields_00004.vtu; --overwrite computes them\n"
+    assert called(place, "run", "square.toml", "--no-plots")[2] == whole + lacking
+
+
+def test_a_run_killed_between_its_last_checkpoint_and_its_end_is_completed(place):
+    """History and index are a row behind then, and there is no summary."""
+    assert called(place, "run", "square.toml", "--no-plots")[0] == 0
+    results = place / "square-out"
+    before, index = contents(results), (results / "fields.pvd").read_text()
+    (results / "summary.json").unlink()
+    (results / "history.csv").write_bytes(b"".join(before["history.csv"].splitlines(True)[:-1]))
+    (results / "fields.pvd").write_text(
+        "".join(line for line in index.splitlines(True) if "00005" not in line)
+    )
+    (results / ".summary.json.77.tmp").write_text("half")
+    told = "evfem: the run in square-out is complete, summary.json is written from its checkpoint\n"
+    assert called(place, "run", "square.toml", "--no-plots")[::2] == (0, told)
+    now = contents(results)
+    assert all(
+        now[name] == data for name, data in before.items() if name not in ("summary.json", ".evfem-files")
+    )
+    assert set(now) == set(before)
 
 
 def test_resuming_and_overwriting_exclude_each_other(place):
@@ -279,6 +351,47 @@ def test_the_package_is_the_command(place):
     done = subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, timeout=300)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout == called(place, "plan", "square.toml")[1]
+
+
+def test_a_sweep_is_no_scene_and_a_scene_no_sweep(place):
+    (place / "sweep.toml").write_text("version = 1\nscene = 'square.toml'\n[grid]\nfinger.depth = [1.0]\n")
+    sentence = "{}: given {}, a {}; allowed: a {}; evfem {} {} runs this one"
+    for command in (("run",), ("plan",), ("mesh", "--out", "m.vtu")):
+        told = sentence.format("scene", "sweep.toml", "sweep", "scene", "sweep", "sweep.toml")
+        assert called(place, *command, "sweep.toml") == (2, "", f"evfem: {told}\n")
+    told = sentence.format("sweep", "square.toml", "scene", "sweep", "run", "square.toml")
+    assert called(place, "sweep", "square.toml") == (2, "", f"evfem: {told}\n")
+    (place / "neither.toml").write_text("version = 1\n[fingre]\n")
+    assert "fingre" in called(place, "run", "neither.toml")[2]
+    assert files(place) == ["neither.toml", "square.toml", "square.vtu", "sweep.toml"]
+
+
+class Full(io.StringIO):
+    """A full disk under the output, which says so once."""
+
+    told = False
+
+    def flush(self):
+        if not self.told:
+            self.told = True
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_output_that_cannot_be_written_is_said_so(place, monkeypatch, capsys):
+    monkeypatch.chdir(place)
+    monkeypatch.setattr(sys, "stdout", Full())
+    monkeypatch.setattr(cli, "_silence", lambda: None)
+    assert cli.main(["plan", "square.toml"]) == 4
+    assert capsys.readouterr().err == "evfem: cannot write the output: No space left on device\n"
+
+
+def test_another_failure_of_the_system_is_not_taken_for_one_of_the_output(monkeypatch, capsys):
+    def fail(given):
+        raise OSError(errno.EADDRINUSE, "Address already in use")
+
+    monkeypatch.setattr(cli, "_plan", fail)
+    assert cli.main(["plan"]) == 4
+    assert capsys.readouterr().err == f"evfem: [Errno {errno.EADDRINUSE}] Address already in use\n"
 
 
 BAD_SCENES = {
@@ -450,7 +563,9 @@ def test_a_checkpoint_of_another_scene_is_refused(place):
     (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 0.25"))
     status, _, err = called(place, "run", "square.toml", "--resume")
     assert status == 2
-    assert "another scene" in err
+    assert err == (
+        "evfem: --resume: given square-out, a run of another scene; allowed: the run of this scene\n"
+    )
     assert {
         name: (place / "square-out" / name).read_bytes() for name in files(place / "square-out")
     } == before

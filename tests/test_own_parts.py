@@ -210,6 +210,15 @@ def test_a_stop_before_the_first_step_is_an_error() -> None:
         ev.simulate(ev.Scene(pad(), FLAT, motion=[PRESS]), observers=[Never()])
 
 
+@pytest.mark.parametrize("deaf", [object(), None, "progress", lambda row: None])
+def test_an_observer_that_would_be_told_of_nothing_is_refused_before_the_run(deaf: Any) -> None:
+    heard = Progress()
+    words = r"observers\[1\]: given .*; allowed: an object with started\(mesh, scene, total_steps\), step\("
+    with pytest.raises(InputError, match=words):
+        ev.simulate(ev.Scene(pad(), FLAT, motion=[PRESS]), observers=[heard, deaf])
+    assert not hasattr(heard, "lines")
+
+
 # -- surfaces in detail ----------------------------------------------------------------------------------
 
 
@@ -273,10 +282,14 @@ def test_objects_that_are_no_surface() -> None:
     class Rough(Waves):
         friction = -1.0
 
-    no_surfaces: list[Any] = [object(), Waves, 3.0]
+    no_surfaces: list[Any] = [object(), int, 3.0]
     for wrong in no_surfaces:
         with pytest.raises(InputError, match=r"surface: given .*an object with a method height\(x\)"):
             ev.Scene(pad(), wrong, motion=[PRESS])
+    classes: list[Any] = [Waves, ev.Flat]
+    for kind in classes:
+        with pytest.raises(InputError, match=f"surface: given the class {kind.__name__}; allowed: an object"):
+            ev.Scene(pad(), kind, motion=[PRESS])
     with pytest.raises(InputError, match=r"surface\.friction: given -1\.0"):
         ev.Scene(pad(), Rough(), motion=[PRESS])
 

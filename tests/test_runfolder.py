@@ -2,7 +2,11 @@
 
 import json
 import logging
+import os
+import shutil
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +21,7 @@ from evfem.finger.fingerpad import FingerPad
 from evfem.runfolder import RunFolder, saved
 from evfem.scene.scene import Output, default_scene
 from evfem.simulation.result import Checkpoint, Result, csv_line
+from evfem.sweeps import folder
 
 SCENE = default_scene()
 MESH, FINGER = square_mesh("quad"), FingerPad().mesh(2)
@@ -125,6 +130,102 @@ def test_files_of_others_with_our_names_stop_the_run(tmp_path):
     (tmp_path / ".evfem-files").unlink()
     with pytest.raises(InputError, match=r"checkpoint\.npz was not written by evfem"):
         started(tmp_path)
+
+
+@pytest.mark.parametrize("name", ["forces.png", "fields.pvd", "fields_00004.vtu", "summary.json"])
+@pytest.mark.parametrize("go_on", [False, True])
+def test_a_file_that_this_folder_never_got_from_evfem_stops_the_run(tmp_path, name, go_on):
+    """Its name is one of ours, but it was never written: no earlier run may pass it off as its own."""
+    take(started(tmp_path, fields=False, plots=False), 1, 2)
+    assert listed(tmp_path) == ["history.csv", "checkpoint.npz"]
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(InputError, match=rf"{name} was not written by evfem"):
+        started(tmp_path, resume=saved(tmp_path, SCENE) if go_on else None)
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_a_file_that_comes_into_the_place_of_one_while_the_run_is_at_work_is_left_alone(tmp_path):
+    folder = started(tmp_path, fields=False)
+    take(folder, 1)
+    (tmp_path / "forces.png").write_text("mine")
+    with pytest.raises(StorageError, match=r"forces\.png: a file that evfem did not write is in its place"):
+        folder.close(None)
+    assert (tmp_path / "forces.png").read_text() == "mine"
+
+
+def listed(path):
+    return [name for name in (path / ".evfem-files").read_text().splitlines() if name]
+
+
+class Killed(BaseException):
+    """As a kill: nothing after it is done, so that what is on disk stays as it is."""
+
+
+@pytest.fixture
+def kill(monkeypatch):
+    """Lets so many changes of the disk by the list and its files pass; at the next, a kill."""
+
+    def at(room):
+        def counted(change):
+            def wrapped(*words, **more):
+                nonlocal room
+                room -= 1
+                if room < 0:
+                    raise Killed
+                return change(*words, **more)
+
+            return wrapped
+
+        changes = {Path: ("touch", "unlink", "write_text"), os: ("replace",), folder.Listed: ("_append",)}
+        for owner, names in changes.items():
+            for name in names:
+                monkeypatch.setattr(owner, name, counted(getattr(owner, name)))
+
+    return at
+
+
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize("room", range(60))
+def test_whenever_a_kill_comes_it_is_known_whose_a_file_is(tmp_path, monkeypatch, kill, room, before):
+    """Ours are taken for ours, and a file that is put where none of ours is, is not."""
+    out = tmp_path / "out"
+    if before:
+        take(started(out, plots=False), 1, 2)
+    with suppress(Killed):
+        kill(room)
+        take(started(out, plots=False), 1)
+    monkeypatch.undo()
+    names = ["checkpoint.npz", "fields.pvd", "fields_00001.vtu", "fields_00002.vtu", "history.csv"]
+    for name in [name for name in names if out.exists() and not (out / name).exists()]:
+        there = shutil.copytree(out, tmp_path / name)
+        (there / name).write_text("mine")
+        with pytest.raises(InputError, match=f"{name} was not written by evfem"):
+            started(there, plots=False)
+    take(started(out, plots=False), 1)
+    assert steps_on_disk(out) == ([1],) * 4
+    assert not list(out.glob(".*.tmp"))
+
+
+def test_a_file_that_could_not_be_written_is_not_listed(tmp_path, monkeypatch):
+    folder = started(tmp_path, fields=False)
+    take(folder, 1)
+    monkeypatch.setattr("evfem.runfolder._picture", lambda result, path: path.with_name("none").stat())
+    with pytest.raises(FileNotFoundError):
+        folder.close(None)
+    monkeypatch.undo()
+    assert listed(tmp_path) == ["checkpoint.npz", "history.csv", "summary.json"]
+    (tmp_path / "forces.png").write_text("mine")
+    with pytest.raises(InputError, match=r"forces\.png was not written by evfem"):
+        started(tmp_path)
+
+
+def test_a_list_from_anywhere_names_no_file_of_others(tmp_path):
+    take(started(tmp_path), 1)
+    (tmp_path / "notes.md").write_text("mine")
+    with (tmp_path / ".evfem-files").open("a") as file:
+        file.write("notes.md\n../notes.md\n\0\n")
+    take(started(tmp_path), 1)
+    assert (tmp_path / "notes.md").read_text() == "mine"
 
 
 def test_the_result_decides_the_summary_and_the_picture(tmp_path):

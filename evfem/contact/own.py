@@ -21,8 +21,8 @@ LENGTH = 1e-4
 def completed(surface: Surface) -> CompleteSurface:
     """The surface itself if it has everything, else an `OwnSurface` around it.
 
-    Raises InputError for an object without `height(x)`, and for a friction, y or insulator that
-    cannot be.
+    Raises InputError for a class, for an object without `height(x)`, and for a friction, y or
+    insulator that cannot be.
 
     >>> class Ramp:
     ...     friction = 0.3
@@ -31,9 +31,11 @@ def completed(surface: Surface) -> CompleteSurface:
     >>> ramp.slope(np.array([2.0])).tolist(), ramp.friction_coefficient(np.array([2.0])).tolist()
     ([0.1], [0.3])
     """
+    if isinstance(surface, type) and hasattr(surface, "height"):
+        raise InputError("surface", f"the class {surface.__name__}", "an object of it")
     if isinstance(surface, CompleteSurface):
         return surface
-    if isinstance(surface, type) or not isinstance(surface, Surface):
+    if not isinstance(surface, Surface):
         allowed = (
             "a surface of evfem, for instance Flat, Display or Grating, or an object with a method height(x)"
         )

@@ -143,7 +143,7 @@ class ExponentialRoughness:
 
 
 LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness)}
-ALLOWED = "a length in mm, not negative, or an object with a method separation(pressure)"
+ALLOWED = f"a length in mm from 0 to {WIDEST:g}, or an object with a method separation(pressure)"
 
 
 def roughness_of(given: Any) -> RoughnessLaw | None:
@@ -152,7 +152,9 @@ def roughness_of(given: Any) -> RoughnessLaw | None:
     >>> roughness_of(0.0), roughness_of(0.001)
     (None, ConstantRoughness(gap=0.001))
     """
-    if isinstance(given, RoughnessLaw) and not isinstance(given, type):
+    if isinstance(given, type) and hasattr(given, "separation"):
+        raise InputError("roughness_gap", f"the class {given.__name__}", "an object of it")
+    if isinstance(given, RoughnessLaw):
         return given
     if isinstance(given, bool) or not isinstance(given, (int, float)):
         raise InputError("roughness_gap", quoted(given), ALLOWED)

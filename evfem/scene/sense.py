@@ -47,7 +47,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
     shear moduli (MPa) of the materials.
     """
-    lengths = (*_small(scene, mesh), *_large(scene, mesh, min(moduli.values())))
+    lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())))
     return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_hovering(scene, mesh))
 
 
@@ -68,21 +68,22 @@ def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:
     softest = min(moduli, key=lambda name: moduli[name])
     for name, modulus in moduli.items():
         most = SOFTEST if name == softest else HARD
-        if not isinstance(scene.finger, MeshedFinger):
+        if name in TABLE_2 and not isinstance(scene.finger, MeshedFinger):
             most = TIMES_TABLE_2 * NeoHookean(*TABLE_2[name]).mu
         if modulus > most:
             much = f"the shear modulus of {name}, {modulus:.3g} MPa, is beyond that of any tissue"
             yield f"{much}: moduli are in MPa, not in Pa"
 
 
-def _small(scene: Scene, mesh: Mesh) -> Iterator[str]:
+def _small(scene: Scene) -> Iterator[str]:
     skin = getattr(scene.finger.electrical, "stratum_corneum_thickness", None)
     if skin is not None and skin < THINNEST_SKIN:
         yield f"a stratum corneum of {skin:g} mm is thinner than any: lengths are in mm, not in m"
     lengths = [abs(getattr(m, name) or 0.0) for m in scene.motion for name in TRAVEL if hasattr(m, name)]
-    travel, width = max(lengths, default=0.0), float(np.ptp(mesh.points[:, 0]))
-    if 0.0 < travel < LEAST_TRAVEL * width:
-        yield f"a finger of {width:.4g} mm is moved by {travel:g} mm at most: lengths are in mm, not in m"
+    travel, width = max(lengths, default=0.0), getattr(scene.finger, "width", None)
+    # a mesh may have most of a half space beside a small contact
+    if width is not None and 0.0 < travel < LEAST_TRAVEL * width:
+        yield f"a finger of {width:g} mm is moved by {travel:g} mm at most: lengths are in mm, not in m"
 
 
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:

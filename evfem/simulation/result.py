@@ -47,6 +47,7 @@ from evfem.simulation.provenance import versions as versions
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
 CHECKPOINT_FORMAT = "evfem-checkpoint-5"
+ANOTHER = "a run of another scene"
 #: what is shown of the last step
 SHOWN = (
     *("position", "indentation", "voltage"),
@@ -405,7 +406,7 @@ class Checkpoint:
             given = f"{self.path}, written by evfem {version[:40]!r}"
             raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
         if owner != scene_digest:
-            raise InputError("checkpoint", f"{self.path}, written by another scene", allowed)
+            raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
         if odd:
             given = f"{self.path}, of another version: with missing or unknown columns {', '.join(odd)}"
             raise InputError("checkpoint", given, allowed)

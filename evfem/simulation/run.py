@@ -20,7 +20,7 @@ from evfem.common.notices import LOG
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
-from evfem.errors import NotConverged, StopRun, Unresolved
+from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
@@ -106,6 +106,7 @@ def simulate(
 
 
 def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resume: Saved | None) -> Result:
+    _check_observers(observers)
     total = scene.total_steps
     # shown at once, for making the model takes seconds; no trace of it where the scene is refused
     bar = notices.bar(total, "step", len(resume.rows) if resume else 0, progress)
@@ -409,6 +410,15 @@ def _duration(motion: Motion, start: dict[str, float]) -> float:
         else start["indentation"]
     )
     return abs(end - start["indentation"]) / motion.steps / speed
+
+
+def _check_observers(observers: Sequence[Observer]) -> None:
+    """Raise InputError for an object that would be told of nothing."""
+    for i, observer in enumerate(observers):
+        if not any(hasattr(observer, event) for event in ("started", "step", "finished")):
+            allowed = "an object with started(mesh, scene, total_steps), step(row, frame, checkpoint) "
+            allowed += "or finished(result)"
+            raise InputError(f"observers[{i}]", quoted(observer), allowed)
 
 
 def _tell(observers: Sequence[Observer], event: str, *arguments: Any) -> list[str]:

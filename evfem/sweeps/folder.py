@@ -4,7 +4,8 @@ A point's file is named by the fingerprint of its scene, outputs and version: a 
 or one changed in other points, finds it again. Every file is written whole or not at all. The
 table is `sweep.csv` (and `sweep.parquet` where pyarrow is installed), a row per point;
 `sweep.json` has the provenance, from the start, so that the folder can tell which sweep was its
-last.
+last. Only files that a sweep wrote are ever replaced or removed: `.evfem-sweep` lists their names
+(`Listed`), a point's file says so itself.
 """
 
 from __future__ import annotations
@@ -14,11 +15,13 @@ import re
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from evfem.common.storage import disk, refuse_others, replacing, write_names, write_text
+from evfem.common.listed import Listed
+from evfem.common.storage import disk, refuse_others, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.errors import InputError
 
@@ -26,8 +29,11 @@ POINTS, TABLE, PARQUET, PROVENANCE = "points", "sweep.csv", "sweep.parquet", "sw
 MANIFEST = ".evfem-sweep"
 FORMAT = "evfem-sweep-point-2"
 POINT_FILE = re.compile(r"[0-9a-f]{64}\.json")
+#: how the file of a point begins, of whatever version
+POINT_BEGINS = b'{"format": "evfem-sweep-point-'
 #: what a killed sweep was writing
 LEFT = re.compile(r"\.([0-9a-f]{64}\.json|sweep\.(csv|json|parquet)|\.evfem-sweep)\.\d+\.tmp")
+OURS = re.compile(r"sweep\.(csv|json|parquet)|points")
 STATUS = ("done", "refused", "not_converged", "failed")
 
 
@@ -70,26 +76,36 @@ class SweepFolder:
         Raises InputError, with nothing touched, where files of others are in the way, or points
         that this sweep does not have.
         """
-        ours = (TABLE, PARQUET, PROVENANCE, POINTS)
         with disk(f"use {self.path}"):
             self.path.mkdir(parents=True, exist_ok=True)
-            present = [name for name in ours if (self.path / name).exists()]
+            listed, points = self._listed, self._points()
+            present = [name for name in (TABLE, PARQUET, PROVENANCE, POINTS) if (self.path / name).exists()]
             refuse_others(self.path / MANIFEST, present, "a sweep")
+            _refuse_no_points(points)
             if not (self.resume or self.overwrite):
-                self._refuse_another(keys, plan)
-            write_names(self.path / MANIFEST, ours)
+                self._refuse_another(keys, plan, points)
+            for file in points if self.overwrite else ():
+                file.unlink()
+            if self.overwrite:
+                listed.remove()
+            listed.begin([POINTS])
             (self.path / POINTS).mkdir(exist_ok=True)
-            files = [p for folder in (self.path, self.path / POINTS) for p in folder.iterdir()]
-            for file in files:
-                old = file.name in ours or POINT_FILE.fullmatch(file.name)
-                if LEFT.fullmatch(file.name) or (old and self.overwrite and file.name != POINTS):
+            for file in [*self.path.iterdir(), *(self.path / POINTS).iterdir()]:
+                if LEFT.fullmatch(file.name):
                     file.unlink()
 
-    def _refuse_another(self, keys: Collection[str], plan: str) -> None:
-        """InputError where the folder has points of another sweep; one that grew is no other."""
+    @cached_property
+    def _listed(self) -> Listed:
+        return Listed(self.path / MANIFEST, OURS)
+
+    def _points(self) -> list[Path]:
+        """The files in the folder of the points that have the name of one."""
         points = self.path / POINTS
-        names = [p.name for p in points.iterdir() if POINT_FILE.fullmatch(p.name)] if points.exists() else []
-        others = sum(name.removesuffix(".json") not in keys for name in names)
+        return [p for p in points.iterdir() if POINT_FILE.fullmatch(p.name)] if points.is_dir() else []
+
+    def _refuse_another(self, keys: Collection[str], plan: str, points: Sequence[Path]) -> None:
+        """InputError where the folder has points of another sweep; one that grew is no other."""
+        others = sum(file.stem not in keys for file in points)
         if others and self._last() != plan:
             given = f"{self.path}, with {others} points of another sweep or version"
             raise InputError(
@@ -117,14 +133,26 @@ class SweepFolder:
 
     def write_table(self, columns: Sequence[str], rows: Sequence[Mapping[str, Any]]) -> None:
         """The table of all points so far."""
-        write_text(self.path / TABLE, sweep_csv(columns, rows))
+        with self._listed.writing(self.path / TABLE):
+            write_text(self.path / TABLE, sweep_csv(columns, rows))
         if find_spec("pyarrow") is not None:
-            with replacing(self.path / PARQUET) as temporary:
+            file = self.path / PARQUET
+            with self._listed.writing(file), replacing(file) as temporary:
                 _write_parquet(temporary, columns, rows)
 
     def write_provenance(self, provenance: Mapping[str, Any]) -> None:
         """How the table came about."""
-        write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
+        with self._listed.writing(self.path / PROVENANCE):
+            write_text(self.path / PROVENANCE, json.dumps(provenance, indent=1, allow_nan=False) + "\n")
+
+
+def _refuse_no_points(files: Sequence[Path]) -> None:
+    """InputError where one of the files with names of points was not written by a sweep."""
+    for path in files:
+        with path.open("rb") as file:
+            if file.read(len(POINT_BEGINS)) != POINT_BEGINS:
+                given = f"{path.parent}, where {path.name} was not written by a sweep"
+                raise InputError("--out", given, "another folder, for files of others are never touched")
 
 
 def _sound(answer: Answer) -> bool:

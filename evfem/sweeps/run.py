@@ -134,14 +134,14 @@ class _Run:
         self.plan, self.folder, self.began = plan, folder, clock.perf_counter()
         self.points = plan.points()
         self.answers: dict[str, Answer] = {}
+        self.refusals: list[InputError] = []
         self.found: list[Units] = []
         quiet = not (progress and sys.stderr.isatty())
         reading = tqdm(self.points, "reading", unit="point", leave=False, delay=2.0, disable=quiet)
         self.keys = [self._key(point.text) for point in reading]
         refused = dict(self.answers)
         if len(refused) == len(set(self.keys)):
-            first = self.answers[self.keys[0]].message
-            raise InputError("sweep", f"no valid point: {first}", "at least one valid scene")
+            raise self._no_scene()
         self.units = table_units(plan.outputs, plan.parameters, self.found)
         self.digest = digest(sorted(set(self.keys)))
         if folder is not None:
@@ -160,6 +160,12 @@ class _Run:
             folder.write_provenance(self.result().provenance)
         self.bar = _Progress(len(set(self.keys)), self.answers, progress)
 
+    def _no_scene(self) -> InputError:
+        """The error of all points where they have the same one; else one that tells the first."""
+        if len({str(error) for error in self.refusals}) == 1:
+            return self.refusals[0]
+        return InputError("sweep", f"no valid point: {self.refusals[0]}", "at least one valid scene")
+
     def _key(self, text: str) -> str:
         """Fingerprint of a point's scene and outputs, or of its text when it is no scene."""
         try:
@@ -167,6 +173,7 @@ class _Run:
         except InputError as error:
             key = digest((text, "refused"))
             self.answers[key] = Answer("refused", 0.0, str(error), {})
+            self.refusals.append(error)
             return key
         if (units := units_of(scene)) not in self.found:
             self.found.append(units)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -211,7 +212,13 @@ def test_points_that_fail_are_rows_with_their_message(plan, tmp_path, monkeypatc
 
 def test_a_sweep_without_a_valid_point_writes_nothing(plan, tmp_path):
     plan.write_text(SWEEP.replace("surface.friction = [0.2, 0.4, -1.0]", "surface.fricton = [0.2]"))
-    with pytest.raises(InputError, match=r"no valid point: surface\.fricton: given an unknown key"):
+    with pytest.raises(InputError, match=r"^surface\.fricton: given an unknown key; allowed: friction\?"):
+        ev.sweep(plan, tmp_path / "out", workers=1)
+    plan.write_text(SWEEP.replace("[0.2, 0.4, -1.0]", "[-1.0, -2.0]"))
+    sentence = (
+        r"^sweep: given no valid point: surface\.friction: given -1\.0; .*; allowed: at least one valid"
+    )
+    with pytest.raises(InputError, match=sentence):
         ev.sweep(plan, tmp_path / "out", workers=1)
     assert not (tmp_path / "out").exists()
 
@@ -231,6 +238,20 @@ def test_files_of_others_are_never_touched(plan, tmp_path):
         ".evfem-sweep", "mine.csv", "points", "sweep.csv", "sweep.json", "sweep.parquet"
     }  # fmt: skip
     assert len(list((out / "points").iterdir())) == 3  # two points of the new sweep, and mine
+
+
+@pytest.mark.parametrize("more", [{}, {"overwrite": True}, {"resume": True}])
+@pytest.mark.parametrize("name", ["sweep.parquet", f"points/{64 * 'a'}.json"])
+def test_a_file_of_others_that_a_sweep_never_wrote_stops_it(plan, tmp_path, monkeypatch, name, more):
+    out = tmp_path / "out"
+    monkeypatch.setattr(sweepfolder, "find_spec", lambda package: None)  # no pyarrow
+    ev.sweep(plan, out, workers=1)
+    monkeypatch.undo()
+    (out / name).write_text("mine")
+    before = {p: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    with pytest.raises(InputError, match=rf"where {Path(name).name} was not written by a sweep; allowed"):
+        ev.sweep(plan, out, workers=1, **more)
+    assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
 
 
 def test_a_folder_that_cannot_be_used(plan, tmp_path):
