@@ -292,3 +292,37 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     part = SimpleNamespace(model=model, old=None, new=None, _slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
     np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
+
+
+def test_a_finger_that_goes_with_its_bone_is_pulled_along_by_nothing():
+    """What counts is how the attraction changes on the way that the bone does not go."""
+    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
+    model = make_model(scene(Display(INSULATOR), StrongTroxel(), 500.0, (Hover(0.3),), column))
+    rest, way = model.equilibrium.rest(np.array([0.0, 0.3]), 500.0), np.array([0.0, -0.1])
+    carried = replace(rest, u=rest.u + way, bone=rest.bone + way)
+    along = np.tile([0.0, -1.0], (len(rest.contact_force), 1))
+    assert Part(model, rest, carried)._pulled_along(along) == 0.0
+    fallen = replace(carried, u=carried.u + 0.5 * way)
+    assert Part(model, rest, fallen)._pulled_along(along) > 1e-6
+
+
+def test_the_field_stretches_with_the_forces_on_the_way():
+    """Rough faces come closer from the forces of the begin to those of the end."""
+    nodes, seen = np.ones(3), []
+
+    def charged(position, voltage, pressing, carried):
+        seen.append(pressing)
+
+    charging = SimpleNamespace(
+        old=SimpleNamespace(voltage=100.0), carried=lambda length: None, energy_density=lambda at: nodes
+    )
+    pad = SimpleNamespace(tributary=lambda position: position[:, 0])
+    attraction = SimpleNamespace(pad=pad, charging=charging, charged=charged)
+    interface = SimpleNamespace(resting=lambda state: state.place)
+    model = SimpleNamespace(attraction=attraction, equilibrium=SimpleNamespace(interface=interface))
+    old, new = (
+        SimpleNamespace(place=long * np.ones((3, 2)), contact_force=load * np.ones((3, 2)))
+        for long, load in ((1.0, 0.2), (1.5, 0.6))
+    )
+    assert Part(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
+    np.testing.assert_allclose(seen, 0.2 + 0.4 * np.outer(works.WAY, nodes), rtol=1e-12)
