@@ -202,6 +202,7 @@ def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
     assert snaps > 0
 
 
+@pytest.mark.filterwarnings("ignore:motion 1 presses")
 def test_an_impossible_press_stops_with_the_good_rows():
     seen = []
 
