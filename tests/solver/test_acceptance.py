@@ -7,115 +7,17 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tools.meshes import block
+from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, pushed, shifted
 
 from evfem.contact.friction import RateFriction
-from evfem.contact.pad import make_pad
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, Verge
 from evfem.contact.surfaces import Flat, Sinusoid
-from evfem.mesh.mesh import raised
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.state import Balance, Folded, Limits, Record, StepFailed
+from evfem.solver.interface import PenaltyInterface
+from evfem.solver.state import Folded, Limits, StepFailed
 from evfem.solver.strategy import Strategy
-
-TOLERANCE, MU = 1e-6, 0.5
-MESH = raised(block(4, 2))
-PAD = make_pad(MESH)
-#: statuses of pad nodes in a row, with forces along normal and tangent (N/mm) that obey Coulomb's law
-NODES = {
-    OPEN: (0.0, 0.0),
-    STICK: (1.0, 0.3),
-    FORWARD: (0.8, -MU * 0.8),
-    BACKWARD: (0.6, MU * 0.6),
-}
-SLIP, GAP = 1e-3, 1e-2
-
-
-class Script:
-    """A body whose iterates and residuals are known beforehand: first the state in question."""
-
-    def __init__(self, states, residuals):
-        self.size, self.record = len(MESH.points), Record()
-        self.states, self.residuals, self.admitted, self.left = states, residuals, [], None
-
-    def known(self, old, target):
-        return None
-
-    def begin(self, old, target, frozen, start):
-        return self.states[0]
-
-    def balance(self, state, attraction, target):
-        residual = self.residuals[self.record.iterations]
-        return state, Balance(np.zeros(2), residual, attraction)
-
-    def advance(self, old, state, target, balance):
-        return self.states[self.record.iterations + 1]
-
-    def accepted(self, old, state):
-        return state
-
-    def leaves(self, old, state, target):
-        return self.left
-
-    def admit(self, state, gap):
-        self.admitted.append(gap)
-
-    def forget(self):
-        pass
-
-    def findings(self, state, balance):
-        return ""
-
-
-def legal(surface, kind=Interface):
-    """An interface, a state before a step and one after it that obeys everything: every fourth
-    node is open, sticks, has slipped forwards, backwards.
-    """
-    interface = kind(PAD, MESH.points, surface, TOLERANCE)
-    script = Script([], [])
-    equilibrium = Equilibrium(script, interface, None, Limits(TOLERANCE))
-    old = equilibrium.rest(np.zeros(2), 0.0)
-    status = np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size)
-    force = np.array([NODES[s] for s in status.tolist()])
-    x, y = MESH.points[PAD.nodes].T
-    moved = np.select([status == FORWARD, status == BACKWARD], [SLIP, -SLIP], 0.0)
-    u = old.u.copy()
-    u[PAD.nodes, 0] = moved
-    ground = surface.y + surface.height(x + moved)
-    u[PAD.nodes, 1] = ground - y + np.where(status == OPEN, GAP, 0.0)
-    new = replace(old, u=u, status=status, contact_force=force, reaction=np.array([0.1, -2.0]))
-    return interface, old, new
-
-
-def node(status):
-    return int(np.flatnonzero(np.resize([OPEN, STICK, FORWARD, BACKWARD], PAD.nodes.size) == status)[0])
-
-
-def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2):
-    """Number of the iterate that the solver accepts, and what it has admitted as candidates."""
-    script = Script(states, residuals)
-    limits = Limits(TOLERANCE, Strategy(iterations=tries))
-    target = target or Target.held(old.bone, 0.0)
-    found = Equilibrium(script, interface, None, limits).step(old, target)
-    return next(k for k, state in enumerate(states) if state is found), script.admitted
-
-
-def shifted(state, where, change, axis):
-    """The state with one node displaced."""
-    u = state.u.copy()
-    u[PAD.nodes[where], axis] += change
-    return replace(state, u=u)
-
-
-def pushed(state, where, change, axis):
-    """The state with one contact force changed."""
-    force = state.contact_force.copy()
-    force[where, axis] += change
-    return replace(state, contact_force=force)
-
 
 SURFACES = [Flat(friction=MU, y=0.0), Sinusoid(friction=MU, terms=[[0.1, 2.0, 0.4]], y=0.0)]
 surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"])
