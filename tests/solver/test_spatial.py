@@ -269,3 +269,73 @@ def test_the_tangent_knows_how_the_attraction_of_open_nodes_weakens(voltage):
     at = body.body.unknowns[model.pad.nodes[expected > 0.0]]
     assert_allclose(taken[at[:, 1]], expected[expected > 0.0], rtol=1e-6)
     assert_allclose(taken[at[:, [0, 2]]], 0.0, atol=1e-12)
+
+
+# -- each condition under every law, where all others hold ------------------------------------------------
+
+LAWS = {
+    "coulomb": None,
+    "load index": ev.LoadIndexFriction(pressure=0.3, index=0.7),
+    "adhesive": ev.AdhesiveFriction(strength=0.2),
+    "ageing": ev.AgeingFriction(fresh=0.4, time=1.0),
+    "rate": ev.RateFriction(speed=1.0, exponent=0.3),
+}
+MOVED, AT_REST, ASKEW = (0.003, 0.004), (0.0, 0.0), (0.6, 0.8)
+
+
+def turned(angle):
+    """Unit vector against `MOVED`, turned by an angle (rad)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return -np.array([[c, -s], [s, c]]) @ np.array(MOVED) / 0.005
+
+
+#: motion (mm) and status of a node, way of its shear and share of the law's bound, height above the
+#: surface (mm), and whether it obeys
+UNDER_LAWS = {
+    "slips": (MOVED, SLIP, turned(0.0), 1.0, 0.0, True),
+    "below": (MOVED, SLIP, turned(0.0), 0.999, 0.0, False),
+    "beyond": (MOVED, SLIP, turned(0.0), 1.001, 0.0, False),
+    "turned a little": (MOVED, SLIP, turned(0.01), 1.0, 0.0, False),
+    "turned a little back": (MOVED, SLIP, turned(-0.01), 1.0, 0.0, False),
+    "slips nowhere": (AT_REST, SLIP, ASKEW, 1.0, 0.0, True),
+    "slips nowhere, below": (AT_REST, SLIP, ASKEW, 0.9, 0.0, False),
+    "slips nowhere, beyond": (AT_REST, SLIP, ASKEW, 1.1, 0.0, False),
+    "sticks": (AT_REST, STICK, ASKEW, 0.99, 0.0, True),
+    "sticks beyond": (AT_REST, STICK, ASKEW, 1.001, 0.0, False),
+    "sticks and goes along x": ((1e-5, 0.0), STICK, ASKEW, 0.9, 0.0, False),
+    "sticks and goes along z": ((0.0, 1e-5), STICK, ASKEW, 0.9, 0.0, False),
+    "lifted": (MOVED, SLIP, turned(0.0), 1.0, 1e-5, False),
+    "sunk": (MOVED, SLIP, turned(0.0), 1.0, -1e-5, False),
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("case", UNDER_LAWS)
+def test_a_state_obeys_every_law_or_not(case, law):
+    moved, status, way, share, lift, obeys = UNDER_LAWS[case]
+    interface, old, new, node = touching(FLAT, [10.0, 0.0, 0.0], moved, status)
+    interface.law, interface.duration = LAWS[law], 0.5
+    # open before, so that contact is fresh
+    old = replace(old, age=np.full(old.status.size, 0.2), status=np.full_like(old.status, OPEN))
+    limit = 0.5 * 10.0
+    if LAWS[law] is not None:
+        area = interface.shares(new)[node]
+        speed = 0.005 / 0.5 if moved == MOVED else 0.0
+        limit = float(LAWS[law].bound(10.0 / area, 0.5, speed, 0.0) * area)
+    force, u = new.contact_force.copy(), new.u.copy()
+    force[node, 1:] = share * limit * np.asarray(way)
+    u[interface.pad.nodes[node], 1] += lift
+    assert interface.obeyed(old, replace(new, u=u, contact_force=force)) is obeys
+
+
+@pytest.mark.parametrize(("normal", "obeys"), [(1.0, True), (-1e-3, False)])
+def test_contact_does_not_pull(normal, obeys):
+    """Without friction, so that no cone is broken beside it."""
+    interface, old, new, _ = touching(ev.Flat(friction=0.0), [normal, 0.0, 0.0], MOVED, SLIP)
+    assert interface.obeyed(old, new) is obeys
+
+
+def test_attraction_in_space_is_vertical():
+    result = ev.simulate(dome_scene(ev.Press(indentation=0.05, steps=1)))
+    assert result.electrostatic_force[0] > 0.0
+    assert not result.electrostatic_force_x.any()
