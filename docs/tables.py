@@ -7,7 +7,8 @@ import textwrap
 from pathlib import Path
 
 from evfem.scene import schema as scenes
-from evfem.scene.schema import Key, Section
+from evfem.scene.schema import Entry as Key
+from evfem.scene.schema import Section
 from evfem.simulation.result import COLUMNS, MEANINGS, UNITS
 from evfem.sweeps import schema as sweeps
 

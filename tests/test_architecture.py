@@ -33,7 +33,7 @@ ROOMS = {
     ),
     "finger": (
         {"numpy", "PIL"},
-        "outline lattice layers scan section fingerpad blocks fingerprint solid fingertip",
+        "outline lattice layers sizes scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
@@ -54,8 +54,8 @@ ROOMS = {
         "equilibrium mirrored factorised relaxation path voltage stepping",
     ),
     "scene": (
-        {"numpy", "pydantic", "tomli_w"},
-        "motion terms driven fieldless scene written keys voltage meanings schema file resolution drift "
+        {"numpy", "tomli_w"},
+        "motion terms driven fieldless options scene written keys format schema file resolution drift "
         "partchecks parts sense fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (
@@ -64,7 +64,7 @@ ROOMS = {
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
-        {"numpy", "pydantic", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
+        {"numpy", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file units schema folder pools run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
@@ -264,7 +264,7 @@ def test_the_laws_load_neither_scikit_fem_nor_matplotlib():
         "ev.Kaczmarek().traction(0.1, 100.0, layers), ev.StrongTroxel(), ev.eps_0\n"
         "ev.NeoHookean(E=1.0, nu=0.3), ev.Sinusoid(), ev.VoltageProfile([0.0], [1.0])\n"
         "ev.Scene(ev.FingerPad(), ev.Display(), motion=[ev.Press(force=0.1)])\n"
-        "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio', 'pydantic'}\n"
+        "heavy = {'skfem', 'matplotlib', 'scipy.optimize', 'scipy.integrate', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     assert fresh_process(code) == "[]"
@@ -275,7 +275,7 @@ def test_a_press_loads_no_package_that_it_has_no_use_for():
         "import evfem as ev\n"
         "finger = ev.FingerPad(ridges=False, resolution='coarse')\n"
         "ev.simulate(ev.Scene(finger, ev.Flat(), motion=[ev.Press(indentation=0.05, steps=1)]))\n"
-        "heavy = {'pydantic', 'scipy.spatial', 'scipy.optimize', 'tqdm', 'matplotlib', 'meshio'}\n"
+        "heavy = {'scipy.spatial', 'scipy.optimize', 'tqdm', 'matplotlib', 'meshio'}\n"
         "print(sorted(heavy & set(sys.modules)))"
     )
     assert fresh_process(code) == "[]"

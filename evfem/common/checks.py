@@ -1,17 +1,19 @@
 """Checks of a user's input; each returns the clean value or raises InputError.
 
 First checks of single values (`real`, `count`, `choice`), then of numbers or arrays of numbers
-(`above`, `at_least`, `finite`), then rules that the fields of a dataclass carry and `check_fields`
-applies.
+(`above`, `at_least`, `finite`), then rules that the fields of a dataclass carry: `check_fields` applies
+them, and a scene file is read, written and described by them (`evfem.scene.keys`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, dataclass, fields
+from functools import cache
 from numbers import Integral, Real
-from typing import Any
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -38,15 +40,15 @@ def real(key: str, value: object, allowed: str, test: Callable[[float], bool] = 
     return number
 
 
-def count(key: str, value: object, most: int = MOST_STEPS) -> int:
-    """`value` as a whole number from 1 to `most`.
+def count(key: str, value: object, most: int = MOST_STEPS, least: int = 1, allowed: str = "") -> int:
+    """`value` as a whole number from `least` to `most`.
 
     >>> count("steps", 2.5)
     Traceback (most recent call last):
     evfem.errors.InputError: steps: given 2.5; allowed: a whole number from 1 to 1000000
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or not 1 <= int(value) <= most:
-        raise InputError(key, quoted(value), f"a whole number from 1 to {most}")
+    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
+        raise InputError(key, quoted(value), allowed or f"a whole number from {least} to {most}")
     return int(value)
 
 
@@ -128,68 +130,134 @@ class Within:
         return inside and not (self.not_zero and value == 0.0)
 
 
-def number(allowed: str, test: Callable[[float], bool]) -> dict[str, Any]:
-    """Metadata of a field that is a finite float and passes `test`; `allowed` says so in words."""
+def number(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
+    """Rule of a field that is a finite float and passes `test`; `allowed` says so in words."""
     check = lambda key, value: real(key, value, allowed, test)  # noqa: E731
-    return {"allowed": allowed, "check": check, "test": test}
+    return {"allowed": allowed, "check": check, "test": test, "unit": unit}
 
 
-def whole(most: int = MOST_STEPS) -> dict[str, Any]:
-    """Metadata of a field that is a whole number from 1 to `most`."""
-    check = lambda key, value: count(key, value, most)  # noqa: E731
-    return {"allowed": f"a whole number from 1 to {most}", "check": check, "test": Within(1, most)}
+def between(low: float, high: float, unit: str = "", *, of: str = "") -> dict[str, Any]:
+    """Rule of a field that is a number within a range; `of` says what its unit is a share of.
+
+    >>> between(12.0, 24.0, "mm")["allowed"]
+    '12 to 24 mm'
+    """
+    return number(f"{low:g} to {high:g} {of or unit}".rstrip(), Within(low, high), unit)
+
+
+def whole(most: int = MOST_STEPS, least: int = 1, allowed: str = "") -> dict[str, Any]:
+    """Rule of a field that is a whole number from `least` to `most`."""
+    allowed = allowed or f"a whole number from {least} to {most}"
+    check = lambda key, value: count(key, value, most, least, allowed)  # noqa: E731
+    return {"allowed": allowed, "check": check, "test": Within(least, most)}
 
 
 def one_of(*names: str) -> dict[str, Any]:
-    """Metadata of a field that is one of `names`."""
+    """Rule of a field that is one of `names`."""
     check = lambda key, value: choice(key, value, names)  # noqa: E731
     return {"allowed": " | ".join(names), "check": check, "names": names}
 
 
 def yes_or_no() -> dict[str, Any]:
-    """Metadata of a field that is True or False."""
+    """Rule of a field that is True or False."""
     return {"allowed": "true | false", "check": truth}
 
 
 def truth(key: str, value: object) -> bool:
     """`value` if it is True or False."""
-    if not isinstance(value, bool):
-        raise InputError(key, quoted(value), "true | false")
-    return value
-
-
-def switch() -> dict[str, Any]:
-    """Metadata of a field that is on or off."""
-    return {"allowed": "true | false", "check": _on_or_off}
-
-
-def _on_or_off(key: str, value: object) -> bool:
     if not isinstance(value, (bool, np.bool_)):
-        raise InputError(key, value, "true | false")
+        raise InputError(key, quoted(value), "true | false")
     return bool(value)
 
 
-def check_fields(target: Any) -> None:
-    """Check and store every field of a frozen dataclass that has a rule; a default None may stay
-    None. All mistakes are reported at once.
+def instance(allowed: str, *classes: Any, unit: str = "") -> dict[str, Any]:
+    """Rule of a field that is of one of these classes."""
 
-    >>> from dataclasses import dataclass, field
-    >>> @dataclass(frozen=True)
-    ... class Hover:
-    ...     gap: float = field(metadata=number("a gap in mm, not negative", lambda gap: gap >= 0))
-    ...
-    ...     def __post_init__(self):
-    ...         check_fields(self)
+    def check(key: str, value: Any) -> Any:
+        if not isinstance(value, classes) or (isinstance(value, bool) and bool not in classes):
+            raise InputError(key, quoted(value), allowed)
+        return value
+
+    return {"allowed": allowed, "check": check, "unit": unit}
+
+
+@dataclass(frozen=True)
+class Key:
+    """What a field of a dataclass is to who sets it: the type and the default of the field, and from its
+    annotation `Annotated[type, rule, meaning]` the rule it obeys and what it means, in words.
+
+    A rule has what is `allowed`, in words, and where there is one the `check` of a value, its `test` or
+    `names` to choose from, and its `unit`; where a file has it otherwise, its `key` and `type` there.
+    """
+
+    field: str
+    annotation: Any
+    default: Any
+    rule: Mapping[str, Any]
+    meaning: str
+
+    @property
+    def name(self) -> str:
+        """How a file calls it."""
+        return str(self.rule.get("key", self.field))
+
+    @property
+    def required(self) -> bool:
+        """Whether it must be given."""
+        return self.default is MISSING
+
+    @property
+    def types(self) -> tuple[Any, ...]:
+        """What a value in a file may be; there is no None in a file."""
+        given = self.rule.get("type", self.annotation)
+        union = isinstance(given, UnionType) or get_origin(given) is Union
+        return tuple(one for one in (get_args(given) if union else (given,)) if one is not NoneType)
+
+
+@cache
+def fields_of(cls: type) -> tuple[Key, ...]:
+    """The fields of a dataclass that its constructor takes, whether they say what they mean or not."""
+    hints, found = get_type_hints(cls, include_extras=True), []
+    for spec in fields(cls):
+        about = getattr(hints[spec.name], "__metadata__", ())
+        rule = dict(spec.metadata).copy()
+        for one in about:
+            rule |= one if isinstance(one, dict) else {}
+        annotation = getattr(hints[spec.name], "__origin__", None) if about else hints[spec.name]
+        default = spec.default if spec.default_factory is MISSING else spec.default_factory()
+        words = [one for one in about if isinstance(one, str)]
+        if spec.init:
+            found.append(Key(spec.name, annotation, default, rule, words[-1] if words else ""))
+    return tuple(found)
+
+
+def keys_of(cls: type) -> tuple[Key, ...]:
+    """The fields of a dataclass that say what they mean: the keys of its table in a file.
+
+    >>> from evfem.scene.motion import Hover
+    >>> key, _ = keys_of(Hover)
+    >>> key.name, key.rule["unit"], key.meaning, key.required
+    ('gap', 'mm', 'of the undeformed outline to the surface', True)
+    """
+    return tuple(key for key in fields_of(cls) if key.meaning)
+
+
+def check_fields(target: Any, prefix: str = "") -> None:
+    """Check and store every field of a frozen dataclass that has a rule; a default None may stay
+    None. All mistakes are reported at once, under `prefix`.
+
+    >>> from evfem.scene.motion import Hover
     >>> Hover(1).gap
     1.0
     >>> Hover(-1)
     Traceback (most recent call last):
-    evfem.errors.InputError: gap: given -1; allowed: a gap in mm, not negative
+    evfem.errors.InputError: gap: given -1; allowed: a gap in mm from 0 to 200
     """
     mistakes = Mistakes()
-    for spec in fields(target):
-        value = getattr(target, spec.name)
-        if "check" in spec.metadata and not (value is None and spec.default is None):
-            with mistakes.of_a_part():
-                set_frozen(target, **{spec.name: spec.metadata["check"](spec.name, value)})
+    cls: Any = type(target)
+    for key in fields_of(cls):
+        if "check" not in key.rule or ((value := getattr(target, key.field)) is None and key.default is None):
+            continue
+        with mistakes.of_a_part():
+            set_frozen(target, **{key.field: key.rule["check"](prefix + key.name, value)})
     mistakes.report()

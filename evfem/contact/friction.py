@@ -26,8 +26,8 @@ doi:10.1073/pnas.1706233114 (the real area grows to 95 % within about 20 s). Uni
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
@@ -41,9 +41,13 @@ from evfem.tensor import derivative
 LOWEST = 0.01
 #: steps of differences of a law that drops imaginary parts: in MPa, of a coefficient, in mm/s
 PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
-_PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
-_SPEED = number("a speed in mm/s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
+_PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
+_SPEED = number("a speed in mm/s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "mm/s")
 _SHARE = number("a share from 0 to 1", Within(0.0, 1.0))
+_INDEX = number("an exponent from 0.1 to 3", Within(0.1, 3.0))
+_RATIO = number("a ratio from 0 to 100", Within(0.0, 100.0))
+_EXPONENT = number("an exponent from -2 to 2", Within(-2.0, 2.0))
+_TIME = number("a time in s, larger than 0", Within(0.0, 1e6, above=True), "s")
 
 
 @dataclass(frozen=True)
@@ -72,9 +76,11 @@ class LoadIndexFriction:
     True
     """
 
-    pressure: float = field(metadata=_PRESSURE)
-    index: float = field(metadata=number("an exponent from 0.1 to 3", Within(0.1, 3.0)))
-    lowest: float | None = field(default=None, metadata=_PRESSURE)
+    pressure: Annotated[float, _PRESSURE, "contact pressure at which the coefficient is that of the surface"]
+    index: Annotated[float, _INDEX, "the force grows with this power of the load"]
+    lowest: Annotated[
+        float | None, _PRESSURE, "below it the coefficient stays; without it a hundredth of the pressure"
+    ] = None
     kind = "load_index"
     timed = False
 
@@ -96,8 +102,14 @@ class AdhesiveFriction:
     [0.0026, 0.007]
     """
 
-    strength: float = field(metadata=_PRESSURE)
-    full: float | None = field(default=None, metadata=_PRESSURE)
+    strength: Annotated[
+        float, _PRESSURE, "shear traction that every place in real contact carries beside mu p"
+    ]
+    full: Annotated[
+        float | None,
+        _PRESSURE,
+        "contact pressure at which real contact is complete; without it the strength",
+    ] = None
     kind = "adhesive"
     timed = False
 
@@ -124,10 +136,12 @@ class RateFriction:
     [0.004, 0.008]
     """
 
-    speed: float = field(metadata=_SPEED)
-    ratio: float = field(default=1.0, metadata=number("a ratio from 0 to 100", Within(0.0, 100.0)))
-    exponent: float = field(default=0.0, metadata=number("an exponent from -2 to 2", Within(-2.0, 2.0)))
-    slowest: float | None = field(default=None, metadata=_SPEED)
+    speed: Annotated[float, _SPEED, "at which friction of sliding differs from that of sticking"]
+    ratio: Annotated[float, _RATIO, "friction of fast sliding over that of sticking"] = 1.0
+    exponent: Annotated[float, _EXPONENT, "friction goes with this power of speed over that speed"] = 0.0
+    slowest: Annotated[
+        float | None, _SPEED, "below it that power stays; without it a hundredth of the speed"
+    ] = None
     kind = "rate"
     timed = True
 
@@ -152,10 +166,8 @@ class AgeingFriction:
     [0.001, 0.0048]
     """
 
-    fresh: float = field(metadata=_SHARE)
-    time: float = field(
-        default=6.7, metadata=number("a time in s, larger than 0", Within(0.0, 1e6, above=True))
-    )
+    fresh: Annotated[float, _SHARE, "share of the friction that a place has when it touches"]
+    time: Annotated[float, _TIME, "time constant of the rest"] = 6.7
     kind = "ageing"
     timed = True
 

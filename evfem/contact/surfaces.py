@@ -16,11 +16,11 @@ from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 import numpy as np
 
-from evfem.common.checks import real, set_frozen
+from evfem.common.checks import Within, check_fields, number, real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Layer
@@ -46,6 +46,18 @@ FARTHEST, HIGHEST, FASTEST, ROUGHEST, NEAREST = 1e6, 1e3, 1e6, 100.0, 1e-9
 EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi / 2))
 
 
+Friction = Annotated[
+    float | Rows,
+    {"allowed": FRICTION, "type": float | list[list[float]]},
+    "Coulomb's coefficient, or its table over x (mm), linear in between",
+]
+Shift = Annotated[
+    float | None,
+    number("a height in mm, within 1e3 mm", Within(-HIGHEST, HIGHEST), "mm"),
+    "shift of the profile; without it the finger just touches at the start",
+]
+
+
 class RigidSurface:
     """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
     `insulator`.
@@ -58,9 +70,7 @@ class RigidSurface:
 
     def _check_common(self) -> None:
         set_frozen(self, friction=_friction(self.friction))
-        if self.y is not None:
-            allowed = "a height within 1e3 mm, or None for first touch at the start"
-            set_frozen(self, y=real("surface.y", self.y, allowed, lambda y: abs(y) <= HIGHEST))
+        check_fields(self, "surface.")
         if not (self.insulator is None or isinstance(self.insulator, Layer)):
             raise InputError("surface.insulator", quoted(self.insulator), "Layer(thickness, eps_r), or None")
 
@@ -160,8 +170,8 @@ class Flat(_Level):
     [0.0, 0.0]
     """
 
-    friction: float | Rows = 0.3
-    y: float | None = None
+    friction: Friction = 0.3
+    y: Shift = None
     insulator: Layer | None = None
 
     def __post_init__(self) -> None:
@@ -182,8 +192,8 @@ class Display(_Level):
     """
 
     insulator: Layer | None = FILM
-    friction: float | Rows = 0.3
-    y: float | None = None
+    friction: Friction = 0.3
+    y: Shift = None
     electrodes: Rows | None = None
 
     def __post_init__(self) -> None:
@@ -209,9 +219,13 @@ class Sinusoid(RigidSurface):
     0.0
     """
 
-    friction: float | Rows = 0.3
-    terms: Rows | None = None
-    y: float | None = None
+    friction: Friction = 0.3
+    terms: Annotated[
+        Rows | None,
+        {"allowed": TERMS, "type": list[list[float]]},
+        "sum of a sin(k x + phase); without it eq. (25) of the paper",
+    ] = None
+    y: Shift = None
     insulator: Layer | None = None
 
     def __post_init__(self) -> None:
@@ -258,8 +272,8 @@ class Profile(RigidSurface):
 
     x: Array
     samples: Array
-    friction: float | Rows = 0.3
-    y: float | None = None
+    friction: Friction = 0.3
+    y: Shift = None
     insulator: Layer | None = None
 
     def __init__(

@@ -20,19 +20,34 @@ from __future__ import annotations
 import random
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import real, set_frozen
-from evfem.contact.surfaces import FARTHEST, HIGHEST, MOST_TERMS, RigidSurface, Rows, Sinusoid
+from evfem.common.checks import Within, number, real, set_frozen, whole
+from evfem.contact.surfaces import FARTHEST, HIGHEST, MOST_TERMS, Friction, RigidSurface, Shift, Sinusoid
 from evfem.electrostatics.laws import Layer
-from evfem.errors import InputError, quoted
+from evfem.errors import InputError
 from evfem.tensor import Array
 
 #: shortest length of a texture (mm), and largest seed
 FINEST, LARGEST_SEED = 1e-6, 2**63 - 1
 #: a wall's share of the narrower one of ridge and groove where nothing is said
 WALL = 0.5
+
+
+def _length(most: float) -> dict[str, Any]:
+    return number(f"a length in mm from {FINEST:g} to {most:g}", Within(FINEST, most), "mm")
+
+
+# those whose bounds depend on others are checked where all are known
+_GROOVE = {"allowed": "a width in mm at half depth, below the period", "unit": "mm"}
+_WALL = {"allowed": "a width in mm up to that of ridge and groove", "unit": "mm"}
+_SHORTEST = {"allowed": "a wavelength in mm up to the longest", "unit": "mm"}
+_LONGEST = {"allowed": "a wavelength in mm up to the period", "unit": "mm"}
+_PHASE = number("a part of the period, -1 to 1", Within(-1.0, 1.0), "periods")
+_HURST = number("a Hurst exponent from 0 to 1", Within(0.0, 1.0))
+_SEED = whole(LARGEST_SEED, 0, "a whole number, not negative")
 
 
 @dataclass(frozen=True)
@@ -52,19 +67,20 @@ class Grating(RigidSurface):
     evfem.errors.InputError: surface.wall_width: given 0.6; allowed: a width in mm up to 0.5, ridge and groove being 0.5 and 0.5 wide
     """  # noqa: E501
 
-    period: float
-    groove_depth: float
-    groove_width: float | None = None
-    wall_width: float | None = None
-    phase: float = 0.0
-    friction: float | Rows = 0.3
-    y: float | None = None
+    period: Annotated[float, _length(FARTHEST), "after which the surface repeats"]
+    groove_depth: Annotated[float, _length(HIGHEST), "of the grooves below the ridges"]
+    groove_width: Annotated[float | None, _GROOVE, "at half depth; without it half the period"] = None
+    wall_width: Annotated[
+        float | None, _WALL, "part of x that a wall takes; without it half of ridge or groove"
+    ] = None
+    phase: Annotated[float, _PHASE, "place of a ridge's middle"] = 0.0
+    friction: Friction = 0.3
+    y: Shift = None
     insulator: Layer | None = None
 
     def __post_init__(self) -> None:
         self._check_common()
-        period = _length("period", self.period, FARTHEST)
-        depth = _length("groove_depth", self.groove_depth, HIGHEST)
+        period = self.period
         groove = 0.5 * period if self.groove_width is None else self.groove_width
         allowed = f"a width in mm above 0 and below the period, {period:g}"
         groove = real("surface.groove_width", groove, allowed, lambda width: 0.0 < width < period)
@@ -73,8 +89,7 @@ class Grating(RigidSurface):
         widths = f"ridge and groove being {period - groove:g} and {groove:g} wide"
         allowed = f"a width in mm up to {narrower:g}, {widths}"
         wall = real("surface.wall_width", wall, allowed, lambda width: FINEST <= width <= narrower)
-        phase = real("surface.phase", self.phase, "a part of the period, -1 to 1", lambda p: abs(p) <= 1.0)
-        set_frozen(self, period=period, groove_depth=depth, groove_width=groove, wall_width=wall, phase=phase)
+        set_frozen(self, groove_width=groove, wall_width=wall)
 
     def _wall(self, x: Array) -> tuple[Array, Array, Array]:
         """Place s (...) on the wall, 0 on ridges and 1 in grooves, whether it is on a wall, and
@@ -124,34 +139,26 @@ class SelfAffine(RigidSurface):
     (50, '0.010000')
     """
 
-    hurst: float
-    rms: float
-    period: float = 10.0
-    shortest: float = 0.2
-    longest: float | None = None
-    seed: int = 0
-    friction: float | Rows = 0.3
-    y: float | None = None
+    hurst: Annotated[float, _HURST, "Hurst exponent"]
+    rms: Annotated[float, _length(HIGHEST), "root mean square height"]
+    period: Annotated[float, _length(FARTHEST), "after which the surface repeats"] = 10.0
+    shortest: Annotated[float, _SHORTEST, "shortest wave"] = 0.2
+    longest: Annotated[float | None, _LONGEST, "longest wave; without it the period"] = None
+    seed: Annotated[int, _SEED, "the same seed gives the same surface"] = 0
+    friction: Friction = 0.3
+    y: Shift = None
     insulator: Layer | None = None
 
     def __post_init__(self) -> None:
         self._check_common()
-        hurst = real("surface.hurst", self.hurst, "a Hurst exponent from 0 to 1", lambda h: 0.0 <= h <= 1.0)
-        set_frozen(self, hurst=hurst, rms=_length("rms", self.rms, HIGHEST))
-        period = _length("period", self.period, FARTHEST)
+        period = self.period
         longest = period if self.longest is None else self.longest
         longest = real(
             "surface.longest", longest, f"a wavelength in mm up to the period, {period:g}", _within(period)
         )
         allowed = f"a wavelength in mm up to the longest, {longest:g}"
         shortest = real("surface.shortest", self.shortest, allowed, _within(longest))
-        set_frozen(self, period=period, longest=longest, shortest=shortest)
-        if (
-            isinstance(self.seed, bool)
-            or not isinstance(self.seed, int)
-            or not 0 <= self.seed <= LARGEST_SEED
-        ):
-            raise InputError("surface.seed", quoted(self.seed), "a whole number, not negative")
+        set_frozen(self, longest=longest, shortest=shortest)
         if not 1 <= len(self._waves) <= MOST_TERMS:
             given = f"{len(self._waves)} waves between {longest:g} and {shortest:g} mm"
             raise InputError("surface.shortest", given, f"1 to {MOST_TERMS} waves that fit into the period")
@@ -191,11 +198,6 @@ class SelfAffine(RigidSurface):
     def curvature(self, x: Array) -> Array:
         """Second derivative (1/mm) of the height at x (mm)."""
         return self._sines.curvature(x)
-
-
-def _length(name: str, value: object, most: float) -> float:
-    allowed = f"a length in mm from {FINEST:g} to {most:g}"
-    return real(f"surface.{name}", value, allowed, lambda length: FINEST <= length <= most)
 
 
 def _within(most: float):  # type: ignore[no-untyped-def]

@@ -19,8 +19,8 @@ Resolved in time, the voltage of the moment charges the skin, the gap leaks
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -39,7 +39,7 @@ from evfem.common.checks import (
 from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric
 from evfem.electrostatics.laws import Layer, Layers, traction_derivative
 from evfem.electrostatics.relaxation import seen_at
-from evfem.electrostatics.timesignals import FASTEST, Sampled, Sine, Square
+from evfem.electrostatics.timesignals import FREQUENCY, Sampled, Sine, Square
 from evfem.protocols import ForceLaw, TimeSignal
 
 WAVEFORMS = ("sine", "square")
@@ -50,8 +50,19 @@ SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
 #: orders of samples that repeat: at least so many, and so many times the samples of a period
 SMOOTH, PERIODS = 4096, 8
 
-_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
-_CONDUCTIVITY = number("a conductivity in S/m, not negative", Within(0.0))
+# keys that a scene file has beside others in [electrostatics]
+DriveFrequency = Annotated[float | None, FREQUENCY, "of the alternating voltage; without it a direct one"]
+Waveform = Annotated[str, one_of(*WAVEFORMS), "of the alternating voltage"]
+Skin = Annotated[
+    Any,
+    {"allowed": f"{' | '.join(SKINS)} | the path of a csv file", "type": str},
+    "dielectric of the stratum corneum; without it stratum_corneum_eps_r",
+]
+Conductivity = Annotated[
+    float,
+    number("a conductivity in S/m, not negative", Within(0.0), "S/m"),
+    "of what fills the gap: the leak",
+]
 
 
 @dataclass(frozen=True)
@@ -70,11 +81,13 @@ class Drive:
     70.71067811865476
     """
 
-    frequency: float | None = field(default=None, metadata=_FREQUENCY)
-    waveform: str = field(default="sine", metadata=one_of(*WAVEFORMS))
-    skin: Any = None
-    gap_conductivity: float = field(default=0.0, metadata=_CONDUCTIVITY)
-    resolved: bool = field(default=False, metadata=yes_or_no())
+    frequency: DriveFrequency = None
+    waveform: Waveform = "sine"
+    skin: Skin = None
+    gap_conductivity: Conductivity = 0.0
+    resolved: Annotated[
+        bool, yes_or_no(), "attraction by its mean over the cycle, or resolved in time with its charges"
+    ] = False
 
     def __post_init__(self) -> None:
         check_fields(self)

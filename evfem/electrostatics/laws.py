@@ -29,13 +29,14 @@ broadcast, real or complex (for derivatives by complex step); scalars give a flo
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Values, above, at_least, finite, plain
+from evfem.common.checks import Values, Within, above, at_least, finite, plain
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
@@ -47,6 +48,7 @@ GAP_STEP = 1e-5
 
 __all__ = [
     "FILM",
+    "FORCE_LAWS",
     "INSULATORS",
     "TOUCHSCREEN",
     "Kaczmarek",
@@ -163,6 +165,13 @@ def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Val
     return near, far
 
 
+GapPermittivity = Annotated[
+    float,
+    {"allowed": "a relative permittivity, at least 1", "test": Within(1.0)},
+    "relative permittivity of what fills the gap",
+]
+
+
 def _check_medium(gap_eps_r: float) -> None:
     at_least("gap_eps_r", gap_eps_r, 1.0, "the relative permittivity of the gap, at least 1")
 
@@ -180,7 +189,7 @@ class StrongTroxel:
     24.1
     """
 
-    gap_eps_r: float = 1.0
+    gap_eps_r: GapPermittivity = 1.0
 
     def __post_init__(self) -> None:
         _check_medium(self.gap_eps_r)
@@ -247,7 +256,7 @@ class Kaczmarek:
     1.39
     """
 
-    gap_eps_r: float = 1.0
+    gap_eps_r: GapPermittivity = 1.0
 
     def __post_init__(self) -> None:
         _check_medium(self.gap_eps_r)
@@ -283,6 +292,10 @@ class Kaczmarek:
             lossy = q * share - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
             share = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
         return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * share)
+
+
+#: force laws by their names in a scene file
+FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:

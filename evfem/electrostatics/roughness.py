@@ -24,8 +24,8 @@ A part of one's own needs `separation(pressure)` (`evfem.protocols.RoughnessLaw`
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -37,10 +37,11 @@ from evfem.tensor import derivative
 #: step of differences of a law by its pressure (MPa)
 PRESSURE_STEP = 1e-7
 WIDEST = 1.0
-_GAP = number(f"a length in mm from 0 to {WIDEST:g}", Within(0.0, WIDEST))
-_OPEN = number(f"a length in mm, larger than 0, up to {WIDEST:g}", Within(0.0, WIDEST, above=True))
-_PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
+_GAP = number(f"a length in mm from 0 to {WIDEST:g}", Within(0.0, WIDEST), "mm")
+_OPEN = number(f"a length in mm, larger than 0, up to {WIDEST:g}", Within(0.0, WIDEST, above=True), "mm")
+_PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
 _EXPONENT = number("an exponent, larger than 0, up to 10", Within(0.0, 10.0, above=True))
+OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no bound"]
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ class ConstantRoughness:
     [0.001, 0.001]
     """
 
-    gap: float = field(metadata=_GAP)
+    gap: Annotated[float, _GAP, "at every pressure"]
     law = "constant"
 
     def __post_init__(self) -> None:
@@ -76,10 +77,10 @@ class PowerRoughness:
     [0.006, 0.001, 0.0005]
     """
 
-    gap: float = field(metadata=_OPEN)
-    pressure: float = field(metadata=_PRESSURE)
-    exponent: float = field(metadata=_EXPONENT)
-    open_gap: float = field(metadata=_OPEN)
+    gap: Annotated[float, _OPEN, "at that pressure"]
+    pressure: Annotated[float, _PRESSURE, "contact pressure of that gap"]
+    exponent: Annotated[float, _EXPONENT, "gap (p / pressure)^-exponent"]
+    open_gap: OpenGap
     law = "power"
 
     def __post_init__(self) -> None:
@@ -114,9 +115,9 @@ class ExponentialRoughness:
     [0.008, 0.002, 0.0]
     """
 
-    decay: float = field(metadata=_OPEN)
-    pressure: float = field(metadata=_PRESSURE)
-    open_gap: float = field(metadata=_OPEN)
+    decay: Annotated[float, _OPEN, "by which it falls for every factor e of the pressure"]
+    pressure: Annotated[float, _PRESSURE, "contact pressure of full contact"]
+    open_gap: OpenGap
     law = "exponential"
 
     def __post_init__(self) -> None:

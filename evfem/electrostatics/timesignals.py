@@ -18,17 +18,28 @@ motions that take none. Any object with the methods of `evfem.protocols.TimeSign
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Values, Within, above, check_fields, number, plain, real, set_frozen
+from evfem.common.checks import (
+    Values,
+    Within,
+    above,
+    check_fields,
+    number,
+    plain,
+    real,
+    set_frozen,
+    yes_or_no,
+)
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, read_columns
 from evfem.electrostatics import wav
-from evfem.errors import ABSENT, InputError, quoted
+from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 
 HEADER = ["time", "voltage"]
@@ -43,14 +54,17 @@ FLIP = 1e-9
 #: largest difference of two spacings of evenly spaced times, as a share of the spacing
 EVEN = 1e-3
 
-_FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
-_AMPLITUDE = number(f"a voltage in V from 0 to {LARGEST:g}", Within(0.0, LARGEST))
-_BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-LARGEST, LARGEST))
-_PHASE = number("a phase in rad", Within())
-_RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True))
-_START = number("a time in s", Within())
+FREQUENCY = number(f"a frequency in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True), "Hz")
+_AMPLITUDE = number(f"a voltage in V from 0 to {LARGEST:g}", Within(0.0, LARGEST), "V")
+_BIAS = number(f"a voltage in V between -{LARGEST:g} and {LARGEST:g}", Within(-LARGEST, LARGEST), "V")
+_PHASE = number("a phase in rad", Within(), "rad")
+RATE = number(f"a rate in Hz, above 0, up to {FASTEST:g}", Within(0.0, FASTEST, above=True), "Hz")
+START = number("a time in s", Within(), "s")
 _CHARGE = "a charge in nC per mm of depth, or a signal in time that is called with times"
 _ENVELOPE = "a voltage in V, or a signal in time that is called with times"
+_NUMBER_OR_SIGNAL = {"type": float | dict, "kinds": lambda: SIGNALS, "tag": "kind"}
+Frequency = Annotated[float, FREQUENCY, "of the sine, square wave or carrier"]
+Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 
 @dataclass(frozen=True)
@@ -61,10 +75,10 @@ class Sine:
     120.0
     """
 
-    frequency: float = field(metadata=_FREQUENCY)
-    amplitude: float = field(metadata=_AMPLITUDE)
-    bias: float = field(default=0.0, metadata=_BIAS)
-    phase: float = field(default=0.0, metadata=_PHASE)
+    frequency: Frequency
+    amplitude: Amplitude
+    bias: Annotated[float, _BIAS, "mean voltage"] = 0.0
+    phase: Annotated[float, _PHASE, "at time 0"] = 0.0
     kind = "sine"
 
     def __post_init__(self) -> None:
@@ -95,8 +109,8 @@ class Square:
     [100.0, 100.0, -100.0, 100.0]
     """
 
-    frequency: float = field(metadata=_FREQUENCY)
-    amplitude: float = field(metadata=_AMPLITUDE)
+    frequency: Frequency
+    amplitude: Amplitude
     kind = "square"
 
     def __post_init__(self) -> None:
@@ -127,8 +141,8 @@ class OpenCircuit:
     100.0
     """
 
-    voltage: float = field(metadata=_BIAS)
-    after: float = field(default=0.0, metadata=_START)
+    voltage: Annotated[float, _BIAS, "of the source"]
+    after: Annotated[float, START, "when the electrode is disconnected"] = 0.0
     highest_frequency = 0.0
     kind = "open_circuit"
 
@@ -156,7 +170,11 @@ class ChargeControl:
     0.02
     """
 
-    charge: Any = field(metadata={"allowed": _CHARGE})
+    charge: Annotated[
+        Any,
+        {"allowed": "a charge in nC/mm, or a signal of charges", "unit": "nC/mm", **_NUMBER_OR_SIGNAL},
+        "of the electrode, per mm of depth: a number, or a signal of charges",
+    ]
     kind = "charge"
 
     def __post_init__(self) -> None:
@@ -201,9 +219,13 @@ class Carrier:
     (70.711, 75.0)
     """
 
-    frequency: float = field(metadata=_FREQUENCY)
-    envelope: Any = field(metadata={"allowed": _ENVELOPE})
-    resolved: bool = True
+    frequency: Frequency
+    envelope: Annotated[
+        Any,
+        {"allowed": "a voltage in V, or a signal", "unit": "V", **_NUMBER_OR_SIGNAL},
+        "height of the carrier: a number, or a signal that modulates it",
+    ]
+    resolved: Annotated[bool, yes_or_no(), "false: the root mean square over its cycles"] = True
     kind = "carrier"
 
     def __post_init__(self) -> None:
@@ -211,8 +233,6 @@ class Carrier:
         if not isinstance(self.envelope, TimeSignal):
             envelope = real("envelope", self.envelope, _ENVELOPE, Within(0.0, LARGEST))
             set_frozen(self, envelope=envelope)
-        if not isinstance(self.resolved, bool):
-            raise InputError("resolved", quoted(self.resolved), "true or false")
 
     @property
     def largest(self) -> float:
@@ -249,10 +269,10 @@ class Sampled:
     50.0
     """
 
-    voltage: Any
-    rate: float = field(metadata=_RATE)
-    start: float = field(default=0.0, metadata=_START)
-    repeat: bool = False
+    voltage: Annotated[Any, {"unit": "V"}, "the samples"]
+    rate: Annotated[float, RATE, "of the samples"]
+    start: Annotated[float, START, "time of the first sample"] = 0.0
+    repeat: Annotated[bool, yes_or_no(), "whether it begins anew at its end"] = False
     kind = "sampled"
 
     def __post_init__(self) -> None:
@@ -262,8 +282,6 @@ class Sampled:
             raise InputError("voltage", f"{voltage.size} samples", f"1 to {MOST_ROWS} samples")
         if np.abs(voltage).max() > LARGEST:
             raise InputError("voltage", f"{voltage[np.argmax(np.abs(voltage))]:g}", _BIAS["allowed"])
-        if not isinstance(self.repeat, bool):
-            raise InputError("repeat", quoted(self.repeat), "true or false")
         set_frozen(self, voltage=voltage)
 
     def __repr__(self) -> str:
@@ -337,3 +355,9 @@ class Sampled:
         time = self.start + np.arange(self.voltage.size) / self.rate
         rows = (f"{t!r},{u!r}\n" for t, u in zip(time.tolist(), self.voltage.tolist(), strict=True))
         write_text(path, ",".join(HEADER) + "\n" + "".join(rows))
+
+
+#: kinds of signals in a file
+SIGNALS: Mapping[str, Any] = {
+    cls.kind: cls for cls in (Sine, Square, Carrier, Sampled, OpenCircuit, ChargeControl)
+}

@@ -11,46 +11,61 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from numbers import Integral
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem import data
-from evfem.common.checks import Within, choice, real, set_frozen
+from evfem.common.checks import (
+    Within,
+    check_fields,
+    choice,
+    instance,
+    number,
+    one_of,
+    set_frozen,
+    yes_or_no,
+)
 from evfem.common.views import called, changed, short, table
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
+from evfem.finger.sizes import (
+    BoneHeight,
+    BoneOffset,
+    BoneWidth,
+    Dermis,
+    Epidermis,
+    Height,
+    NailThickness,
+    NailWidth,
+    RidgeCrest,
+    RidgeExponent,
+    RidgeGroove,
+    RidgeHeight,
+    RidgePhase,
+    RidgeWidth,
+    StratumCorneum,
+    Viscosity,
+    Width,
+)
 from evfem.mesh import file as meshfile
+from evfem.mesh.formats import LARGEST
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
 from evfem.protocols import Material
-from evfem.tissue.laws import NeoHookean
+from evfem.tissue.laws import LAWS, NeoHookean
 
-#: parameter of `FingerPad` -> lowest and highest value, and its unit.
-RANGES: Mapping[str, tuple[float, float, str]] = {
-    "width": (12.0, 24.0, " mm"),
-    "height": (9.0, 20.0, " mm"),
-    "ridge_height": (0.02, 0.4, " mm"),
-    "ridge_width": (0.3, 0.8, " mm"),
-    "ridge_exponent": (2.0, 16.0, ""),
-    "ridge_phase": (-1.0, 1.0, " pitches"),
-    "ridge_crest": (0.0, 0.9, " of the pitch"),
-    "ridge_groove": (0.0, 0.5, " of the pitch"),
-    **{
-        layer.parameter: (layer.thickness.lowest, layer.thickness.highest, " mm")
-        for layer in (*LAYERS, NAIL)
-        if layer.thickness
-    },
-    "nail_width": (4.0, 18.0, " mm"),
-    "bone_width": (2.0, 12.0, " mm"),
-    "bone_height": (2.0, 10.0, " mm"),
-    "bone_offset": (-1.0, 3.0, " mm"),
-    "viscosity": (0.0, 1e3, " s"),
-}
+Materials = Annotated[
+    Mapping[str, Material],
+    {"allowed": "a table [finger.materials.NAME]", "kinds": lambda: LAWS, "tag": "law"},
+    "laws of regions that are not to have Table 2's",
+]
+Skin = Annotated["Electrical", {"allowed": "a table [finger.electrical]"}, "the dielectric skin"]
 #: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, the
 #: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
 #: inverse.
@@ -78,6 +93,21 @@ RESOLUTIONS: Mapping[str, Divisions] = {
     "fine": Divisions(24, (("epidermis", 0), ("dermis", -1)), side=9, upper=9, nail=18),
 }
 
+_SCAN = str | dict[str, list[float]]
+_MESH = instance("the path of a mesh file", str, os.PathLike, Mesh)
+_MESH |= {"key": "mesh", "type": str, "file": LARGEST}
+_REGIONS: dict[str, Any] = {"allowed": "a table name = number"}
+
+
+def _regions(key: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
+    for region in given.values():
+        if isinstance(region, bool) or not isinstance(region, Integral):
+            raise InputError(key, quoted(region), _REGIONS["allowed"])
+    return given
+
+
+_REGIONS["check"] = _regions
+
 
 @dataclass(frozen=True)
 class Electrical:
@@ -86,19 +116,17 @@ class Electrical:
     `stratum_corneum_thickness` in mm; None: the local thickness of that region of the mesh.
     """
 
-    stratum_corneum_thickness: float | None = None
-    stratum_corneum_eps_r: float = 1650.0
+    stratum_corneum_thickness: Annotated[
+        float | None,
+        number("a thickness in mm, larger than 0, up to 10", Within(0.0, 10.0, above=True), "mm"),
+        "without it the region's local thickness",
+    ] = None
+    stratum_corneum_eps_r: Annotated[
+        float, number("a relative permittivity, at least 1", Within(1.0, 1e9)), "relative permittivity"
+    ] = 1650.0
 
     def __post_init__(self) -> None:
-        thickness, eps_r = (
-            "finger.electrical.stratum_corneum_thickness",
-            "finger.electrical.stratum_corneum_eps_r",
-        )
-        if self.stratum_corneum_thickness is not None:
-            real(
-                thickness, self.stratum_corneum_thickness, "a thickness up to 10 mm", lambda d: 0.0 < d < 10.0
-            )
-        real(eps_r, self.stratum_corneum_eps_r, "a number of at least 1", lambda eps: 1.0 <= eps < 1e9)
+        check_fields(self, "finger.electrical.")
 
 
 @dataclass(frozen=True)
@@ -148,38 +176,38 @@ class FingerPad:
     evfem.errors.InputError: finger.ridge_height: given 0.5; allowed: 0.02 to 0.4 mm
     """
 
-    width: float = 16.68
-    height: float = 12.79
-    ridges: bool = True
-    ridge_height: float = 0.15
-    ridge_width: float = 0.50
-    ridge_exponent: float = 7.0
-    ridge_phase: float = 0.0
-    ridge_crest: float = 0.0
-    ridge_groove: float = 0.0
-    ridge_scan: RidgeScan | str | os.PathLike[str] | None = None
+    width: Width = 16.68
+    height: Height = 12.79
+    ridges: Annotated[bool, yes_or_no(), "whether there are fingerprint ridges"] = True
+    ridge_height: RidgeHeight = 0.15
+    ridge_width: RidgeWidth = 0.50
+    ridge_exponent: RidgeExponent = 7.0
+    ridge_phase: RidgePhase = 0.0
+    ridge_crest: RidgeCrest = 0.0
+    ridge_groove: RidgeGroove = 0.0
+    ridge_scan: Annotated[
+        RidgeScan | str | os.PathLike[str] | None,
+        {"allowed": "the path of a csv file with the header x,height or x,y", "type": _SCAN, "file": True},
+        "ridges as they were scanned",
+    ] = None
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
-    stratum_corneum_thickness: float = thickness_of("stratum_corneum")
-    epidermis_thickness: float = thickness_of("epidermis")
-    dermis_thickness: float = thickness_of("dermis")
-    nail_thickness: float = thickness_of("nail")
-    nail_width: float = 11.0
-    bone_width: float = 6.0
-    bone_height: float = 5.0
-    bone_offset: float = 1.0
-    resolution: str = "medium"
-    materials: Mapping[str, Material] = field(default_factory=dict)
-    electrical: Electrical = field(default_factory=Electrical)
-    viscosity: float = 0.0
+    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
+    epidermis_thickness: Epidermis = thickness_of("epidermis")
+    dermis_thickness: Dermis = thickness_of("dermis")
+    nail_thickness: NailThickness = thickness_of("nail")
+    nail_width: NailWidth = 11.0
+    bone_width: BoneWidth = 6.0
+    bone_height: BoneHeight = 5.0
+    bone_offset: BoneOffset = 1.0
+    resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 23k, 50k nodes"] = "medium"
+    materials: Materials = field(default_factory=dict)
+    electrical: Skin = field(default_factory=Electrical)
+    viscosity: Viscosity = 0.0
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
-        take_numbers(self, RANGES, mistakes)
         with mistakes.of_a_part():
-            if not isinstance(self.ridges, bool):
-                raise InputError("finger.ridges", quoted(self.ridges), "true or false")
-        with mistakes.of_a_part():
-            choice("finger.resolution", self.resolution, tuple(RESOLUTIONS))
+            check_fields(self, "finger.")
         with mistakes.of_a_part():
             if self.ridge_scan is not None:
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
@@ -277,14 +305,6 @@ def participant_sizes(name: str) -> dict[str, Any]:
     sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
     sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
     return {"width": width, "height": height, **sizes}
-
-
-def take_numbers(finger: object, ranges: Mapping[str, tuple[float, float, str]], mistakes: Mistakes) -> None:
-    """Make each field of `ranges` (lowest, highest, unit) a number within it, or collect a mistake."""
-    for name, (low, high, unit) in ranges.items():
-        key, allowed = f"finger.{name}", f"{low:g} to {high:g}{unit}"
-        with mistakes.of_a_part():
-            set_frozen(finger, **{name: real(key, getattr(finger, name), allowed, Within(low, high))})
 
 
 def all_materials(own: object, layers: Sequence[TissueLayer]) -> dict[str, Any]:
@@ -386,15 +406,17 @@ class MeshedFinger:
     `InputError` when it is faulty or does not fit the materials.
     """
 
-    source: str | os.PathLike[str] | Mesh
-    materials: Mapping[str, Material]
-    electrical: Electrical = field(default_factory=Electrical)
-    viscosity: float = 0.0
-    regions: Mapping[str, int] | None = None
+    source: Annotated[str | os.PathLike[str] | Mesh, _MESH, "a mesh of your own, in mm"]
+    materials: Annotated[Materials, "the law of each region"]
+    electrical: Skin = field(default_factory=Electrical)
+    viscosity: Viscosity = 0.0
+    regions: Annotated[
+        Mapping[str, int] | None, _REGIONS, "names of the numbers in the cell data `region`"
+    ] = None
 
     def __post_init__(self) -> None:
-        viscosity = real("finger.viscosity", self.viscosity, "0 to 1000 s", Within(0.0, 1e3))
-        set_frozen(self, viscosity=viscosity, materials=dict(self.materials))
+        check_fields(self, "finger.")
+        set_frozen(self, materials=dict(self.materials))
         if not isinstance(self.source, Mesh):
             set_frozen(self, source=Path(self.source))
         names = self._own.region_names

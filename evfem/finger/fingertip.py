@@ -12,50 +12,49 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem import data
-from evfem.common.checks import choice, set_frozen
+from evfem.common.checks import between, check_fields, keys_of, one_of, set_frozen
 from evfem.common.views import called, changed, short, table
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
 from evfem.finger.fingerpad import (
     CLEARANCE,
-    RANGES,
     STEEPEST,
     STEEPEST_FLAT,
     Electrical,
+    Materials,
+    Skin,
     all_materials,
-    take_numbers,
 )
 from evfem.finger.fingerpad import participant_sizes as sizes_in_section
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
 from evfem.finger.layers import LAYERS, thickness_of
 from evfem.finger.outline import Ridges
+from evfem.finger.sizes import (
+    BoneHeight,
+    BoneOffset,
+    BoneWidth,
+    Dermis,
+    Epidermis,
+    Height,
+    RidgeCrest,
+    RidgeExponent,
+    RidgeGroove,
+    RidgeHeight,
+    RidgePhase,
+    RidgeWidth,
+    StratumCorneum,
+    Viscosity,
+    Width,
+)
 from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Solid, rows_that_merge
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
-from evfem.protocols import Material
 
-#: parameters that only a whole pad has -> lowest and highest value, and its unit
-OWN_RANGES: Mapping[str, tuple[float, float, str]] = {
-    "length": (16.0, 32.0, " mm"),
-    "bone_length": (6.0, 28.0, " mm"),
-    "posture": (0.0, 45.0, " degrees"),
-    "ridge_pixel": (0.005, 0.5, " mm"),
-}
-#: those that it shares with `FingerPad`
-SHARED = (
-    *("width", "height", "bone_width", "bone_height", "bone_offset", "viscosity"),
-    *("ridge_height", "ridge_width", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove"),
-    *(layer.parameter for layer in LAYERS if layer.thickness),
-)
-TIP_RANGES: Mapping[str, tuple[float, float, str]] = {
-    **{name: RANGES[name] for name in SHARED},
-    **OWN_RANGES,
-}
 RIMS = ("fixed", "free")
 #: angle (degrees) at which the finger of Table 1 was held, whose length is seen from above
 HELD = 30.0
@@ -83,6 +82,14 @@ TIP_RESOLUTIONS: Mapping[str, TipDivisions] = {
     "medium": TipDivisions(across=10, along=12, sides=3, per_ridge=3.0, per_curved_ridge=2.0),
     "fine": TipDivisions(across=16, along=20, sides=4, per_ridge=6.0, per_curved_ridge=3.0),
 }
+_RIDGES = (
+    f"false | none | true | {' | '.join(PATTERNS)}, the path of a csv file with the header x,z,height or of "
+    "a grey image, or a table of x, z and rows of height"
+)
+
+
+def _is_file(ridges: str) -> bool:
+    return bool(Path(ridges).suffix)
 
 
 @dataclass(frozen=True)
@@ -124,39 +131,44 @@ class Fingertip:
     evfem.errors.InputError: finger.length: given 60.0; allowed: 16 to 32 mm
     """
 
-    width: float = 16.68
-    height: float = 12.79
-    length: float = 22.5
-    ridges: bool | str | os.PathLike[str] | HeightMap = "along"
-    ridge_pixel: float = 0.05
-    ridge_height: float = 0.15
-    ridge_width: float = 0.50
-    ridge_exponent: float = 7.0
-    ridge_phase: float = 0.0
-    ridge_crest: float = 0.0
-    ridge_groove: float = 0.0
+    width: Width = 16.68
+    height: Height = 12.79
+    length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
+    ridges: Annotated[
+        bool | str | os.PathLike[str] | HeightMap,
+        {"allowed": _RIDGES, "type": bool | str | dict[str, list[Any]], "file": _is_file},
+        "pattern of the fingerprint ridges, or a measured print",
+    ] = "along"
+    ridge_pixel: Annotated[float, between(0.005, 0.5, "mm"), "from point to point of a grey image"] = 0.05
+    ridge_height: RidgeHeight = 0.15
+    ridge_width: RidgeWidth = 0.50
+    ridge_exponent: RidgeExponent = 7.0
+    ridge_phase: RidgePhase = 0.0
+    ridge_crest: RidgeCrest = 0.0
+    ridge_groove: RidgeGroove = 0.0
     # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
-    stratum_corneum_thickness: float = thickness_of("stratum_corneum")
-    epidermis_thickness: float = thickness_of("epidermis")
-    dermis_thickness: float = thickness_of("dermis")
-    bone_width: float = 6.0
-    bone_height: float = 5.0
-    bone_length: float = 17.0
-    bone_offset: float = 1.0
-    rim: str = "fixed"
-    posture: float = 0.0
-    resolution: str = "medium"
-    materials: Mapping[str, Material] = field(default_factory=dict)
-    electrical: Electrical = field(default_factory=Electrical)
-    viscosity: float = 0.0
+    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
+    epidermis_thickness: Epidermis = thickness_of("epidermis")
+    dermis_thickness: Dermis = thickness_of("dermis")
+    bone_width: BoneWidth = 6.0
+    bone_height: BoneHeight = 5.0
+    bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0
+    bone_offset: BoneOffset = 1.0
+    rim: Annotated[str, one_of(*RIMS), "whether the cut around the nail moves with the bone"] = "fixed"
+    posture: Annotated[float, between(0.0, 45.0, "degrees"), "how far the tip is turned down"] = 0.0
+    resolution: Annotated[
+        str,
+        one_of(*TIP_RESOLUTIONS),
+        "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more",
+    ] = "medium"
+    materials: Materials = field(default_factory=dict)
+    electrical: Skin = field(default_factory=Electrical)
+    viscosity: Viscosity = 0.0
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
-        take_numbers(self, TIP_RANGES, mistakes)
         with mistakes.of_a_part():
-            choice("finger.resolution", self.resolution, tuple(TIP_RESOLUTIONS))
-        with mistakes.of_a_part():
-            choice("finger.rim", self.rim, RIMS)
+            check_fields(self, "finger.")
         with mistakes.of_a_part():
             if not mistakes.found:
                 set_frozen(self, ridges=_ridges(self))
@@ -270,7 +282,8 @@ class Fingertip:
 def tip_sizes(name: str) -> dict[str, Any]:
     """Parameters of `Fingertip` that a participant of Table 1 has of his or her own (mm)."""
     sizes = sizes_in_section(name)
-    kept = {key: value for key, value in sizes.items() if key in TIP_RANGES}
+    own = {key.name for key in keys_of(Fingertip)}
+    kept = {key: value for key, value in sizes.items() if key in own}
     length = data.load("table1").value(name, "c") * math.cos(math.radians(HELD))
     return kept | {"length": length, "bone_length": Fingertip.bone_length * length / Fingertip.length}
 
@@ -286,10 +299,9 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
         return "along" if given else "none"
     if isinstance(given, str) and given in ("none", *PATTERNS):
         return given
-    if isinstance(given, str | os.PathLike) and Path(given).suffix:
+    if isinstance(given, str | os.PathLike) and _is_file(os.fspath(given)):
         return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height)
-    allowed = "false | none | " + " | ".join(PATTERNS) + " | the path of a csv file or of a grey image"
-    raise InputError("finger.ridges", quoted(given), allowed)
+    raise InputError("finger.ridges", quoted(given), _RIDGES)
 
 
 def _check_shape(tip: Fingertip, solid: Solid) -> None:

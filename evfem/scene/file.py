@@ -3,60 +3,43 @@ file.
 
 Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps,
 csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.formats`). What is written
-(`dump`) is in `evfem.scene.written`, which needs no models of the tables.
+(`dump`) is in `evfem.scene.written`, which needs none of this.
 """
 
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 from evfem.common.checks import MOST_STEPS
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.electrostatics.laws import INSULATORS, Layer
+from evfem.contact.surfaces import Display
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger, participant_sizes
-from evfem.finger.layers import TABLE_2, Moduli
-from evfem.mesh.formats import LARGEST
-from evfem.scene.keys import (
+from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
+from evfem.finger.fingertip import tip_sizes
+from evfem.finger.layers import TABLE_2
+from evfem.scene.format import (
+    FINGERS,
     FRICTIONS,
-    MOTIONS,
-    ROUGHNESS,
+    HOMES,
     SURFACES,
-    ElectricalTable,
-    ElectrostaticsTable,
-    HandTable,
-    MeshTable,
-    OutputTable,
-    ProfileTable,
+    VERSION,
+    BesideFinger,
+    BesideSurface,
+    Electrostatics,
     SceneTable,
-    SolverTable,
-    StrategyTable,
-    Table,
-    at,
-    check_size,
-    columns,
-    kind_of,
-    parse,
-    shown,
-    unknown_key,
+    names,
 )
-from evfem.scene.motion import Motion, VoltageRamp
+from evfem.scene.keys import at, check_size, kind_of, read, read_kind, shown
+from evfem.scene.motion import MOTIONS, Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
-from evfem.scene.voltage import drive_of, voltage_of
-from evfem.scene.written import FORCE_LAWS, TEXTURES, VERSION, dump
+from evfem.scene.written import dump
 from evfem.solver.hand import Hand
-from evfem.solver.strategy import Strategy
-from evfem.tissue.laws import from_table
 
-#: largest files in bytes, and most steps of all motions together
+#: largest file in bytes
 LARGEST_SCENE = 4 * 2**20
-LARGEST_TABLE = 64 * 2**20
 
 __all__ = ["dump", "load", "loads"]
 
@@ -109,217 +92,98 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     >>> loads(text).motion
     (Press(force=0.05, indentation=None, steps=10, speed=None),)
     """
-    tables = tables_of("scene", text)
-    top = parse(SceneTable, tables, "")
-    folder, mistakes, electrostatics = Path(folder), Mistakes(), None
+    top = read(SceneTable, tables_of("scene", text), "", homes=HOMES)
+    folder, mistakes = Path(folder), Mistakes()
     parts: dict[str, Any] = {}
     with mistakes.of_a_part():
-        parts["finger"] = _finger(top.finger, folder)
-    with mistakes.of_a_part(), at("finger"):
-        if "depth" in top.finger:
-            parts["depth"] = DEPTH["check"]("depth", top.finger["depth"])
+        parts |= _finger({} if top.finger is None else top.finger, folder)
+    insulated: dict[str, Any] = {}
     with mistakes.of_a_part():
         if top.electrostatics is not None:
-            electrostatics = parse(ElectrostaticsTable, top.electrostatics, "electrostatics")
-            parts |= _attraction(electrostatics, top.motion, folder)
+            found = read(Electrostatics, top.electrostatics, "electrostatics", folder, homes=HOMES)
+            ramped = any(
+                isinstance(one, Mapping) and one.get("kind") == VoltageRamp.kind for one in top.motion
+            )
+            parts |= found.scene_keys(ramped, folder)
+            insulated = {"insulator": found.layer(), "electrodes": found.electrodes}
     with mistakes.of_a_part():
-        parts["surface"] = _surface(top.surface, folder, electrostatics)
-    with mistakes.of_a_part():
-        if (law := top.surface.get("friction_law")) is not None:
-            parts["friction_law"] = _friction_law(law)
+        parts |= _surface(top.surface, folder, **insulated)
     with mistakes.of_a_part():
         parts["motion"] = _motions(top.motion)
-    with mistakes.of_a_part():
-        if top.hand is not None:
-            parts["hand"] = _build(Hand, parse(HandTable, top.hand, "hand"), "hand")
-    with mistakes.of_a_part():
-        parts["solver"] = _solver(parse(SolverTable, top.solver, "solver"))
-    with mistakes.of_a_part():
-        parts["output"] = _build(Output, parse(OutputTable, top.output, "output"), "output")
+    for key, cls in (("hand", Hand), ("solver", Solver), ("output", Output)):
+        with mistakes.of_a_part():
+            if (table := getattr(top, key)) is not None:
+                parts[key] = read(cls, table, key, homes=HOMES)
     mistakes.report()
     return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 
 
-def _solver(table: Any) -> Solver:
-    key = "solver.strategy"
-    strategy = _build(Strategy, parse(StrategyTable, table.strategy, key), key)
-    return _build(Solver, table.model_copy(update={"strategy": strategy}), "solver")
-
-
-def _build(cls: type, table: Table, prefix: str) -> Any:
-    values = {name: getattr(table, name) for name in type(table).model_fields if name != "kind"}
-    with at(prefix):
-        return cls(**values)
-
-
-def _motions(tables: list[dict[str, Any]]) -> list[Motion]:
+def _motions(tables: list[Any]) -> list[Motion]:
     mistakes, motions = Mistakes(), []
     for i, table in enumerate(tables):
         with mistakes.of_a_part():
-            model, cls = MOTIONS[kind_of(table, f"motion[{i}]", MOTIONS)]
-            motions.append(_build(cls, parse(model, table, f"motion[{i}]"), f"motion[{i}]"))
+            motions.append(read_kind(table, f"motion[{i}]", MOTIONS, homes=HOMES))
     mistakes.report()
+    if not motions:
+        raise InputError("motion", ABSENT, "one or more tables [[motion]]")
     if (total := sum(one.steps for one in motions)) > MOST_STEPS:
         raise InputError("motion", f"{total} steps in all", f"at most {MOST_STEPS} steps in all")
     return motions
 
 
-def _surface(table: Mapping[str, Any], folder: Path, electrostatics: Any) -> Any:
-    kind = kind_of(table, "surface", SURFACES)
-    parsed: Any = parse(SURFACES[kind], table, "surface")
-    insulator = None if electrostatics is None else _insulator(electrostatics)
-    common = {"friction": parsed.friction, "y": parsed.y, "insulator": insulator}
-    electrodes = getattr(electrostatics, "electrodes", None)
+def _surface(table: Any, folder: Path, insulator: Any = None, electrodes: Any = None) -> dict[str, Any]:
+    """The surface, and what its table says of the scene."""
+    kind, mistakes, found = kind_of(table, "surface", SURFACES), Mistakes(), dict[str, Any]()
+    given = {"insulator": insulator}
     if electrodes is not None and kind != "flat":
         raise InputError("electrostatics.electrodes", f"beside a surface of kind {kind}", "a flat surface")
-    with at("surface"):
-        if kind == "flat":
-            return Flat(**common) if insulator is None else Display(**common, electrodes=electrodes)
-        if kind == "sinusoid":
-            return Sinusoid(terms=parsed.terms, **common)
-        if kind in TEXTURES:
-            return TEXTURES[kind](**parsed.model_dump(exclude={"kind", "friction_law", *common}), **common)
-        if (parsed.file is None) == (parsed.points is None):
-            given = ABSENT if parsed.file is None else "file and points"
-            raise InputError("surface.file", given, ProfileTable.model_fields["file"].description or "")
-        if parsed.points is not None:
-            return Profile(*columns("surface.points", parsed.points), **common)
-        path = folder / parsed.file
-        check_size("surface.file", path, LARGEST_TABLE)
-        return Profile.from_csv(path, **common)
-
-
-def _friction_law(table: object) -> Any:
-    """The law of friction of the table [surface.friction_law]."""
-    key = "surface.friction_law"
-    if not isinstance(table, Mapping):
-        raise InputError(key, shown(table), "a table [surface.friction_law] with a kind")
-    model, cls = FRICTIONS[kind_of(table, key, FRICTIONS)]
-    return _build(cls, parse(model, table, key), key)
-
-
-def _insulator(table: ElectrostaticsTable) -> Layer:
-    """The insulator by its name, or by its thickness and permittivity."""
-    own = {name: getattr(table, name) for name in ("insulator_thickness", "insulator_eps_r")}
-    if table.insulator is not None:
-        for name, value in own.items():
-            if value is not None:
-                given = f"{value:g} beside insulator = {table.insulator}"
-                raise InputError(f"electrostatics.{name}", given, "one of the two")
-        return INSULATORS[table.insulator]
-    mistakes = Mistakes()
-    for name, value in own.items():
-        with mistakes.of_a_part():
-            if value is None:
-                allowed = ElectrostaticsTable.model_fields[name].description
-                others = " | ".join(INSULATORS)
-                raise InputError(f"electrostatics.{name}", ABSENT, f"{allowed}; or insulator = {others}")
-    mistakes.report()
-    prefix = "electrostatics.insulator_"
-    with at("electrostatics", layer_thickness=f"{prefix}thickness", layer_eps_r=f"{prefix}eps_r"):
-        return Layer(*own.values())
-
-
-def _attraction(table: Any, motion: list[dict[str, Any]], folder: Path) -> dict[str, Any]:
-    """What a table [electrostatics] says of a scene."""
-    with at("electrostatics"):
-        law = FORCE_LAWS[table.law](gap_eps_r=table.gap_eps_r)
-    ramped = any(one.get("kind") == VoltageRamp.kind for one in motion)
-    voltage, drive = voltage_of(table, not ramped, folder), drive_of(table, folder)
-    same = {
-        name: getattr(table, name) for name in ("air_layer", "direction", "field", "grounded", "coupling")
-    }
-    same["roughness_gap"] = _roughness(table.roughness_gap)
-    return {"law": law, "voltage": voltage, "drive": drive, **same}
-
-
-def _roughness(given: float | Mapping[str, Any]) -> Any:
-    """The gap between rough faces: a length, or a law by its name."""
-    key = "electrostatics.roughness_gap"
-    if not isinstance(given, Mapping):
-        return given
-    model, cls = ROUGHNESS[kind_of(given, key, ROUGHNESS, "law")]
-    parsed: Any = parse(model, given, key)
-    with at(key):
-        return cls(**parsed.model_dump(exclude={"law"}))
-
-
-def _finger(table: Mapping[str, Any], folder: Path) -> Any:
-    parts = {name: value for name, value in table.items() if name != "depth"}  # the scene's
-    electrical = parts.pop("electrical", {})
-    if not isinstance(electrical, dict):
-        raise InputError("finger.electrical", shown(electrical), "a table [finger.electrical]")
-    parsed = parse(ElectricalTable, electrical, "finger.electrical")
-    skin = _build(Electrical, parsed, "finger.electrical")
-    if "mesh" in parts:
-        return _meshed_finger(parts, skin, folder)
-    finger, sizes = FINGERS[kind_of({"kind": "pad"} | parts, "finger", FINGERS)]()
-    known = {spec.name: spec for spec in fields(finger) if spec.init}
-    mistakes = Mistakes()
-    mistakes.found += [
-        unknown_key(f"finger.{name}", name, [*known, "kind", "participant", "mesh", "depth"])
-        for name in parts
-        if name not in (*known, "kind", "participant")
-    ]
-    laws, given = parts.pop("materials", {}), {name: parts[name] for name in parts if name in known}
+    kinds = SURFACES if insulator is None else {**SURFACES, "flat": Display}
+    if kinds[kind] is Display:
+        given["electrodes"] = electrodes
+    beside = names(BesideSurface)
+    with mistakes.of_a_part(), at("surface", surface_electrodes="electrostatics.electrodes"):
+        found["surface"] = read_kind(table, "surface", kinds, folder, beside=beside, homes=HOMES, **given)
     with mistakes.of_a_part():
-        given["materials"] = _materials(laws, TABLE_2)
-    with mistakes.of_a_part(), at("finger"):
-        scan = "ridge_scan" if finger is FingerPad else "ridges"
-        if isinstance(path := given.get(scan), str) and (finger is FingerPad or Path(path).suffix):
-            check_size(f"finger.{scan}", folder / path, LARGEST_TABLE)
-            given[scan] = folder / path
-        if "participant" in parts:
-            given = sizes(parts["participant"]) | given
-        made = finger(**given, **({"electrical": skin} if electrical else {}))
+        if "friction_law" in table:
+            found["friction_law"] = read_kind(table["friction_law"], "surface.friction_law", FRICTIONS)
     mistakes.report()
-    return made
+    return found
 
 
-def _pad() -> tuple[Any, Callable[[str], dict[str, Any]]]:
-    return FingerPad, participant_sizes
+def _finger(table: Any, folder: Path) -> dict[str, Any]:
+    """The finger, and what its table says of the scene."""
+    if not isinstance(table, Mapping):
+        raise InputError("finger", shown(table), "a table [finger]")
+    mistakes, found, given = Mistakes(), dict[str, Any](), dict(table)
+    with mistakes.of_a_part(), at("finger"):
+        if "depth" in given:
+            found["depth"] = DEPTH["check"]("depth", given.pop("depth"))
+    with mistakes.of_a_part():
+        found["finger"] = _meshed(given, folder) if "mesh" in given else _parametric(given, folder)
+    mistakes.report()
+    return found
 
 
-def _tip() -> tuple[Any, Callable[[str], dict[str, Any]]]:
-    from evfem.finger.fingertip import Fingertip, tip_sizes
-
-    return Fingertip, tip_sizes
-
-
-#: kind of a finger -> its class, and the sizes of a participant's, loaded when they are asked for
-FINGERS: Mapping[str, Callable[[], tuple[Any, Callable[[str], dict[str, Any]]]]] = {
-    "pad": _pad,
-    "fingertip": _tip,
-}
-
-
-def _meshed_finger(table: dict[str, Any], electrical: Electrical, folder: Path) -> MeshedFinger:
-    geometry = [name for name in table if name in {"kind", *(spec.name for spec in fields(FingerPad))}]
-    geometry = [name for name in geometry if name not in MeshTable.model_fields]
+def _meshed(table: dict[str, Any], folder: Path) -> MeshedFinger:
+    geometry = [name for name in table if name in {"kind", *names(FingerPad)} - {*names(MeshedFinger)}]
     if geometry:
         raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")
-    parsed = parse(MeshTable, table, "finger")
-    path = folder / parsed.mesh
-    check_size("finger.mesh", path, LARGEST)
+    return read(MeshedFinger, table, "finger", folder, beside=names(BesideFinger), homes=HOMES)
+
+
+def _parametric(table: dict[str, Any], folder: Path) -> Any:
+    cls = FINGERS[kind_of({"kind": "pad"} | table, "finger", FINGERS)]
     with at("finger"):
-        materials = _materials(parsed.materials)
-        return MeshedFinger(path, materials, electrical, parsed.viscosity, parsed.regions)
+        if "participant" in table:
+            sizes = participant_sizes if cls is FingerPad else tip_sizes
+            table = sizes(table["participant"]) | table
+    if isinstance(laws := table.get("materials"), Mapping):
+        table = table | {"materials": {name: _completed(name, law) for name, law in laws.items()}}
+    return read(cls, table, "finger", folder, beside=("kind", *names(BesideFinger)), homes=HOMES)
 
 
-def _materials(tables: object, usual: Mapping[str, Moduli] = MappingProxyType({})) -> dict[str, Any]:
-    """The laws of the regions; one of `usual` whose table names no law is neo-Hookean, and keeps
-    the moduli that its table does not name.
-    """
-    if not isinstance(tables, dict):
-        raise InputError("finger.materials", shown(tables), "a table [finger.materials.NAME] for a region")
-    laws, mistakes = {}, Mistakes()
-    for name, table in tables.items():
-        key = f"finger.materials.{name}"
-        with mistakes.of_a_part(), at("finger"):
-            if not isinstance(table, dict):
-                raise InputError(key, shown(table), "a table with a law and its parameters")
-            if name in usual and "law" not in table:
-                table = {"law": "neo_hookean", **usual[name]._asdict(), **table}
-            laws[name] = from_table(table, key)
-    mistakes.report()
-    return laws
+def _completed(name: str, table: Any) -> Any:
+    """A layer of Table 2 whose table names no law is neo-Hookean, and keeps the moduli it does not name."""
+    if not isinstance(table, Mapping) or "law" in table or name not in TABLE_2:
+        return table
+    return {"law": "neo_hookean", **TABLE_2[name]._asdict(), **table}

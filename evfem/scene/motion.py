@@ -5,25 +5,28 @@ N/mm, V, s).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Literal, get_args
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
 
 from evfem.common.checks import Within, check_fields, number, one_of, whole
 from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
 
-# What a field may be, in words and as a check. Scene files take their keys from these fields too
-# (`evfem.scene.keys`).
-_FORCE = number("a force in N/mm, not negative", Within(0.0))
-_INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0))
-_DISTANCE = number("a distance in mm, not 0, at most 1000 either way", Within(-1000.0, 1000.0, not_zero=True))
-_SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True))
-_GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0))
-_VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6))
-_DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True))
-_ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0))
-_STEPS, _HOLD = whole(), one_of(*get_args(Hold))
+# What a field may be, in words and as a check; scene files take their keys from the fields too.
+_FORCE = number("a force in N/mm, not negative", Within(0.0), "N/mm")
+_INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
+_DISTANCE = number(
+    "a distance in mm, not 0, at most 1000 either way", Within(-1000.0, 1000.0, not_zero=True), "mm"
+)
+_SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True), "mm/s")
+_GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0), "mm")
+_VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
+_DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
+_ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
+Steps = Annotated[int, whole(), "in how many equal parts"]
+Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it is"]
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,12 @@ class Press:
     evfem.errors.InputError: force: given neither force nor indentation; allowed: exactly one of the two
     """
 
-    force: float | None = field(default=None, metadata=_FORCE)
-    indentation: float | None = field(default=None, metadata=_INDENTATION)
-    steps: int = field(default=10, metadata=_STEPS)
-    speed: float | None = field(default=None, metadata=_SPEED)
+    force: Annotated[float | None, _FORCE, "load on the bone at the end; this or indentation"] = None
+    indentation: Annotated[float | None, _INDENTATION, "travel of the bone beyond first touch at the end"] = (
+        None
+    )
+    steps: Steps = 10
+    speed: Annotated[float | None, _SPEED, "of a press to an indentation; without it no time passes"] = None
     kind = "press"
 
     def __post_init__(self) -> None:
@@ -74,11 +79,11 @@ class Slide:
     (0.0, 2.0)
     """
 
-    distance: float = field(metadata=_DISTANCE)
-    steps: int = field(default=100, metadata=_STEPS)
-    speed: float | None = field(default=None, metadata=_SPEED)
-    hold: Hold = field(default="indentation", metadata=_HOLD)
-    angle: float = field(default=0.0, metadata=_ANGLE)
+    distance: Annotated[float, _DISTANCE, "from where it is, negative towards -x"]
+    steps: Steps = 100
+    speed: Annotated[float | None, _SPEED, "needed with dynamics other than quasistatic"] = None
+    hold: Held = "indentation"
+    angle: Annotated[float, _ANGLE, "from +x, of a fingertip; 90 is along the finger"] = 0.0
     kind = "slide"
 
     def __post_init__(self) -> None:
@@ -102,8 +107,8 @@ class Hover:
     The tissue is free to move under the attraction. Going there takes no time.
     """
 
-    gap: float = field(metadata=_GAP)
-    steps: int = field(default=1, metadata=_STEPS)
+    gap: Annotated[float, _GAP, "of the undeformed outline to the surface"]
+    steps: Steps = 1
     kind = "hover"
 
     def __post_init__(self) -> None:
@@ -117,9 +122,9 @@ class VoltageRamp:
     `hold` keeps the indentation or the applied force of the moment before.
     """
 
-    voltage: float = field(metadata=_VOLTAGE)
-    steps: int = field(default=10, metadata=_STEPS)
-    hold: Hold = field(default="indentation", metadata=_HOLD)
+    voltage: Annotated[float, _VOLTAGE, "at the end, from the present one"]
+    steps: Steps = 10
+    hold: Held = "indentation"
     kind = "voltage"
 
     def __post_init__(self) -> None:
@@ -137,9 +142,9 @@ class Wait:
     100
     """
 
-    duration: float = field(metadata=_DURATION)
-    steps: int = field(default=100, metadata=_STEPS)
-    hold: Hold = field(default="indentation", metadata=_HOLD)
+    duration: Annotated[float, _DURATION, "how long it stays"]
+    steps: Steps = 100
+    hold: Held = "indentation"
     kind = "wait"
 
     def __post_init__(self) -> None:
@@ -147,6 +152,7 @@ class Wait:
 
 
 Motion = Press | Slide | Hover | VoltageRamp | Wait
+MOTIONS: Mapping[str, type] = {cls.kind: cls for cls in get_args(Motion)}
 
 
 def takes_time(motion: Motion) -> bool:

@@ -10,17 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol, runtime_checkable
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 from evfem.common.checks import (
     Within,
     check_fields,
-    choice,
     number,
     one_of,
     real,
     set_frozen,
-    whole,
     yes_or_no,
 )
 from evfem.common.digest import digest
@@ -28,31 +26,44 @@ from evfem.common.views import called, changed, short, table
 from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
-from evfem.electrostatics.roughness import roughness_of
+from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
+from evfem.electrostatics.roughness import WIDEST, roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw, Surface, TimeSignal
 from evfem.scene.driven import applied, check_drive
 from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
+from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
-from evfem.solver.strategy import Strategy
-from evfem.tissue.elements import ELEMENTS, elements_on
 from evfem.tissue.forms import Form
 
-DYNAMICS = ("quasistatic", "viscous", "inertial")
-CONTACTS = ("exact", "penalty")
 DIRECTIONS = ("vertical", "normal")
-PRECISIONS = ("single", "double")
 #: the attraction column by column, by Poisson's problem, or whichever the bounds ask for
 FIELDS = ("local", "full", "auto")
 COUPLINGS = ("monolithic", "staggered", "staggered_once")
 #: voltages that are no number
 SIGNALS = (VoltageProfile, FollowForce, TimeSignal)
-DEPTH = number("a depth in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True))
-_PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True))
-_TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3))
+DEPTH = number("a depth in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True), "mm")
+# keys that a scene file has in [electrostatics]
+AirLayer = Annotated[bool, yes_or_no(), "false: only touching nodes carry force, eq. (10)"]
+Direction = Annotated[str, one_of(*DIRECTIONS), "normal: Maxwell stress on the deformed outline"]
+FieldChoice = Annotated[
+    str, one_of(*FIELDS), "full: Poisson's problem, not column by column; auto: where it matters"
+]
+Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
+Coupling = Annotated[str, one_of(*COUPLINGS), "staggered_once: the paper's, once in each step"]
+_ROUGHNESS: dict[str, Any] = {
+    "allowed": f"a length in mm from 0 to {WIDEST:g}, or a table [electrostatics.roughness_gap] with a law",
+    "type": float | dict,
+    "kinds": lambda: ROUGHNESS_LAWS,
+    "tag": "law",
+    "unit": "mm",
+}
+RoughnessGap = Annotated[
+    float | RoughnessLaw, _ROUGHNESS, "what rough skin keeps between itself and the insulator in contact"
+]
 
 
 @runtime_checkable
@@ -73,85 +84,6 @@ class Finger(Protocol):
 
     def mesh(self, order: int) -> Any:
         """The mesh with elements of that order."""
-
-
-@dataclass(frozen=True)
-class Solver:
-    """How a scene is solved; the defaults are the recommended ones.
-
-    `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
-    largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
-    (N/mm3) go with `contact="penalty"` alone. With `symmetry` a scene that is its own mirror image
-    is computed from its right half. `strategy` says how hard steps are tried.
-    """
-
-    element: str | None = field(default=None, metadata=one_of(*ELEMENTS))
-    dynamics: str = field(default="quasistatic", metadata=one_of(*DYNAMICS))
-    contact: str = field(default="exact", metadata=one_of(*CONTACTS))
-    penalty_normal: float | None = field(default=None, metadata=_PENALTY)
-    penalty_tangential: float | None = field(default=None, metadata=_PENALTY)
-    tolerance: float = field(default=1e-8, metadata=_TOLERANCE)
-    threads: int = field(default=1, metadata=whole(1024))
-    symmetry: bool = field(default=False, metadata=yes_or_no())
-    strategy: Strategy = field(default_factory=Strategy)
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.strategy, Strategy):
-            raise InputError("strategy", quoted(self.strategy), "a Strategy")
-        for key in ("penalty_normal", "penalty_tangential"):
-            if self.contact == "exact" and getattr(self, key) is not None:
-                raise InputError(key, quoted(getattr(self, key)), 'only with contact = "penalty"')
-        check_fields(self)
-        if self.contact == "penalty" and self.penalty_normal is None:
-            allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
-            raise InputError("penalty_normal", ABSENT, allowed)
-
-    @classmethod
-    def within(cls, error: float = 1e-3) -> Solver:
-        """What costs least where forces shall err by at most this share beside the mesh's own error:
-        residuals of a thousandth of it, steps that are cut only where the path would err by more,
-        and half of a symmetric scene.
-
-        >>> auto = Strategy(steps="auto", path_error=0.001)
-        >>> Solver.within(0.001) == Solver(tolerance=1e-6, symmetry=True, strategy=auto)
-        True
-        """
-        strategy = Strategy(steps="auto", path_error=error)
-        return cls(tolerance=1e-3 * error, symmetry=True, strategy=strategy)
-
-    def element_on(self, corners: int) -> str:
-        """The element used on cells with that many corners (3, 4 or 8).
-
-        >>> Solver().element_on(4), Solver().element_on(3), Solver(element="q1").element_on(4)
-        ('q2p1', 'p2', 'q1')
-        >>> Solver(element="q1").element_on(3)
-        Traceback (most recent call last):
-        evfem.errors.InputError: solver.element: given q1 on a mesh of triangles; allowed: p2
-        """
-        names = elements_on(corners)
-        if self.element is None:
-            return {3: "p2", 4: "q2p1", 8: "hex27p1"}[corners]
-        if self.element not in names:
-            cells = {3: "triangles", 4: "quads", 8: "hexahedra"}[corners]
-            raise InputError("solver.element", f"{self.element} on a mesh of {cells}", " | ".join(names))
-        return self.element
-
-
-@dataclass(frozen=True)
-class Output:
-    """Fields are kept of every `every`-th step, and of the last one; None keeps all.
-
-    What is left open `evfem run` chooses so that its files of fields stay small
-    (`evfem.export.FieldFiles`): with `every` None it may write fewer of them, with `precision`
-    None in single precision. `compression` makes them smaller still, and slower to write.
-    """
-
-    every: int | None = field(default=None, metadata=whole())
-    precision: str | None = field(default=None, metadata=one_of(*PRECISIONS))
-    compression: bool = field(default=False, metadata=yes_or_no())
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 class Motions:
@@ -187,20 +119,22 @@ class Scene:
     law: ForceLaw | None = None
     voltage: float | VoltageProfile | FollowForce | TimeSignal = 0.0
     motion: Motions = Motions()
-    air_layer: bool = field(default=True, kw_only=True)
-    direction: str = field(default="vertical", kw_only=True)
-    coupling: str = field(default="monolithic", kw_only=True)
+    air_layer: AirLayer = field(default=True, kw_only=True)
+    direction: Direction = field(default="vertical", kw_only=True)
+    coupling: Coupling = field(default="monolithic", kw_only=True)
     drive: Drive | None = field(default=None, kw_only=True)
-    roughness_gap: float | RoughnessLaw = field(default=0.0, kw_only=True)
+    roughness_gap: RoughnessGap = field(default=0.0, kw_only=True)
     friction_law: FrictionLaw = field(default=Coulomb(), kw_only=True)
     hand: Hand | None = field(default=None, kw_only=True)
     solver: Solver = field(default=Solver(), kw_only=True)
     name: str = field(default="scene", kw_only=True, compare=False)
     forms: tuple[Term, ...] = field(default=(), kw_only=True)
-    depth: float | None = field(default=None, kw_only=True, metadata=DEPTH)
+    depth: float | None = field(default=None, kw_only=True)
     output: Output = field(default=Output(), kw_only=True)
-    grounded: bool = field(default=True, kw_only=True)
-    field: str = field(default="local", kw_only=True)  # the last one: from here on `field` is its default
+    grounded: Grounded = field(default=True, kw_only=True)
+    field: FieldChoice = field(
+        default="local", kw_only=True
+    )  # the last one: from here on `field` is its default
 
     def __post_init__(self) -> None:
         _check_parts(self)
@@ -300,10 +234,7 @@ def _check_parts(scene: Scene) -> None:
 
 
 def _check_electrostatics(scene: Scene) -> None:
-    choice("electrostatics.direction", scene.direction, DIRECTIONS)
-    choice("electrostatics.coupling", scene.coupling, COUPLINGS)
-    if not isinstance(scene.air_layer, bool):
-        raise InputError("electrostatics.air_layer", quoted(scene.air_layer), "true or false")
+    check_fields(scene, "electrostatics.")
     _check_roughness(scene)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
@@ -341,7 +272,8 @@ def _check_hand(scene: Scene) -> None:
 
 def _check_roughness(scene: Scene) -> None:
     if isinstance(scene.roughness_gap, (int, float)) and not isinstance(scene.roughness_gap, bool):
-        set_frozen(scene, roughness_gap=float(scene.roughness_gap))
+        gap = real("electrostatics.roughness_gap", scene.roughness_gap, _ROUGHNESS["allowed"])
+        set_frozen(scene, roughness_gap=gap)
     try:
         rough = roughness_of(scene.roughness_gap)
     except InputError as error:
@@ -352,9 +284,6 @@ def _check_roughness(scene: Scene) -> None:
 
 
 def _check_field(scene: Scene) -> None:
-    choice("electrostatics.field", scene.field, FIELDS)
-    if not isinstance(scene.grounded, bool):
-        raise InputError("electrostatics.grounded", quoted(scene.grounded), "true or false")
     ended = getattr(scene.surface, "electrodes", None) is not None
     if scene.field != "full" and (ended or not scene.grounded):
         given = f"{scene.field} with {'electrodes that end' if ended else 'a finger that is not grounded'}"

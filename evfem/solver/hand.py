@@ -18,7 +18,8 @@ kg, and the cut-off frequency of the friction, that of a first-order system, by 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
@@ -29,6 +30,9 @@ from evfem.solver.state import State
 
 #: of a sliding finger for every mm/s: stiffness (N/mm), moving mass (t), cut-off frequency (Hz)
 STIFFER, HEAVIER, FASTER = 4.04e-3, 3.23e-8, 13.8
+_STIFFNESS = number("a stiffness in N/mm, larger than 0", Within(0.0, 1e9, above=True), "N/mm")
+_DAMPING = number("a damping in N s/mm, not negative", Within(0.0, 1e9), "N s/mm")
+_MASS = number("a mass in t, not negative", Within(0.0, 1e3), "t")
 
 
 @dataclass(frozen=True)
@@ -39,13 +43,9 @@ class Hand:
     Hand(stiffness=0.1, damping=0.0, mass=0.0)
     """
 
-    stiffness: float = field(
-        metadata=number("a stiffness in N/mm, larger than 0", Within(0.0, 1e9, above=True))
-    )
-    damping: float = field(
-        default=0.0, metadata=number("a damping in N s/mm, not negative", Within(0.0, 1e9))
-    )
-    mass: float = field(default=0.0, metadata=number("a mass in t, not negative", Within(0.0, 1e3)))
+    stiffness: Annotated[float, _STIFFNESS, "of the spring, per mm of depth"]
+    damping: Annotated[float, _DAMPING, "of the damper beside it, per mm of depth"] = 0.0
+    mass: Annotated[float, _MASS, "that moves with the bone, per mm of depth"] = 0.0
 
     def __post_init__(self) -> None:
         check_fields(self)

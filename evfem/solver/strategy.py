@@ -15,11 +15,13 @@ With steps "auto" the parts are as long as the error of the path allows (`evfem.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
-from evfem.common.checks import Within, check_fields, number, one_of, switch, whole
+from evfem.common.checks import Within, check_fields, number, one_of, whole, yes_or_no
 from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK, WEAKENED
 
+_COUNT = whole(10_000)
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
 _GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
@@ -50,15 +52,27 @@ class Strategy:
     evfem.errors.InputError: smallest_part: given 2.0; allowed: a share of a step, above 0, at most 1
     """
 
-    iterations: int = field(default=40, metadata=whole(10_000))
-    patience: float = field(default=8.0, metadata=_PATIENCE)
-    smallest_part: float = field(default=1.0 / 1024.0, metadata=_PART)
-    easy: int = field(default=8, metadata=whole(10_000))
-    growth: float = field(default=1.25, metadata=_GROWTH)
-    reach: float = field(default=1.5, metadata=_REACH)
-    relaxation: bool = field(default=True, metadata=switch())
-    steps: str = field(default="given", metadata=one_of("given", "auto"))
-    path_error: float = field(default=1e-3, metadata=_ERROR)
+    iterations: Annotated[int, _COUNT, "most of one part of a step"] = 40
+    patience: Annotated[float, _PATIENCE, "iterations with an old factorisation before it is renewed"] = 8.0
+    smallest_part: Annotated[
+        float,
+        _PART,
+        "of what is left of a step before it counts as not converged; its square if time passes",
+    ] = 1.0 / 1024.0
+    easy: Annotated[int, _COUNT, "iterations of a part after which the next one may be longer"] = 8
+    growth: Annotated[float, _GROWTH, "by which factor"] = 1.25
+    reach: Annotated[float, _REACH, "first guess: so many of the last part's displacements ahead"] = 1.5
+    relaxation: Annotated[bool, yes_or_no(), "whether a finger without an equilibrium near is released"] = (
+        True
+    )
+    steps: Annotated[
+        str,
+        one_of("given", "auto"),
+        "one part each unless it fails, or parts as the error of the path allows",
+    ] = "given"
+    path_error: Annotated[float, _ERROR, "of a part, with steps = auto: a share of the force on the bone"] = (
+        1e-3
+    )
 
     def __post_init__(self) -> None:
         check_fields(self)

@@ -15,23 +15,24 @@ from dataclasses import dataclass, field
 from itertools import product
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import tomli_w
-from pydantic import Field as Key
 
-from evfem.common.checks import set_frozen
+from evfem.common.checks import instance, one_of, real, set_frozen, whole
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.file import read_text, tables_of
-from evfem.scene.keys import SceneTable, Table, at, parse, shown
+from evfem.scene.format import SceneTable, names
+from evfem.scene.keys import at, read, shown
 from evfem.scene.scene import Scene
 from evfem.scene.written import VERSION, dump
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
-from evfem.sweeps.samples import METHODS, Distribution, Normal, Samples, Uniform
+from evfem.sweeps.samples import METHODS, MOST_SAMPLES, Distribution, Normal, Samples, Uniform
 
 #: most points of a sweep
 MOST_POINTS = 100_000
+LARGEST_SEED = 2**63 - 1
 STATISTICS = ("last", "mean", "min", "max")
 OUTPUTS = (
     "applied_force.last",
@@ -42,7 +43,7 @@ OUTPUTS = (
 )
 #: columns of the table that every sweep has, before and after its own
 FIRST, LAST = ("point",), ("status", "seconds", "message")
-TABLES = tuple(name for name in SceneTable.model_fields if name != "version")
+TABLES = tuple(name for name in names(SceneTable) if name != "version")
 Row = Mapping[str, Any]
 
 
@@ -226,31 +227,67 @@ def check_output(output: Any, motions: int) -> None:
         raise InputError("outputs", quoted(output), f"motions from 0 to {motions - 1}")
 
 
-class SweepTable(Table):
+@dataclass(frozen=True)
+class SweepTable:
     """The whole sweep file."""
 
-    version: int
-    scene: str | dict[str, Any] = Key(description="the path of a scene file, or a table [scene] like one")
-    grid: dict[str, Any] = Key(default={}, description="a table [grid]")
-    samples: dict[str, Any] | None = Key(default=None, description="a table [samples]")
-    outputs: list[str] = Key(default=list(OUTPUTS), description="a list of texts COLUMN.STATISTIC")
+    version: Annotated[int, {"allowed": str(VERSION)}, "version of the format"]
+    scene: Annotated[
+        str | dict[str, Any],
+        instance("the path of a scene file, or a table [scene] like one", str, dict),
+        "what is varied: a file, or the tables of one without its version",
+    ]
+    grid: Annotated[
+        dict[str, Any] | None,
+        instance("a table [grid]", dict),
+        "keys of the scene with lists of values, or named rows of several keys",
+    ] = None
+    samples: Annotated[
+        dict[str, Any] | None,
+        instance("a table [samples]", dict),
+        "random values of keys, for each point of the grid",
+    ] = None
+    outputs: Annotated[
+        list[str] | None,
+        instance("a list of texts COLUMN.STATISTIC", list),
+        "last, mean, min or max of columns, .N of motion N alone",
+    ] = None
 
 
-class SamplesTable(Table):
+@dataclass(frozen=True)
+class SamplesTable:
     """[samples]."""
 
-    count: int = Key(description="a whole number of samples")
-    seed: int = Key(description="a whole number, not negative")
-    method: str = Key(default=METHODS[0], description=" | ".join(METHODS))
-    parameters: dict[str, Any] = Key(description="a table [samples.parameters] of distributions")
+    count: Annotated[int, whole(MOST_SAMPLES), "number of samples"]
+    seed: Annotated[
+        int, whole(LARGEST_SEED, 0, "a whole number, not negative"), "the same seed gives the same samples"
+    ]
+    parameters: Annotated[
+        dict[str, Any],
+        instance("a table [samples.parameters] of distributions", dict),
+        "a distribution for each key",
+    ]
+    method: Annotated[str, one_of(*METHODS), "how they are drawn"] = METHODS[0]
 
 
-class DistributionTable(Table):
+def _pair(allowed: str) -> dict[str, Any]:
+    def check(key: str, value: Any) -> tuple[float, float]:
+        if not isinstance(value, list) or len(value) != 2:
+            raise InputError(key, shown(value), allowed)
+        return real(key, value[0], allowed), real(key, value[1], allowed)
+
+    return {"allowed": allowed, "check": check}
+
+
+@dataclass(frozen=True)
+class DistributionTable:
     """One parameter in [samples.parameters]."""
 
-    uniform: list[float] | None = Key(None, min_length=2, max_length=2, description="[low, high]")
-    normal: list[float] | None = Key(None, min_length=2, max_length=2, description="[mean, sd]")
-    between: list[float] | None = Key(None, min_length=2, max_length=2, description="[low, high]")
+    uniform: Annotated[list[float] | None, _pair("[low, high]"), "every value as likely as any other"] = None
+    normal: Annotated[list[float] | None, _pair("[mean, sd]"), "instead: a normal distribution"] = None
+    between: Annotated[list[float] | None, _pair("[low, high]"), "where a normal distribution is cut off"] = (
+        None
+    )
 
 
 def load(path: str | Path) -> Sweep:
@@ -264,13 +301,14 @@ def load(path: str | Path) -> Sweep:
 
 def loads(text: str, folder: str | Path = ".", name: str = "sweep") -> Sweep:
     """The sweep in a TOML text; the path of its scene starts at `folder`."""
-    top = parse(SweepTable, tables_of("sweep", text), "")
+    top = read(SweepTable, tables_of("sweep", text), "")
     folder, scene = Path(folder), top.scene
     if isinstance(scene, str):
         path = folder / scene
         folder, scene = path.parent, tables_of("scene", read_text("scene", path))
     samples = None if top.samples is None else _samples(top.samples)
-    return Sweep({"version": VERSION, **scene}, _grid(top.grid), samples, top.outputs, name, folder)
+    outputs = OUTPUTS if top.outputs is None else top.outputs
+    return Sweep({"version": VERSION, **scene}, _grid(top.grid or {}), samples, outputs, name, folder)
 
 
 def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
@@ -291,21 +329,21 @@ def _grid(table: Mapping[str, Any]) -> dict[str, Any]:
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Dotted keys and values of tables in tables; distributions are values."""
     for name, value in table.items():
-        if isinstance(value, dict) and not set(value) & set(DistributionTable.model_fields):
+        if isinstance(value, dict) and not {*value} & {*names(DistributionTable)}:
             yield from _flat(value, f"{prefix}{name}.")
         else:
             yield f"{prefix}{name}", value
 
 
 def _samples(table: Mapping[str, Any]) -> Samples:
-    parsed = parse(SamplesTable, table, "samples")
+    parsed = read(SamplesTable, table, "samples")
     parameters = {}
     for key, value in _flat(parsed.parameters):
         place = f"samples.parameters.{key}"
         if not isinstance(value, dict):
             raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
         with at(place):
-            parameters[key] = _distribution(parse(DistributionTable, value, place), place)
+            parameters[key] = _distribution(read(DistributionTable, value, place), place)
     return Samples(parameters, parsed.count, parsed.seed, parsed.method)
 
 

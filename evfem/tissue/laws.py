@@ -21,20 +21,29 @@ small-strain volume change have `volume_measure = "trace"`: there theta stands f
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, field, fields
-from typing import Any, Literal
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
 
 import numpy as np
 
-from evfem.common.checks import choice, real
-from evfem.errors import ABSENT, InputError
+from evfem.common.checks import Within, check_fields, number
 from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
-from evfem.tissue.moduli import Isotropic, bulk_modulus, check_rates, check_volumetric
+from evfem.tissue.moduli import (
+    POSITIVE,
+    Bulk,
+    Density,
+    Isotropic,
+    PoissonOrNone,
+    Relaxation,
+    bulk_modulus,
+    check_volumetric,
+)
 from evfem.tissue.ogden import Ogden
 from evfem.tissue.splitlaw import SplitLaw, split
 
-__all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "from_table", "split"]
+__all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "split"]
 
+_FINITE = number("a finite number", Within(), "MPa")
 #: d F_ij / d F_kl and d (F_ij + F_ji) / d F_kl in two and in three dimensions
 UNIT_TANGENT = {d: np.einsum("ik,jl->ijkl", np.eye(d), np.eye(d)) for d in (2, 3)}
 SYMMETRIC_TANGENT = {d: unit + np.einsum("ijkl->ijlk", unit) for d, unit in UNIT_TANGENT.items()}
@@ -155,20 +164,17 @@ class Yeoh(_InvariantLaw):
     1.6666666666666667
     """
 
-    c1: float
-    c2: float = 0.0
-    c3: float = 0.0
-    nu: float | None = None
-    bulk: float | None = None
-    viscosity: float | None = None
-    density: float = 1e-9
+    c1: Annotated[float, POSITIVE, "first coefficient of I1 - 3"]
+    c2: Annotated[float, _FINITE, "second coefficient"] = 0.0
+    c3: Annotated[float, _FINITE, "third coefficient"] = 0.0
+    nu: PoissonOrNone = None
+    bulk: Bulk = None
+    viscosity: Relaxation = None
+    density: Density = 1e-9
 
     def __post_init__(self) -> None:
-        real("c1", self.c1, "a positive number", lambda c: c > 0.0)
-        for key in ("c2", "c3"):
-            real(key, getattr(self, key), "a finite number")
+        check_fields(self)
         check_volumetric(self.nu, self.bulk)
-        check_rates(self.viscosity, self.density)
 
     @property
     def shear_modulus(self) -> float:
@@ -251,31 +257,3 @@ LAWS: Mapping[str, type] = {
     "ogden": Ogden,
     "linear_elastic": LinearElastic,
 }
-
-
-def from_table(table: Mapping[str, Any], key: str = "material") -> Any:
-    """The law that a table {"law": name, parameter: value, ...} describes; `key` names the table
-    in errors.
-
-    Raises `InputError` for an unknown law, an unknown, missing or impossible parameter.
-
-    >>> from_table({"law": "neo_hookean", "E": 0.05, "nu": 0.48})
-    NeoHookean(E=0.05, nu=0.48, viscosity=None, density=1e-09)
-    """
-    values = dict(table)
-    name = values.pop("law", None)
-    if name is None:
-        raise InputError(f"{key}.law", ABSENT, " | ".join(LAWS))
-    choice(f"{key}.law", name, tuple(LAWS))
-    parameters = [f for f in fields(LAWS[name]) if f.init]
-    allowed = f"{name} has the parameters " + ", ".join(f.name for f in parameters)
-    for given in values:
-        if given not in [f.name for f in parameters]:
-            raise InputError(f"{key}.{given}", "an unknown key", allowed)
-    for f in parameters:
-        if f.name not in values and f.default is MISSING:
-            raise InputError(f"{key}.{f.name}", ABSENT, f"a value; {allowed}")
-    try:
-        return LAWS[name](**values)
-    except InputError as error:
-        raise InputError(f"{key}.{error.key}", error.given, error.allowed) from None

@@ -3,33 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
-from evfem.common.checks import real
+from evfem.common.checks import Within, check_fields, number
 from evfem.errors import InputError
 
-
-def check_poisson(nu: object) -> None:
-    """Raise `InputError` unless -1 < nu < 0.5."""
-    real("nu", nu, "a number above -1 and below 0.5 (0.4999 is fine)", lambda nu: -1.0 < nu < 0.5)
-
-
-def check_rates(viscosity: object, density: object) -> None:
-    """Raise `InputError` unless `viscosity` (s, or None) >= 0 and `density` (t/mm^3) > 0."""
-    if viscosity is not None:
-        real("viscosity", viscosity, "a relaxation time in s, at least 0", lambda tau: tau >= 0.0)
-    real("density", density, "a positive number in t/mm^3", lambda rho: rho > 0.0)
+POSITIVE = number("a positive number in MPa", Within(0.0, above=True), "MPa")
+POISSON = number("a number above -1 and below 0.5 (0.4999 is fine)", lambda nu: -1.0 < nu < 0.5)
+POISSON |= {"limits": Within(-1.0, 0.5, above=True)}
+_POSITIVE_TIME = number("a relaxation time in s, at least 0", Within(0.0), "s")
+_DENSITY = number("a positive number in t/mm3", Within(0.0, above=True), "t/mm3")
+# keys that laws share
+Young = Annotated[float, POSITIVE, "Young's modulus"]
+Poisson = Annotated[float, POISSON, "Poisson's ratio"]
+PoissonOrNone = Annotated[float | None, POISSON, "Poisson's ratio"]
+Bulk = Annotated[float | None, POSITIVE, "bulk modulus, instead of nu"]
+Relaxation = Annotated[float | None, _POSITIVE_TIME, "relaxation time; without it the finger's"]
+Density = Annotated[float, _DENSITY, "with dynamics = inertial"]
 
 
 def check_volumetric(nu: object, bulk: object) -> None:
-    """Raise `InputError` unless one of Poisson's ratio and the bulk modulus is given, and
-    possible.
-    """
+    """Raise `InputError` unless one of Poisson's ratio and the bulk modulus is given."""
     if (nu is None) == (bulk is None):
         raise InputError("nu, bulk", f"nu = {nu}, bulk = {bulk}", "exactly one of the two")
-    if nu is None:
-        real("bulk", bulk, "a positive number in MPa", lambda bulk: bulk > 0.0)
-    else:
-        check_poisson(nu)
 
 
 def bulk_modulus(mu: float, nu: float | None, bulk: float | None) -> float:
@@ -50,15 +46,13 @@ class Isotropic:
     strain.
     """
 
-    E: float
-    nu: float
-    viscosity: float | None = None
-    density: float = 1e-9
+    E: Young
+    nu: Poisson
+    viscosity: Relaxation = None
+    density: Density = 1e-9
 
     def __post_init__(self) -> None:
-        real("E", self.E, "a positive number in MPa", lambda E: E > 0.0)
-        check_poisson(self.nu)
-        check_rates(self.viscosity, self.density)
+        check_fields(self)
 
     @property
     def mu(self) -> float:

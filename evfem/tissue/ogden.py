@@ -2,20 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from evfem.common.checks import real, set_frozen
+from evfem.common.checks import check_fields, real
 from evfem.errors import InputError
 from evfem.tensor import Array, complex_step, ddot, det, inv, mul, symmetric_power, transpose
-from evfem.tissue.moduli import bulk_modulus, check_rates, check_volumetric
+from evfem.tissue.moduli import Bulk, Density, PoissonOrNone, Relaxation, bulk_modulus, check_volumetric
 from evfem.tissue.splitlaw import stepped_tangent
 
 #: largest exponent: stretches of tissue to this power are still numbers
 MOST = 1000.0
+
+
+def _numbers(allowed: str, inside: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
+    """Rule of a number or a list of them, kept as a tuple."""
+
+    def check(key: str, given: Any) -> tuple[float, ...]:
+        values = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
+        return tuple(real(key, value, allowed, inside) for value in values)
+
+    return {"allowed": allowed, "check": check, "unit": unit, "type": float | list[float]}
+
+
+_TERMS = "a number, or a list of numbers, none of them zero"
+_MU = _numbers(_TERMS, bool, "MPa")
+_ALPHA = _numbers(f"{_TERMS} or beyond +-{MOST:g}", lambda value: 0.0 < abs(value) <= MOST)
 
 
 @dataclass(frozen=True)
@@ -33,26 +48,21 @@ class Ogden:
     1.2
     """
 
-    mu: float | Sequence[float]
-    alpha: float | Sequence[float]
-    nu: float | None = None
-    bulk: float | None = None
-    viscosity: float | None = None
-    density: float = 1e-9
+    mu: Annotated[float | Sequence[float], _MU, "moduli of the terms"]
+    alpha: Annotated[float | Sequence[float], _ALPHA, "exponents of the terms"]
+    nu: PoissonOrNone = None
+    bulk: Bulk = None
+    viscosity: Relaxation = None
+    density: Density = 1e-9
     volume_measure: Literal["log", "trace"] = field(default="log", init=False, repr=False)
 
     def __post_init__(self) -> None:
-        none = "a number, or a list of numbers, none of them zero"
-        for key, allowed, inside in (("mu", none, bool), ("alpha", f"{none} or beyond +-{MOST:g}", _power)):
-            given = getattr(self, key)
-            values = tuple(given) if isinstance(given, Sequence | np.ndarray) else (given,)
-            set_frozen(self, **{key: tuple(real(key, v, allowed, inside) for v in values)})
+        check_fields(self)
         if len(self._terms[0]) != len(self._terms[1]):
             raise InputError("alpha", self.alpha, "as many numbers as in mu")
         if not self.shear_modulus > 0.0:
             raise InputError("mu", self.mu, "moduli with a positive sum of mu alpha / 2")
         check_volumetric(self.nu, self.bulk)
-        check_rates(self.viscosity, self.density)
 
     @property
     def _terms(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -14,7 +14,6 @@ from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh import file as meshfile
-from evfem.scene import keys
 from evfem.scene.file import dump, load, loads
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
@@ -314,7 +313,7 @@ WRONG = [
         "kind = 'flat'",
         "kind = 'self_affine'\nhurst = 2\nrms = 0.01",
         "surface.hurst",
-        "given 2.0; allowed: a Hurst exponent from 0 to 1",
+        "given 2; allowed: a Hurst exponent from 0 to 1",
     ),
     (
         SHORT,
@@ -370,7 +369,7 @@ WRONG = [
     (SHORT, "force = 0.05", "force = 0.05\ndistance = 2", "motion[0].distance", "an unknown key"),
     (SHORT, "force = 0.05", "force = 0.05\n[output]\nevery = 0", "output.every", "given 0"),
     (SHORT, "force = 0.05", "force = 0.05\n[solver]\nelement = 'p3'", "solver.element", "q2p1"),
-    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ntolerance = 1", "solver.tolerance", "given 1.0"),
+    (SHORT, "force = 0.05", "force = 0.05\n[solver]\ntolerance = 1", "solver.tolerance", "given 1;"),
     (SHORT, "force = 0.05", "force = 0.05\n[solver]\ncontact='penalty'", "solver.penalty_normal", "missing"),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = -3", "finger.width", "given -3"),
     (SHORT, "force = 0.05", "force = 0.05\n[finger]\nwidth = 'w'", "finger.width", 'given "w"'),
@@ -554,17 +553,6 @@ def test_the_strategy_goes_to_a_file_and_back():
     assert loads(dump(scene)).solver == scene.solver
     with pytest.raises(InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"):
         loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))
-
-
-def test_every_key_that_comes_from_a_dataclass_says_what_is_allowed():
-    tables = [
-        keys.SolverTable,
-        keys.StrategyTable,
-        keys.OutputTable,
-        *(one for one, _ in keys.MOTIONS.values()),
-    ]
-    for table in tables:
-        assert all(field.description for field in table.model_fields.values()), table
 
 
 def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():

@@ -5,7 +5,6 @@ of the files, but not stricter.
 import json
 import re
 import tomllib
-from dataclasses import fields
 
 import jsonschema
 import pytest
@@ -14,14 +13,12 @@ from tools.meshes import square_mesh
 
 from evfem import templates
 from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad
-from evfem.finger.fingertip import Fingertip
 from evfem.mesh import file as meshfile
-from evfem.scene import keys, meanings
+from evfem.scene import format as scenefile
 from evfem.scene import schema as scenes
 from evfem.scene.file import dump, load, loads
+from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import default_scene
-from evfem.scene.voltage import SIGNALS
 from evfem.sweeps import file as sweepfile
 from evfem.sweeps import schema as sweeps
 from evfem.tissue.laws import LAWS
@@ -78,64 +75,11 @@ def scene_schema():
     return scenes.schema()
 
 
-def test_every_key_of_the_models_has_its_row():
-    found = {(one.name, one.kind): {key.name for key in one.keys} for one in scenes.sections()}
-    models = {
-        ("", ""): keys.SceneTable,
-        ("hand", ""): keys.HandTable,
-        ("finger.electrical", ""): keys.ElectricalTable,
-        ("electrostatics", ""): keys.ElectrostaticsTable,
-        ("solver", ""): keys.SolverTable,
-        ("solver.strategy", ""): keys.StrategyTable,
-        ("output", ""): keys.OutputTable,
-    }
-    models |= {("surface", kind): model for kind, model in keys.SURFACES.items()}
-    models |= {("electrostatics.signal", kind): model for kind, model in SIGNALS.items()}
-    models |= {("motion", kind): model for kind, (model, _) in keys.MOTIONS.items()}
-    for place, model in models.items():
-        assert found.pop(place) == set(model.model_fields), place
-    assert found.pop(("finger", "mesh")) == {*keys.MeshTable.model_fields, "depth"}
-    for kind, cls in (("parametric", FingerPad), ("fingertip", Fingertip)):
-        own = {"kind", "participant", "depth"} | {spec.name for spec in fields(cls) if spec.init}
-        assert found.pop(("finger", kind)) == own
-    for name, (model, _) in keys.FRICTIONS.items():
-        assert found.pop(("surface.friction_law", name)) == {*model.model_fields}
-    for name, (model, _) in keys.ROUGHNESS.items():
-        assert found.pop(("electrostatics.roughness_gap", name)) == set(model.model_fields)
-    for name, law in LAWS.items():
-        parameters = {spec.name for spec in fields(law) if spec.init}
-        assert found.pop(("finger.materials.NAME", name)) == parameters | {"law"}
-    assert found == {}
-
-
-def test_every_key_says_what_it_is_and_no_text_is_left_over():
-    used = set()
+def test_every_key_says_what_it_is_and_what_is_allowed():
     for one in [*scenes.sections(), *sweeps.sections()]:
         for key in one.keys:
             assert key.meaning, key
             assert key.allowed, key
-            used.add(key.meaning)
-    written = [
-        meanings.SCENE,
-        meanings.FINGER,
-        meanings.MESHED_FINGER,
-        meanings.ELECTRICAL,
-        meanings.MATERIAL,
-    ]
-    written += [meanings.ELECTROSTATICS, meanings.SOLVER, meanings.STRATEGY, meanings.OUTPUT]
-    written += [
-        meanings.FRICTION,
-        meanings.HAND,
-        meanings.ROUGHNESS,
-        *meanings.MOTION.values(),
-        meanings.SIGNAL,
-        sweeps.SWEEP,
-        sweeps.SAMPLES,
-        sweeps.DISTRIBUTION,
-    ]
-    for table in [*written, {name: t for name, t in meanings.SURFACE.items() if name != "kind"}]:
-        for name, text in table.items():
-            assert text.meaning in used, name
 
 
 def test_the_defaults_are_those_of_a_scene(scene_schema):
@@ -268,7 +212,7 @@ def test_what_a_template_comments_out_is_a_default(name, tmp_path):
 def test_a_template_names_every_kind(name):
     """A comment `one | two | ...` beside a kind or a law has all there are."""
     text = templates.text(name)
-    for kinds in (keys.SURFACES, keys.MOTIONS, LAWS):
+    for kinds in (scenefile.SURFACES, MOTIONS, LAWS):
         for line in text.splitlines():
             told = set(re.findall(r"\w+", line.rpartition("#")[2])) & set(kinds)
             assert len(told) < 3 or told == set(kinds), line

@@ -102,7 +102,7 @@ def test_voltage_files_over_the_position_are_read_as_ever(tmp_path):
         (SAMPLED, "rate = 1000.0", "rate = -1.0", "electrostatics.signal.rate"),
         (SAMPLED, "voltage = [0, 50.0]", "", "electrostatics.signal"),
         (SAMPLED, "voltage = [0, 50.0]", "voltage = []", "electrostatics.signal.voltage"),
-        (SAMPLED, "repeat = true", 'file = "a.csv"', "electrostatics.signal.voltage"),
+        (SAMPLED, "repeat = true", 'file = "a.csv"', "electrostatics.signal.file"),
         (SAMPLED, "repeat = true", "full_scale = 3.0", "electrostatics.signal.full_scale"),
         (SAMPLED, "rate = 1000.0\nvoltage = [0, 50.0]", 'file = "none.csv"', "electrostatics.signal.file"),
         (SAMPLED, "rate = 1000.0\nvoltage = [0, 50.0]", 'file = "bad.csv"', "electrostatics.signal.file"),
@@ -141,7 +141,7 @@ def test_a_signal_of_ones_own_goes_into_a_scene_but_not_into_a_file():
         assert scene.digest() == scene.digest()
         with pytest.raises(InputError) as caught:
             dump(scene)
-        assert caught.value.key == "electrostatics.voltage"
+        assert caught.value.key.startswith("electrostatics.voltage")
 
 
 PRESS = ev.Press(indentation=0.3, steps=1)

@@ -6,7 +6,7 @@ import csv
 import importlib
 import importlib.util
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,21 +15,10 @@ from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
-from evfem.finger.fingerpad import FingerPad
-from evfem.finger.fingertip import Fingertip
 from evfem.scene.driven import largest_voltage
-from evfem.scene.keys import (
-    MOTIONS,
-    SURFACES,
-    ElectricalTable,
-    ElectrostaticsTable,
-    MeshTable,
-    OutputTable,
-    SceneTable,
-    SolverTable,
-    StrategyTable,
-)
-from evfem.scene.voltage import SIGNALS
+from evfem.scene.format import SIGNALS, SURFACES
+from evfem.scene.motion import MOTIONS
+from evfem.scene.schema import sections
 from evfem.simulation.run import simulate
 from evfem.tissue.elements import elements_on
 from evfem.tissue.laws import LAWS
@@ -122,24 +111,16 @@ NEVER = {
 }
 
 
+LATER = ("friction_law", "depth", "kind", "law")
+
+
 def keys_of_a_scene_file():
-    """Every key of every table, as keys.py and the classes behind it have them."""
-    yield from SceneTable.model_fields
-    tables = {
-        "electrostatics": [ElectrostaticsTable],
-        "finger": [MeshTable],
-        "finger.electrical": [ElectricalTable],
-        "surface": SURFACES.values(),
-        "electrostatics.signal": SIGNALS.values(),
-        "solver": [SolverTable],
-        "solver.strategy": [StrategyTable],
-        "output": [OutputTable],
-        "motion": [table for table, _ in MOTIONS.values()],
-    }
-    for name, several in tables.items():
-        yield from (f"{name}.{key}" for table in several for key in table.model_fields)
-    yield from (f"finger.{spec.name}" for of in (FingerPad, Fingertip) for spec in fields(of) if spec.init)
-    yield from ("finger.participant", "finger.kind")
+    """Every key of every table but those of materials, friction laws and roughness."""
+    for one in sections():
+        if not one.name.startswith(("finger.materials", "surface.friction_law", "electrostatics.roughness")):
+            yield from (
+                f"{one.name}.{key.name}".lstrip(".") for key in one.keys if key.name != "friction_law"
+            )
 
 
 def keys_in(table, prefix=""):

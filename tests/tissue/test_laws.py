@@ -8,7 +8,7 @@ from tools.laws import EnergyOnly, StressOnly
 
 from evfem.errors import InputError
 from evfem.tensor import complex_step, ddot, det, inv, mul, trace, transpose
-from evfem.tissue.laws import LAWS, LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, from_table, split
+from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, SplitLaw, Yeoh, split
 from evfem.tissue.splitlaw import UserLaw, embed
 
 rng = np.random.default_rng(2)
@@ -329,40 +329,6 @@ def test_complex_arrays_pass_through_every_function(law):
 def test_impossible_parameters_are_refused_by_name(make, key):
     with pytest.raises(InputError) as caught:
         make()
-    assert caught.value.key == key
-
-
-def test_tables_make_every_law():
-    assert from_table({"law": "neo_hookean", "E": 0.05, "nu": 0.48}) == NeoHookean(E=0.05, nu=0.48)
-    assert from_table({"law": "linear_elastic", "E": 1, "nu": 0.2, "density": 2e-9}) == LinearElastic(
-        1, 0.2, density=2e-9
-    )
-    assert from_table({"law": "yeoh", "c1": 0.5, "c3": 0.1, "bulk": 3.0}) == Yeoh(c1=0.5, c3=0.1, bulk=3.0)
-    ogden = from_table(
-        {"law": "ogden", "mu": [1.0, -0.2], "alpha": [2.0, -2.0], "nu": 0.45, "viscosity": 1e-3}
-    )
-    assert ogden == Ogden(mu=(1.0, -0.2), alpha=(2.0, -2.0), nu=0.45, viscosity=1e-3)
-    assert set(LAWS) == {"neo_hookean", "yeoh", "ogden", "linear_elastic"}
-
-
-@pytest.mark.parametrize(
-    ("table", "key", "words"),
-    [
-        ({"E": 1.0, "nu": 0.3}, "skin.law", "neo_hookean"),
-        ({"law": "mooney"}, "skin.law", "ogden"),
-        ({"law": "neo_hookean", "E": 1.0, "nu": 0.3, "G": 2.0}, "skin.G", "E, nu, viscosity, density"),
-        ({"law": "neo_hookean", "E": 1.0}, "skin.nu", "a value"),
-        ({"law": "neo_hookean", "E": 1.0, "nu": 0.7}, "skin.nu", "below 0.5"),
-        (
-            {"law": "ogden", "mu": 1.0, "alpha": 2.0, "nu": 0.3, "volume_measure": "trace"},
-            "skin.volume_measure",
-            "mu, alpha",
-        ),
-    ],
-)
-def test_wrong_tables_are_refused_by_key(table, key, words):
-    with pytest.raises(InputError, match=words) as caught:
-        from_table(table, key="skin")
     assert caught.value.key == key
 
 

@@ -1,0 +1,336 @@
+"""The tables of a scene file whose keys are not the fields of one object, and which tables there are.
+
+Such a table is a dataclass like the others, with a method `made` that makes of its keys what they describe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Annotated, Any
+
+from evfem.common.checks import Within, instance, keys_of, number, one_of, yes_or_no
+from evfem.contact.friction import KINDS as FRICTIONS
+from evfem.contact.surfaces import Flat, Friction, Profile, Shift, Sinusoid
+from evfem.contact.textures import Grating, SelfAffine
+from evfem.electrostatics import timesignals
+from evfem.electrostatics.dielectrics import SKINS, DielectricTable, dielectric
+from evfem.electrostatics.drive import CREST, Conductivity, Drive, DriveFrequency, Skin, Waveform
+from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, GapPermittivity, Layer
+from evfem.electrostatics.signalfile import read_voltage
+from evfem.electrostatics.signals import VoltageProfile
+from evfem.electrostatics.timesignals import RATE, START, Sampled
+from evfem.errors import ABSENT, InputError, Mistakes
+from evfem.finger.fingerpad import Electrical, FingerPad
+from evfem.finger.fingertip import Fingertip
+from evfem.scene.keys import LARGEST_TABLE, at, check_size, columns, shown
+from evfem.scene.motion import MOTIONS
+from evfem.scene.scene import (
+    DEPTH,
+    AirLayer,
+    Coupling,
+    Direction,
+    FieldChoice,
+    Grounded,
+    Output,
+    RoughnessGap,
+    Solver,
+)
+
+VERSION = 1
+Table = Mapping[str, Any]
+Pairs = list[list[float]]
+_FRICTION_LAW = {
+    "allowed": "a table [surface.friction_law] with a kind",
+    "type": dict,
+    "kinds": lambda: FRICTIONS,
+}
+_SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
+_SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
+
+
+def _rows(allowed: str, unit: str) -> dict[str, Any]:
+    return instance(allowed, list, unit=unit)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneTable:
+    """The whole file."""
+
+    version: Annotated[int, {"allowed": str(VERSION)}, "version of the format"]
+    finger: Annotated[
+        Table | None, {"allowed": "a table [finger]"}, "the finger; without it that of the paper's Table 2"
+    ] = None
+    surface: Annotated[
+        Table,
+        {"allowed": "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"},
+        "what the finger touches",
+    ]
+    electrostatics: Annotated[
+        Table | None,
+        {"allowed": "a table [electrostatics]"},
+        "insulator, voltage and force law; without it no attraction",
+    ] = None
+    hand: Annotated[
+        Table | None,
+        {"allowed": "a table [hand]"},
+        "between drive and bone; without it the drive moves the bone itself",
+    ] = None
+    solver: Annotated[
+        Table | None,
+        {"allowed": "a table [solver]"},
+        "how the scene is solved; the defaults are the recommended ones",
+    ] = None
+    output: Annotated[Table | None, {"allowed": "a table [output]"}, "which fields are kept"] = None
+    motion: Annotated[
+        list[Table],
+        instance("one or more tables [[motion]]", list),
+        "what happens, one table [[motion]] after the other",
+    ]
+
+
+@dataclass(frozen=True)
+class BesideFinger:
+    """Keys of [finger] that are no parameters of its kind."""
+
+    participant: Annotated[
+        str | None, {"allowed": "i to xi"}, "sizes of one of Table 1's fingers; other keys go before"
+    ] = None
+    depth: Annotated[float | None, DEPTH, "of the finger; adds forces in N, areas in mm2"] = None
+
+
+@dataclass(frozen=True)
+class BesideSurface:
+    """The key of [surface] that is the scene's."""
+
+    friction_law: Annotated[
+        Any,
+        _FRICTION_LAW,
+        "what the coefficient means; without it Coulomb's law",
+    ] = None
+
+
+@dataclass(frozen=True)
+class ProfileTable:
+    """[surface] of the kind profile."""
+
+    file: Annotated[
+        str | None,
+        {"allowed": "the path of a csv file with the header x,height", "file": True}
+        | instance("the path of a csv file with the header x,height", str, Path),
+        "heights over x",
+    ] = None
+    points: Annotated[
+        Pairs | None, _rows("rows [[x, height], ...] in mm", "mm"), "the same in the scene file"
+    ] = None
+    friction: Friction = 0.3
+    y: Shift = None
+    insulator: Layer | None = None
+
+    def made(self, folder: Path) -> Profile:
+        """The profile of the file or of the points."""
+        common: Any = {"friction": self.friction, "y": self.y, "insulator": self.insulator}
+        if (self.file is None) == (self.points is None):
+            given = ABSENT if self.file is None else "file and points"
+            raise InputError("surface.file", given, "the path of a csv file with the header x,height")
+        if self.points is not None:
+            return Profile(*columns("surface.points", self.points), **common)
+        return Profile.from_csv(self.file or "", **common)
+
+
+@dataclass(frozen=True)
+class SampledTable:
+    """[electrostatics.signal] of the kind sampled."""
+
+    file: Annotated[
+        str | None,
+        {"file": True}
+        | instance("the path of a csv file with the header time,voltage, or of a .wav", str, Path),
+        "the samples",
+    ] = None
+    full_scale: Annotated[
+        float | None, number("the voltage of the largest sample of a .wav, in V", Within(), "V"), "of a .wav"
+    ] = None
+    voltage: Annotated[
+        list[float] | None, instance("samples in V", list, unit="V"), "the samples in the scene file"
+    ] = None
+    rate: Annotated[float | None, RATE, "of the samples in the scene file"] = None
+    start: Annotated[
+        float | None,
+        START | {"allowed": "the time of the first sample in s; not with a csv file"},
+        "time of the first sample",
+    ] = None
+    repeat: Annotated[bool, yes_or_no(), "whether it begins anew at its end"] = False
+
+    def made(self, folder: Path) -> Sampled:
+        """The samples of the file, or as they stand in the table."""
+        file = self.file if self.file is None else Path(self.file)
+        wav = file is not None and file.suffix.lower() == ".wav"
+        usable = {"repeat", "file"} | ({"full_scale", "start"} if wav else set())
+        if file is None:
+            usable = {"repeat", "voltage", "rate", "start"}
+            if self.voltage is None or self.rate is None:
+                raise InputError(
+                    "electrostatics.signal", "neither file nor voltage with rate", "one of the two"
+                )
+        for name in (spec.name for spec in fields(self)):
+            if (value := getattr(self, name)) is not None and name not in usable:
+                beside = "voltage" if file is None else f"the file {file.name}"
+                raise InputError(name, f"{shown(value)} beside {beside}", "nothing here")
+        if file is None:
+            return Sampled(self.voltage, self.rate or 0.0, self.start or 0.0, self.repeat)
+        with at("electrostatics.signal", path="electrostatics.signal.file"):
+            if wav:
+                return Sampled.from_wav(file, self.full_scale, start=self.start or 0.0, repeat=self.repeat)
+            return Sampled.from_csv(file, repeat=self.repeat)
+
+
+SIGNALS: Mapping[str, Any] = {**timesignals.SIGNALS, "sampled": SampledTable}
+
+
+@dataclass(frozen=True)
+class Electrostatics:
+    """[electrostatics]: law, voltage and drive of a scene, and the insulator of its surface."""
+
+    law: Annotated[str, one_of(*FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
+    voltage: Annotated[
+        float | None,
+        number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V"),
+        "effective, across skin and insulator",
+    ] = None
+    amplitude: Annotated[
+        float | None,
+        number("a peak voltage in V, from 0 to 1e6", Within(0.0, 1e6), "V"),
+        "peak, instead of voltage",
+    ] = None
+    frequency: DriveFrequency = None
+    waveform: Waveform = "sine"
+    skin: Annotated[Skin, instance(f"{' | '.join(SKINS)} | the path of a csv file", str)] = None
+    gap_conductivity: Conductivity = 0.0
+    drive: Annotated[
+        str | None,
+        one_of("mean", "resolved"),
+        "attraction by its mean over the cycle, or resolved in time with its charges",
+    ] = None
+    voltage_file: Annotated[
+        str | None,
+        {"file": True}
+        | instance(
+            "the path of a csv file (header: position,voltage or time,voltage) or of a .wav", str, Path
+        ),
+        "voltage over the position, instead of a number",
+    ] = None
+    voltage_profile: Annotated[
+        Pairs | None,
+        _rows("rows [[position, voltage], ...] in mm and V", "mm, V"),
+        "the same in the scene file",
+    ] = None
+    signal: Annotated[
+        Any,
+        _SIGNAL,
+        "voltage over time, instead of a number",
+    ] = None
+    insulator: Annotated[str | None, one_of(*INSULATORS), "a usual insulator by its name"] = None
+    insulator_thickness: Annotated[
+        float | None,
+        number("a thickness in mm, not negative", Within(0.0), "mm"),
+        "of the display's insulator",
+    ] = None
+    insulator_eps_r: Annotated[
+        float | None, number("a relative permittivity, at least 1", Within(1.0)), "its relative permittivity"
+    ] = None
+    gap_eps_r: Annotated[GapPermittivity, number("a relative permittivity, at least 1", Within(1.0))] = 1.0
+    air_layer: AirLayer = True
+    direction: Direction = "vertical"
+    field: FieldChoice = "local"
+    electrodes: Annotated[
+        Pairs | None,
+        _rows("rows [[from, to, share], ...] in mm, with gaps between", "mm, 1"),
+        "where electrodes end, and their share of the voltage; with field full",
+    ] = None
+    grounded: Grounded = True
+    coupling: Coupling = "monolithic"
+    roughness_gap: RoughnessGap = 0.0
+
+    def layer(self) -> Layer:
+        """The insulator by its name, or by its thickness and permittivity."""
+        own = {name: getattr(self, name) for name in ("insulator_thickness", "insulator_eps_r")}
+        mistakes = Mistakes()
+        for name, value in own.items():
+            if self.insulator is not None and value is not None:
+                given = f"{value:g} beside insulator = {self.insulator}"
+                raise InputError(f"electrostatics.{name}", given, "one of the two")
+            with mistakes.of_a_part():
+                if self.insulator is None and value is None:
+                    rule = next(key.rule for key in keys_of(Electrostatics) if key.name == name)
+                    allowed = f"{rule['allowed']}; or insulator = {' | '.join(INSULATORS)}"
+                    raise InputError(f"electrostatics.{name}", ABSENT, allowed)
+        mistakes.report()
+        return Layer(*own.values()) if self.insulator is None else INSULATORS[self.insulator]
+
+    def scene_keys(self, ramped: bool, folder: Path) -> dict[str, Any]:
+        """What it says of a scene; `ramped`: the voltage may begin without one."""
+        names = ("air_layer", "direction", "field", "grounded", "coupling", "roughness_gap")
+        own = {"law": FORCE_LAWS[self.law](gap_eps_r=self.gap_eps_r), "voltage": self._voltage(not ramped)}
+        return own | {"drive": self._drive(folder)} | {name: getattr(self, name) for name in names}
+
+    def _voltage(self, needed: bool) -> Any:
+        names = ("voltage", "amplitude", "voltage_file", "voltage_profile", "signal")
+        given = [name for name in names if getattr(self, name) is not None]
+        if len(given) > 1 or (needed and not given):
+            allowed = "exactly one of voltage (V), amplitude (V), voltage_file and signal"
+            raise InputError("electrostatics.voltage", " and ".join(given) or ABSENT, allowed)
+        key = "electrostatics.voltage_file"
+        if self.voltage_file is not None:
+            with at(key, voltage_file=key, path=key):
+                return read_voltage(Path(self.voltage_file))
+        if self.voltage_profile is not None:
+            with at("electrostatics.voltage_profile"):
+                return VoltageProfile(*columns("electrostatics.voltage_profile", self.voltage_profile))
+        if self.amplitude is not None:
+            return self.amplitude / CREST[self.waveform]
+        return self.signal or self.voltage or 0.0
+
+    def _drive(self, folder: Path) -> Drive | None:
+        """The drive, None where no key asks for one."""
+        usual = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": None}
+        given = {name: getattr(self, name) for name in usual}
+        if given in (usual, usual | {"drive": "mean"}) and (given == usual or self.signal is None):
+            return None
+        resolved = given.pop("drive") == "resolved"
+        with at("electrostatics"):
+            if given["skin"] is not None and given["skin"] not in SKINS:
+                path = folder / given["skin"]
+                if path.suffix.lower() != ".csv":
+                    dielectric(given["skin"])
+                check_size("electrostatics.skin", path, LARGEST_TABLE)
+                given["skin"] = DielectricTable.from_csv(path)
+            return Drive(**given, resolved=resolved)
+
+
+SURFACES: Mapping[str, Any] = {
+    "flat": Flat,
+    "sinusoid": Sinusoid,
+    "profile": ProfileTable,
+    "grating": Grating,
+    "self_affine": SelfAffine,
+}
+FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
+
+
+def names(*classes: Any) -> list[str]:
+    """The keys of tables."""
+    return [key.name for cls in classes for key in keys_of(cls)]
+
+
+#: tables that a key may have been meant for
+HOMES: Mapping[str, list[str]] = {
+    "[finger]": names(BesideFinger, FingerPad),
+    "[finger.electrical]": names(Electrical),
+    "[electrostatics]": names(Electrostatics),
+    "[surface]": names(BesideSurface, Flat),
+    "[solver]": names(Solver),
+    "[output]": names(Output),
+    "[[motion]]": names(*MOTIONS.values()),
+}

@@ -1,0 +1,114 @@
+"""How a scene is solved, and which fields are kept."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from evfem.common.checks import Within, check_fields, number, one_of, whole, yes_or_no
+from evfem.errors import ABSENT, InputError, quoted
+from evfem.solver.strategy import Strategy
+from evfem.tissue.elements import ELEMENTS, elements_on
+
+DYNAMICS = ("quasistatic", "viscous", "inertial")
+CONTACTS = ("exact", "penalty")
+PRECISIONS = ("single", "double")
+_PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True), "N/mm3")
+_TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3))
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How a scene is solved; the defaults are the recommended ones.
+
+    `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
+    largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
+    (N/mm3) go with `contact="penalty"` alone. With `symmetry` a scene that is its own mirror image
+    is computed from its right half. `strategy` says how hard steps are tried.
+    """
+
+    element: Annotated[str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles"] = None
+    dynamics: Annotated[str, one_of(*DYNAMICS), "without time, with viscosity, or with inertia too"] = (
+        "quasistatic"
+    )
+    contact: Annotated[str, one_of(*CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
+    penalty_normal: Annotated[float | None, _PENALTY, "with contact = penalty"] = None
+    penalty_tangential: Annotated[float | None, _PENALTY, "with contact = penalty and friction"] = None
+    tolerance: Annotated[
+        float, _TOLERANCE, "largest free residual over the largest reaction, of every step"
+    ] = 1e-8
+    threads: Annotated[int, whole(1024), "of the factorisation"] = 1
+    symmetry: Annotated[
+        bool, yes_or_no(), "whether a scene that is its own mirror image is computed from its right half"
+    ] = False
+    strategy: Annotated[Strategy, {"allowed": "a table [solver.strategy]"}, "how hard steps are tried"] = (
+        field(default_factory=Strategy)
+    )
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.strategy, Strategy):
+            raise InputError("strategy", quoted(self.strategy), "a Strategy")
+        for key in ("penalty_normal", "penalty_tangential"):
+            if self.contact == "exact" and getattr(self, key) is not None:
+                raise InputError(key, quoted(getattr(self, key)), 'only with contact = "penalty"')
+        check_fields(self)
+        if self.contact == "penalty" and self.penalty_normal is None:
+            allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
+            raise InputError("penalty_normal", ABSENT, allowed)
+
+    @classmethod
+    def within(cls, error: float = 1e-3) -> Solver:
+        """What costs least where forces shall err by at most this share beside the mesh's own error:
+        residuals of a thousandth of it, steps that are cut only where the path would err by more,
+        and half of a symmetric scene.
+
+        >>> auto = Strategy(steps="auto", path_error=0.001)
+        >>> Solver.within(0.001) == Solver(tolerance=1e-6, symmetry=True, strategy=auto)
+        True
+        """
+        strategy = Strategy(steps="auto", path_error=error)
+        return cls(tolerance=1e-3 * error, symmetry=True, strategy=strategy)
+
+    def element_on(self, corners: int) -> str:
+        """The element used on cells with that many corners (3, 4 or 8).
+
+        >>> Solver().element_on(4), Solver().element_on(3), Solver(element="q1").element_on(4)
+        ('q2p1', 'p2', 'q1')
+        >>> Solver(element="q1").element_on(3)
+        Traceback (most recent call last):
+        evfem.errors.InputError: solver.element: given q1 on a mesh of triangles; allowed: p2
+        """
+        names = elements_on(corners)
+        if self.element is None:
+            return {3: "p2", 4: "q2p1", 8: "hex27p1"}[corners]
+        if self.element not in names:
+            cells = {3: "triangles", 4: "quads", 8: "hexahedra"}[corners]
+            raise InputError("solver.element", f"{self.element} on a mesh of {cells}", " | ".join(names))
+        return self.element
+
+
+@dataclass(frozen=True)
+class Output:
+    """Fields are kept of every `every`-th step, and of the last one; None keeps all.
+
+    What is left open `evfem run` chooses so that its files of fields stay small
+    (`evfem.export.FieldFiles`): with `every` None it may write fewer of them, with `precision`
+    None in single precision. `compression` makes them smaller still, and slower to write.
+    """
+
+    every: Annotated[
+        int | None,
+        whole(),
+        "fields of every n-th step, and of the last one; without it as many as fit in 25 MB",
+    ] = None
+    precision: Annotated[
+        str | None,
+        one_of(*PRECISIONS),
+        "of the fields; without it single where they would take more than 25 MB",
+    ] = None
+    compression: Annotated[
+        bool, yes_or_no(), "of the fields' files: a third of the size, slower to write"
+    ] = False
+
+    def __post_init__(self) -> None:
+        check_fields(self)
