@@ -14,7 +14,6 @@ from evfem.errors import NotConverged
 from evfem.fast.memory import CondensedPad
 from evfem.fast.step import RememberedPad
 from evfem.mesh.mesh import Mesh
-from evfem.scene.driven import largest_voltage
 from evfem.scene.scene import Scene
 from evfem.scene.way import allowed_error
 from evfem.simulation.ledger import Ledger
@@ -71,7 +70,7 @@ class FastRun(Run):
         points = mesh.points[whole.nodes]
         surface, first_gap = placed(scene.ground, points)
         attraction = None
-        if scene.law is not None and largest_voltage(scene) != 0.0:
+        if scene.electrics.acts:
             attraction = make_attraction(scene, mesh, whole, surface)
             attraction = replace(attraction, pad=alone)
         limits = limits_of(scene)

@@ -10,7 +10,6 @@ from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.contact.pad import make_pad
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.driven import lossless, skin_thickness, solids
 from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover
 from evfem.scene.scene import Scene
@@ -60,13 +59,9 @@ def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
     line = in_line(pad, facing(pad, position))
     ground = scene.ground.height(position[:, 0])
     height = position[:, 1] - ground
-    electrical = scene.finger.electrical
-    thickness = skin_thickness(electrical, mesh, pad.nodes)
-    skin, insulator = (
-        lossless(scene, layer) for layer in solids(scene, thickness, electrical.stratum_corneum_eps_r)
-    )
+    electrics = scene.electrics.above(scene.finger.electrical, mesh, pad.nodes)
+    skin, insulator = (electrics.lossless(layer) for layer in (electrics.skin, electrics.insulator))
     reduced = np.asarray(skin.thickness) / skin.eps_r
     above = height - height.min() + gap
     levels = np.stack([ground, ground + above])[:, line]
-    gap_eps_r = getattr(scene.law, "gap_eps_r", 1.0)
-    return certificate(position[line, 0], levels, insulator, reduced[line], gap_eps_r), gap
+    return certificate(position[line, 0], levels, insulator, reduced[line], electrics.gap_eps_r), gap

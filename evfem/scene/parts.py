@@ -18,7 +18,6 @@ from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.protocols import RoughnessLaw, TimeSignal
-from evfem.scene.driven import applied, attracting, largest_voltage, skin_of, solids
 from evfem.scene.motion import Slide, VoltageRamp, Wait
 from evfem.scene.partchecks import (
     check_arguments,
@@ -75,7 +74,7 @@ def check_parts(scene: Scene) -> None:
         check_friction_law(scene)
     if isinstance(scene.roughness_gap, RoughnessLaw) and _is_own(scene.roughness_gap):
         check_roughness(scene.roughness_gap)
-    voltage = largest_voltage(scene)
+    voltage = scene.electrics.largest_voltage
     if voltage > HIGHEST_VOLTAGE:
         raise InputError("electrostatics.voltage", voltage, f"a voltage in V up to {HIGHEST_VOLTAGE:g}")
     if scene.law is not None and _is_own(scene.law):
@@ -176,8 +175,8 @@ def _check_force_law(scene: Scene, law: Any, voltage: float) -> None:
     """Whether a user's traction is one up to the largest voltage of the scene (V), and below none."""
     key = "electrostatics.law"
     check_arguments(key, law.traction, ("traction", "gap", "voltage", "layers"))
-    thickness, eps_r = skin_of(scene)
-    seen, layers = attracting(scene, *solids(scene, np.full(GAPS.shape, thickness), eps_r))
+    skin = np.full(GAPS.shape, scene.electrics.skin.thickness)
+    seen, layers = scene.electrics.of_skin(skin).attraction
     at = voltage or 1.0
     what = "traction(gap, voltage, layers)"
     found = evaluated(key, what, lambda gap: seen.traction(gap, at, layers), GAPS)
@@ -219,7 +218,7 @@ def _check_negative(key: str, traction: Callable[[Array], Any], voltage: float) 
 
 def _lowest(scene: Scene) -> float:
     """Lowest voltage (V) of a scene, as far as some moments and places tell."""
-    own: Any = applied(scene)
+    own: Any = scene.electrics.voltage
     slides = [motion for motion in scene.motion if isinstance(motion, Slide)]
     if isinstance(own, FollowForce):
         own = 0.0

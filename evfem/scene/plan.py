@@ -21,7 +21,6 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
-from evfem.scene.driven import applied, largest_voltage, skin_of
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
@@ -229,10 +228,10 @@ def _friction(scene: Scene) -> Term:
 
 
 def _electricity(scene: Scene) -> Term:
-    if scene.law is None or largest_voltage(scene) == 0.0:
+    if not scene.electrics.acts:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
-    signal = applied(scene)
+    signal = scene.electrics.voltage
     over_time = (
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
@@ -242,7 +241,7 @@ def _electricity(scene: Scene) -> Term:
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
     """What bounds say of the full field, where a scene asks for it or leaves the choice."""
-    if scene.field == "local" or scene.law is None or largest_voltage(scene) == 0.0:
+    if scene.field == "local" or not scene.electrics.acts:
         return ()
     from evfem.scene.fieldchoice import chosen_field
 
@@ -265,12 +264,12 @@ def _drive(scene: Scene) -> tuple[Term, ...]:
     """The time scales of a scene with a drive."""
     if scene.drive is None:
         return ()
-    return (Term("drive", True, time_scales(scene, *skin_of(scene))),)
+    return (Term("drive", True, time_scales(scene)),)
 
 
 def _time(scene: Scene) -> Term:
     dynamics = scene.solver.dynamics
-    clock = ", the clock sets the voltage alone" if isinstance(applied(scene), TimeSignal) else ""
+    clock = ", the clock sets the voltage alone" if isinstance(scene.electrics.voltage, TimeSignal) else ""
     lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
     if dynamics == "quasistatic":
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))

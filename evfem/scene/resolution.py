@@ -17,7 +17,6 @@ from evfem.contact.textures import SelfAffine
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
-from evfem.scene.driven import applied
 from evfem.scene.motion import Motion, Slide, Wait
 from evfem.scene.scene import Scene
 
@@ -90,7 +89,7 @@ def too_fast(scene: Scene) -> str | None:
     The attraction goes with the square of the voltage, so with up to twice that frequency; what
     lies above half the rate of the steps appears below it (aliasing).
     """
-    signal = applied(scene)
+    signal = scene.electrics.voltage
     if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
         return None
     steps = {i: _seconds(motion) / motion.steps for i, motion in enumerate(scene.motion)}

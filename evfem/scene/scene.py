@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Annotated, Any, Protocol, runtime_checkable
 
 from evfem.common.checks import (
@@ -31,7 +32,7 @@ from evfem.electrostatics.roughness import WIDEST, roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw, Surface, TimeSignal
-from evfem.scene.driven import applied, check_drive
+from evfem.scene.electrics import Electrics, check_drive
 from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.options import Output, Solver
@@ -180,6 +181,11 @@ class Scene:
         """The surface with all that contact asks of it, derived where it is the user's own."""
         return completed(self.surface)
 
+    @cached_property
+    def electrics(self) -> Electrics:
+        """Voltage, layers and law of the attraction as a run has them."""
+        return Electrics.of(self)
+
     @property
     def has_friction(self) -> bool:
         """Whether anything may resist sliding."""
@@ -322,7 +328,9 @@ def _check_motion(scene: Scene) -> None:
 
 
 def _check_time(scene: Scene) -> None:
-    timed = isinstance(applied(scene), TimeSignal) or (scene.drive is not None and scene.drive.resolved)
+    timed = isinstance(scene.electrics.voltage, TimeSignal) or (
+        scene.drive is not None and scene.drive.resolved
+    )
     if timed and not any(takes_time(motion) for motion in scene.motion):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")

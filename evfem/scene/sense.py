@@ -18,7 +18,6 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.scene.driven import largest_voltage, layers_of, lossless, skin_of, solids
 from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
@@ -106,10 +105,10 @@ def _breakdown(scene: Scene) -> Iterator[str]:
     """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
     if scene.law is None or isinstance(scene.voltage, (FollowForce, ChargeControl)):
         return
-    voltage, layers = largest_voltage(scene), solids(scene, *skin_of(scene))
-    reduced = float(np.min(layers_of(scene).reduced))
-    for name, layer in zip(("stratum corneum", "insulator"), layers, strict=True):
-        field = 1e-3 * voltage / (float(np.min(lossless(scene, layer).eps_r)) * reduced)
+    seen, voltage = scene.electrics, scene.electrics.largest_voltage
+    reduced = float(np.min(seen.attraction[1].reduced))
+    for name, layer in (("stratum corneum", seen.skin), ("insulator", seen.insulator)):
+        field = 1e-3 * voltage / (float(np.min(seen.lossless(layer).eps_r)) * reduced)
         if field > BREAKDOWN and np.max(layer.thickness) > 0.0:
             yield (
                 f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
@@ -145,7 +144,7 @@ def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
         gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
         if gap <= 0.0:
             return False
-    if scene.law is None or largest_voltage(scene) == 0.0:
+    if not scene.electrics.acts:
         return True
     return gap > 0.0 and hover_share(scene, mesh, gap) < STAYS_UP
 
@@ -159,8 +158,8 @@ def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
     smallest gap.
     """
     assert scene.law is not None
-    layers = Layers.of(lossless(scene, scene.ground.insulator))
-    traction = float(np.max(scene.law.traction(gap, largest_voltage(scene), layers)))
+    layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
+    traction = float(np.max(scene.law.traction(gap, scene.electrics.largest_voltage, layers)))
     softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
     depth = float(np.ptp(mesh.points[:, 1]))
     return traction * depth / softest * 2.0 / gap

@@ -18,20 +18,17 @@ from evfem.electrostatics.laws import Layer, StrongTroxel
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
-from evfem.scene.driven import frequency, sandwich, solids
 from evfem.scene.scene import Scene
 
 #: a swing up to so many times the highest frequency that the tissue follows still moves it
 FOLLOWS = 5.0
 
 
-def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
-    """What the drive of a scene is, which time scales it has, and which of them are resolved; the
-    stratum corneum is `thickness` mm thick.
-    """
+def time_scales(scene: Scene) -> str:
+    """What the drive of a scene is, which time scales it has, and which of them are resolved."""
     drive = scene.drive
     assert drive is not None
-    at = frequency(scene)
+    at = scene.electrics.frequency
     what = "direct voltage" if at is None else f"{drive.waveform} of {at:g} Hz"
     if isinstance(scene.voltage, OpenCircuit):
         what = f"open circuit: {scene.voltage.voltage:g} V, disconnected after {scene.voltage.after:g} s"
@@ -40,7 +37,7 @@ def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
     elif isinstance(scene.voltage, TimeSignal):
         what = f"{type(scene.voltage).__name__} signal"
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
-    charge = _charge(scene, thickness, eps_r)
+    charge = _charge(scene)
     parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
     if drive.resolved and not isinstance(scene.law, StrongTroxel):
         parts.append("no balance of the source, which only Strong and Troxel's law has")
@@ -49,13 +46,14 @@ def time_scales(scene: Scene, thickness: float, eps_r: float) -> str:
     return "; ".join(parts)
 
 
-def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
+def _charge(scene: Scene) -> list[str]:
     """Below which frequencies gap and skin discharge where they touch."""
-    at, layers = frequency(scene), solids(scene, thickness, eps_r)
+    seen = scene.electrics
     assert scene.drive is not None
-    solid, film = (Layer(one.thickness, Dielectric(*_constants(one, at))) for one in layers)
-    leak, medium = scene.drive.gap_conductivity, getattr(scene.law, "gap_eps_r", 1.0)
-    stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=medium)
+    layers = (seen.skin, seen.insulator)
+    solid, film = (Layer(one.thickness, Dielectric(*_constants(one, seen.frequency))) for one in layers)
+    leak = scene.drive.gap_conductivity
+    stack = Sandwich.of(solid, film, frequency=None, gap_conductivity=leak, gap_eps_r=seen.gap_eps_r)
     skin, gap, _ = (float(np.max(rate)) for rate in stack.rates)
     said = []
     if gap > 0.0:
@@ -63,7 +61,7 @@ def _charge(scene: Scene, thickness: float, eps_r: float) -> list[str]:
     if skin > 0.0:
         corner = skin / (1.0 + float(np.max(stack.skin)) / float(np.max(stack.insulator))) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
-    relaxing = _relaxing(scene, layers) if scene.drive.resolved else []
+    relaxing = _relaxing(seen.sandwich) if scene.drive.resolved else []
     return [*(said or ["charge: nothing conducts"]), *relaxing]
 
 
@@ -73,9 +71,8 @@ def _constants(layer: Layer, at: float | None) -> tuple[float, tuple[()], float]
     return float(np.max(eps_r)), (), float(np.max(sigma))
 
 
-def _relaxing(scene: Scene, layers: tuple[Layer, Layer]) -> list[str]:
+def _relaxing(stack: Sandwich | RelaxingSandwich) -> list[str]:
     """How many poles the dielectrics of a resolved drive have, and how slow."""
-    stack = sandwich(scene, *layers)
     if not isinstance(stack, RelaxingSandwich):
         return []
     times = np.concatenate([stack.skin.tau, stack.insulator.tau])
@@ -100,14 +97,14 @@ def slowest_swing(scene: Scene) -> float:
     """Lowest frequency (Hz) at which the attraction swings: twice the voltage's, or that itself where
     it has a bias, or even harmonics.
     """
-    at, found = frequency(scene) or 0.0, powers(scene.voltage)
+    at, found = scene.electrics.frequency or 0.0, powers(scene.voltage)
     odd = found is None or not (found[1] % 2.0 == 0.0).any()
     return 2.0 * at if odd else at
 
 
 def left_out(scene: Scene) -> str | None:
     """A sentence if a mean over the cycle leaves out what moves the tissue, else None."""
-    at, highest = frequency(scene), bandwidth(scene)
+    at, highest = scene.electrics.frequency, bandwidth(scene)
     if scene.drive is None or scene.drive.resolved or at is None or np.isinf(highest):
         return None
     swing = slowest_swing(scene)

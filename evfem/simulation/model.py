@@ -22,15 +22,6 @@ from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.mesh.symmetry import Half
-from evfem.scene.driven import (
-    attracting,
-    conducts,
-    lossless,
-    permittivities,
-    sandwich,
-    skin_thickness,
-    solids,
-)
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -159,15 +150,13 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
 
 def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
-    electrical = scene.finger.electrical
-    thickness = skin_thickness(electrical, mesh, pad.nodes)
+    electrics = scene.electrics.above(scene.finger.electrical, mesh, pad.nodes)
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
-    skin, insulator = solids(scene, thickness, electrical.stratum_corneum_eps_r)
-    law, layers = attracting(scene, skin, insulator)
+    law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
     if scene.drive is not None and scene.drive.resolved:
-        charging = Charging(sandwich(scene, skin, insulator), pad.nodes.size)
+        charging = Charging(electrics.sandwich, pad.nodes.size)
     local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
     if scene.field == "local":
         return Attraction(*local)
@@ -177,18 +166,18 @@ def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)
     assert isinstance(pad, Pad)
-    full = (*local, facing(pad, mesh.points[pad.nodes]), skin, not scene.grounded)
-    if scene.drive is None or not conducts(scene, skin, insulator):
+    full = (*local, facing(pad, mesh.points[pad.nodes]), electrics.skin, not scene.grounded)
+    if not electrics.conducts:
         return FieldAttraction(*full)
     from evfem.contact.drivenfield import DrivenFieldAttraction, Harmonic
 
-    harmonics = tuple(Harmonic(*one) for one in permittivities(scene, skin, insulator))
+    harmonics = tuple(Harmonic(*one) for one in electrics.permittivities)
     return DrivenFieldAttraction(*full, harmonics=harmonics)
 
 
 def _check_quadratic(scene: Scene) -> None:
     """The squared voltage can be an unknown only of laws that are proportional to it."""
-    layers = Layers.of(lossless(scene, scene.ground.insulator))
+    layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
     assert scene.law is not None
     once, twice = (scene.law.traction(0.1, voltage, layers) for voltage in (1.0, 2.0))
     if not np.isclose(twice, 4.0 * once, rtol=1e-9):

@@ -7,7 +7,6 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from os import PathLike
 from typing import Any
 
@@ -22,7 +21,6 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.protocols import Observer, TimeSignal
-from evfem.scene.driven import applied
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.scene.way import allowed_error
@@ -154,10 +152,10 @@ class Run:
         if resume is not None:
             self._restore(resume)
 
-    @cached_property
+    @property
     def voltage(self) -> Any:
-        """The voltage that the run follows: the scene's own, or that of the moment of its drive."""
-        return applied(self.scene)
+        """The voltage that the run follows."""
+        return self.scene.electrics.voltage
 
     def voltage_at(self, position: float, time: float) -> float:
         """The scene's own voltage when the bone is at `position` (mm), at `time` (s)."""
@@ -170,14 +168,14 @@ class Run:
 
     def _follows(self, seconds: float) -> bool:
         """Whether a step of so many seconds follows the scene's voltage on the way."""
-        voltage = self.voltage
+        voltage = self.scene.electrics.voltage
         return isinstance(voltage, VoltageProfile) or (isinstance(voltage, TimeSignal) and seconds > 0.0)
 
     def _kept(self, time: float, begin: float) -> KeptCharge | None:
         """What prescribes the electrode's charge at `time` (s) in a step that begins at `begin`, if
         anything does.
         """
-        voltage = self.voltage
+        voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
             return KeptCharge(0.0, NANO * voltage.charge_at(time) / eps_0)
         if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
@@ -306,7 +304,7 @@ class Run:
             return Target(x, height, drive(x, fraction), duration, z, end.hand)
 
         def drive(x: float, fraction: float) -> VoltageControl:
-            wanted = self.voltage
+            wanted = self.scene.electrics.voltage
             if isinstance(end.drive, KeptCharge):
                 return self._kept(begin + fraction * seconds, begin) or end.drive
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):

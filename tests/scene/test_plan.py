@@ -10,7 +10,7 @@ from tools.builders import finger
 from tools.meshes import block
 
 import evfem as ev
-from evfem.scene.plan import largest_voltage, plan, plan_on, rigid_share, scene_mesh
+from evfem.scene.plan import plan, plan_on, rigid_share, scene_mesh
 from evfem.scene.way import remembers
 from evfem.simulation.model import make_model
 
@@ -67,9 +67,9 @@ def test_whoever_moves_otherwise_than_hovering_deforms(motion):
 
 def test_the_largest_voltage_of_any_source_counts():
     profile = ev.VoltageProfile([0.0, 1.0], [10.0, -300.0])
-    assert largest_voltage(hovering(voltage=profile)) == 300.0
+    assert hovering(voltage=profile).electrics.largest_voltage == 300.0
     ramps = [ev.VoltageRamp(-500.0), ev.VoltageRamp(0.0)]
-    assert largest_voltage(hovering(voltage=20.0, motion=ramps)) == 500.0
+    assert hovering(voltage=20.0, motion=ramps).electrics.largest_voltage == 500.0
     from_nothing = hovering(voltage=0.0, motion=ramps)
     assert plan(from_nothing).has("electricity")
     assert not plan(hovering(voltage=0.0)).has("electricity")

@@ -15,7 +15,6 @@ from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.errors import NotConverged
-from evfem.scene.driven import largest_voltage
 from evfem.scene.format import SIGNALS, SURFACES
 from evfem.scene.motion import MOTIONS
 from evfem.scene.schema import sections
@@ -53,7 +52,7 @@ def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
         scene = tables.scene_of(one)
         thickness = float(scene.ground.insulator.thickness)
         if not isinstance(scene.voltage, ChargeControl):  # whose voltage is what comes out
-            assert largest_voltage(scene) <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
+            assert scene.electrics.largest_voltage <= min(3000.0, 60e3 * thickness) * (1.0 + 1e-5)
         assert 1e-3 <= thickness <= 0.5
     for one in drawn:
         friction = np.atleast_2d(one["surface"]["friction"])[:, -1]
@@ -119,9 +118,7 @@ def keys_of_a_scene_file():
     """Every key of every table but those of materials, friction laws and roughness."""
     for one in sections():
         if not one.name.startswith(("finger.materials", "surface.friction_law", "electrostatics.roughness")):
-            yield from (
-                f"{one.name}.{key.name}".lstrip(".") for key in one.keys if key.name not in LATER
-            )
+            yield from (f"{one.name}.{key.name}".lstrip(".") for key in one.keys if key.name not in LATER)
 
 
 def keys_in(table, prefix=""):

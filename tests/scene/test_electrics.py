@@ -7,8 +7,13 @@ import pytest
 
 import evfem as ev
 from evfem.errors import InputError
-from evfem.scene.driven import applied, attracting, frequency, largest_voltage, solids
 from evfem.scene.file import dump, loads
+
+
+def thin(scene):
+    """Below 0.3 mm of skin."""
+    return scene.electrics.of_skin(0.3)
+
 
 HEAD = """
 version = 1
@@ -36,8 +41,8 @@ def test_keys_make_a_drive_and_are_written_again():
         HEAD + 'amplitude = 90.0\nfrequency = 60.0\nwaveform = "square"\ndrive = "resolved"\n' + HOVER + WAIT
     )
     assert square.voltage == 90.0
-    assert applied(square) == ev.Square(60.0, 90.0)
-    assert largest_voltage(square) == 90.0
+    assert square.electrics.voltage == ev.Square(60.0, 90.0)
+    assert square.electrics.largest_voltage == 90.0
     assert loads(dump(square)) == square
     plain = loads(HEAD + "voltage = 70.0\n" + HOVER)
     assert plain.drive is None
@@ -49,7 +54,7 @@ def test_skin_from_a_table_stands_beside_the_scene(tmp_path):
     (tmp_path / "skin.csv").write_text("frequency,eps_r,conductivity\n10,2000,1e-4\n1000,1000,1e-4\n")
     text = HEAD + 'voltage = 70.0\nfrequency = 10.0\nskin = "skin.csv"\n' + HOVER
     scene = loads(text, tmp_path)
-    layers = attracting(scene, *solids(scene, 0.3, 1650.0))[1]
+    layers = thin(scene).attraction[1]
     expected = ev.electrostatics.complex_length(
         10.0, skin=ev.Dielectric(2000.0, (), 1e-4), skin_thickness=0.3, insulator=ev.TOUCHSCREEN
     )
@@ -112,7 +117,7 @@ def test_the_carriers_frequency_is_that_of_the_dielectrics():
     scene = loads(HEAD + MEAN + HOVER + WAIT)
     given = ev.Drive(skin="gabriel_dry", gap_conductivity=1e-8)
     carried = replace(scene, voltage=ev.Carrier(250.0, 100.0, resolved=False), drive=given)
-    one, other = (attracting(s, *solids(s, 0.3, 1650.0))[1] for s in (scene, carried))
+    one, other = (thin(s).attraction[1] for s in (scene, carried))
     assert one == other
 
 
@@ -150,18 +155,18 @@ def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
     """A sine with a bias: no steps in time, the fundamental for the dielectrics, and both swings."""
     text = HEAD + 'signal = {kind = "sine", frequency = 75.0, amplitude = 100.0, bias = 60.0}\n'
     scene = loads(text + 'drive = "mean"\nskin = "gabriel_dry"\n' + HOVER)
-    assert applied(scene) == pytest.approx(np.sqrt(60.0**2 + 5000.0))
+    assert scene.electrics.voltage == pytest.approx(np.sqrt(60.0**2 + 5000.0))
     said = next(term.reason for term in ev.plan(scene).terms if term.name == "drive")
     assert "left out: the swing of the attraction at 75 Hz" in said
     plain = loads(text + 'drive = "mean"\n' + HOVER)
     assert plain.drive == ev.Drive()
     for one in (scene, plain):
         assert loads(dump(one)).digest() == one.digest()
-    number = replace(plain, voltage=applied(plain), drive=None)
+    number = replace(plain, voltage=plain.electrics.voltage, drive=None)
     forces = [ev.simulate(one).electrostatic_force[-1] for one in (plain, number)]
     assert forces[0] == pytest.approx(forces[1], rel=1e-9)
     samples = ev.Sampled([60.0, 160.0, 60.0, -40.0], 300.0, repeat=True)
-    assert frequency(replace(plain, voltage=samples)) == 75.0
+    assert replace(plain, voltage=samples).electrics.frequency == 75.0
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,220 @@
+"""What acts between finger and electrode: the voltage that a run follows, the layers that it crosses and the
+law of the attraction, resolved from a scene once (`Scene.electrics`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Ints
+from evfem.common.checks import Values
+from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
+from evfem.electrostatics.laws import Layer, Layers, eps_0
+from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
+from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
+from evfem.errors import ABSENT, InputError
+from evfem.protocols import TimeSignal
+from evfem.scene.motion import VoltageRamp
+
+#: voltages that follow from the charge of the electrode
+CHARGED = (OpenCircuit, ChargeControl)
+#: thickness of the stratum corneum (mm) where only the mesh knows it
+SKIN = 0.4
+
+
+@dataclass(frozen=True)
+class Electrics:
+    """Law, drive, the scene's own voltage and that of its ramps (V), and the solid layers: the stratum
+    corneum, with a usual thickness where only the mesh knows it (`above`), and the insulator.
+    """
+
+    law: Any
+    drive: Drive | None
+    given: Any
+    ramps: tuple[float, ...]
+    eps_r: float
+    skin: Layer
+    insulator: Layer
+
+    @classmethod
+    def of(cls, scene: Any) -> Electrics:
+        """Those of a `Scene`, which uses this file itself."""
+        electrical = scene.finger.electrical
+        thickness: Any = getattr(electrical, "stratum_corneum_thickness", None)
+        if thickness is None:
+            thickness = getattr(scene.finger, "stratum_corneum_thickness", SKIN)
+        eps_r = float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
+        skin = (scene.drive or Drive()).skin_layer(float(thickness), eps_r)
+        ramps = tuple(motion.voltage for motion in scene.motion if isinstance(motion, VoltageRamp))
+        return cls(scene.law, scene.drive, scene.voltage, ramps, eps_r, skin, scene.ground.insulator)
+
+    def above(self, electrical: Any, mesh: Any, nodes: Ints) -> Electrics:
+        """The same above the nodes of a pad, where the skin has its given thickness or that of the mesh."""
+        thickness = None if electrical is None else electrical.stratum_corneum_thickness
+        if thickness is None:
+            if electrical is None or "stratum_corneum" not in mesh.region_names:
+                allowed = (
+                    "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
+                )
+                raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
+            from evfem.mesh import faces
+            from evfem.mesh import mesh as edges
+
+            kind = faces if mesh.dim == 3 else edges
+            thickness = kind.layer_thickness(mesh, "stratum_corneum", nodes)
+        return self.of_skin(np.broadcast_to(thickness, nodes.shape).astype(float))
+
+    def of_skin(self, thickness: Values) -> Electrics:
+        """The same below so much skin (mm)."""
+        return replace(self, skin=(self.drive or Drive()).skin_layer(thickness, self.eps_r))
+
+    @cached_property
+    def voltage(self) -> Any:
+        """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
+        the moment, or of a signal that repeats the effective one for its mean over the cycle.
+        """
+        drive = self.drive
+        if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
+            return found[0]
+        if drive is None or not drive.resolved or not isinstance(self.given, float):
+            return self.given
+        return drive.signal(self.given)
+
+    @cached_property
+    def frequency(self) -> float | None:
+        """Frequency (Hz) at which dielectrics count: that of the drive, or of the scene's own signal."""
+        drive, given = self.drive, self.given
+        if drive is None or drive.frequency is not None:
+            return None if drive is None else drive.frequency
+        if isinstance(given, Carrier):
+            return given.frequency
+        if drive.resolved and isinstance(given, TimeSignal):
+            return given.highest_frequency or None
+        if isinstance(given, Sampled) and given.repeat:
+            return given.rate / given.voltage.size
+        return given.frequency if isinstance(given, (Sine, Square)) else None
+
+    @cached_property
+    def largest_voltage(self) -> float:
+        """Largest magnitude of the voltage anywhere in the scene (V)."""
+        own: Any = self.voltage
+        if isinstance(own, VoltageProfile):
+            own = own.voltage
+        elif isinstance(own, FollowForce):
+            own = own.largest_voltage
+        elif isinstance(own, TimeSignal):
+            own = own.largest
+        return float(max([np.abs(own).max(), *map(abs, self.ramps)]))
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything attracts."""
+        return self.law is not None and self.largest_voltage != 0.0
+
+    @cached_property
+    def attraction(self) -> tuple[Any, Layers]:
+        """The law and the layers of the attraction: of the mean over the cycle, or where the drive is
+        resolved without what conducts, which moves the charges instead.
+        """
+        solids = (self.skin, self.insulator)
+        if self.drive is None:
+            return self.law, Layers.of(*solids)
+        if self.drive.resolved:
+            thickness = np.asarray(self.skin.thickness) + self.insulator.thickness
+            return self.law, Layers(self.sandwich.reference, thickness)
+        return mean_law(self.law, self.drive, self.frequency, solids, self.given)
+
+    @property
+    def gap_eps_r(self) -> float:
+        """Relative permittivity of what fills the gap."""
+        return getattr(self.law, "gap_eps_r", 1.0)
+
+    @cached_property
+    def sandwich(self) -> Sandwich | RelaxingSandwich:
+        """The layers of a resolved drive as its charges see them."""
+        assert self.drive is not None
+        gap = {"gap_conductivity": self.drive.gap_conductivity, "gap_eps_r": self.gap_eps_r}
+        return stack_of(self.skin, self.insulator, frequency=self.frequency, **gap)
+
+    @property
+    def conducts(self) -> bool:
+        """Whether a drive's gap conducts, or one of the layers is a dielectric and no mere number."""
+        layers = (self.skin, self.insulator)
+        dielectrics = (callable(getattr(layer.eps_r, "permittivity", None)) for layer in layers)
+        return self.drive is not None and (bool(self.drive.gap_conductivity) or any(dielectrics))
+
+    @property
+    def permittivities(self) -> list[tuple[float, complex, complex, complex]]:
+        """Of each harmonic of a drive its share of the squared effective voltage, and the complex relative
+        permittivities of insulator, gap and skin at its frequency; for voltages without a direct part.
+        """
+        drive, at, found = self.drive, self.frequency, []
+        assert drive is not None
+        assert at is not None
+        for order, share in zip(*(part.tolist() for part in spectrum(drive, self.given)), strict=True):
+            gap = self.gap_eps_r + drive.gap_conductivity / (2j * np.pi * at * order * eps_0)
+            solid = [complex(layer.permittivity(at * order)) for layer in (self.insulator, self.skin)]
+            found.append((share, solid[0], complex(gap), solid[1]))
+        return found
+
+    def lossless(self, layer: Layer) -> Layer:
+        """A layer with its real permittivity alone, at the drive's frequency or static without one."""
+        return Layer(layer.thickness, seen_at(layer, self.frequency)[0])
+
+
+def check_drive(scene: Any) -> None:
+    """Raise InputError where drive, law, voltage and motions do not fit together."""
+    drive = scene.drive
+    if isinstance(scene.voltage, CHARGED) and (drive is None or not drive.resolved):
+        raise InputError("electrostatics.voltage", type(scene.voltage).__name__, "with a resolved drive")
+    if drive is None:
+        return
+    if scene.law is None:
+        allowed = "a scene with an electrostatic law and a voltage"
+        raise InputError("electrostatics.frequency", "a drive without a law", allowed)
+    (_check_resolved if drive.resolved else _check_mean)(scene, drive)
+    assert scene.electrics.attraction  # dielectrics that need a frequency say so
+
+
+def _check_mean(scene: Any, drive: Drive) -> None:
+    voltage = scene.voltage
+    if isinstance(voltage, Carrier):
+        if voltage.resolved:
+            allowed = 'a carrier with resolved=False, or drive = "resolved"'
+            raise InputError("electrostatics.signal", "a resolved carrier in a mean over the cycle", allowed)
+        if drive.frequency is not None:
+            given = f"{drive.frequency:g} beside a carrier of {voltage.frequency:g} Hz"
+            raise InputError("electrostatics.frequency", given, "nothing here")
+    elif drive.frequency is not None and powers(voltage) is not None:
+        given = f"{drive.frequency:g} beside a signal over time, which has its own"
+        raise InputError("electrostatics.frequency", given, "nothing here")
+    elif scene.electrics.frequency is None:
+        allowed = 'a frequency in Hz, needed for the mean over the cycle; or drive = "resolved"'
+        raise InputError("electrostatics.frequency", ABSENT, allowed)
+
+
+def _check_resolved(scene: Any, drive: Drive) -> None:
+    voltage = scene.voltage
+    if scene.direction == "normal":
+        raise InputError("electrostatics.direction", "normal in a resolved drive", "vertical")
+    if isinstance(voltage, (FollowForce, VoltageProfile)):
+        allowed = "a number or a signal over time with a resolved drive"
+        raise InputError("electrostatics.voltage", type(voltage).__name__, allowed)
+    if isinstance(voltage, TimeSignal) and drive.frequency is not None:
+        given = f"{drive.frequency:g} beside a signal over time, which is resolved itself"
+        raise InputError("electrostatics.frequency", given, "nothing here")
+    if isinstance(voltage, CHARGED) and np.any(seen_at(scene.ground.insulator, scene.electrics.frequency)[1]):
+        allowed = "an insulator that does not conduct, with an open circuit or a given charge"
+        raise InputError("surface.insulator", "a conductor", allowed)
+    if isinstance(voltage, Carrier) and not voltage.resolved:
+        allowed = "a carrier with resolved=True in a resolved drive"
+        raise InputError("electrostatics.signal", "the mean of a carrier", allowed)
+    for i, motion in enumerate(scene.motion):
+        if isinstance(motion, VoltageRamp):
+            raise InputError(f"motion[{i}]", "a voltage ramp in a resolved drive", "a signal over time")
