@@ -257,7 +257,7 @@ def _touch_options(command: argparse.ArgumentParser) -> None:
 
 
 def _device_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--law", default="kaczmarek", help="kaczmarek or strong_troxel; default: kaczmarek")
+    command.add_argument("--law", default="kaczmarek", help="name of a force law; default: kaczmarek")
     command.add_argument("--insulator", default="film", help="film or touchscreen; default: film")
     options = {
         "display": (0.25, "MU", "coefficient of the display"),

@@ -38,7 +38,7 @@ ROOMS = {
     "electrostatics": (
         {"numpy", "scipy", "skfem"},
         "laws grading outlines bounds curves fieldmesh poisson rigid columncells columns meanpull "
-        "dielectrics charges relaxation alternating roughness forces signals wav timesignals drive "
+        "dielectrics charges relaxation alternating roughness forces signals wav spectrum timesignals drive "
         "encoding hjif signalfile",
     ),
     "contact": (

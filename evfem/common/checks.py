@@ -8,7 +8,7 @@ them, and a scene file is read, written and described by them (`evfem.scene.keys
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from numbers import Integral, Real
@@ -52,7 +52,7 @@ def count(key: str, value: object, most: int = MOST_STEPS, least: int = 1, allow
     return int(value)
 
 
-def choice(key: str, value: object, names: tuple[str, ...]) -> str:
+def choice(key: str, value: object, names: Collection[str]) -> str:
     """`value` if it is one of `names`."""
     if not isinstance(value, str) or value not in names:
         raise InputError(key, quoted(value), " | ".join(names))
@@ -154,8 +154,12 @@ def whole(most: int = MOST_STEPS, least: int = 1, allowed: str = "") -> dict[str
 
 def one_of(*names: str) -> dict[str, Any]:
     """Rule of a field that is one of `names`."""
-    check = lambda key, value: choice(key, value, names)  # noqa: E731
-    return {"allowed": " | ".join(names), "check": check, "names": names}
+    return among(names)
+
+
+def among(names: Collection[str]) -> dict[str, Any]:
+    """Rule of a field that is one of `names`, of which there may be more later."""
+    return {"check": lambda key, value: choice(key, value, names), "names": names}
 
 
 def yes_or_no() -> dict[str, Any]:
@@ -200,6 +204,11 @@ class Key:
     def name(self) -> str:
         """How a file calls it."""
         return str(self.rule.get("key", self.field))
+
+    @property
+    def allowed(self) -> str:
+        """What it may be, in words."""
+        return self.rule.get("allowed") or " | ".join(self.rule["names"])
 
     @property
     def required(self) -> bool:

@@ -28,9 +28,9 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import (
     Values,
     Within,
+    among,
     check_fields,
     number,
-    one_of,
     plain,
     real,
     set_frozen,
@@ -39,20 +39,12 @@ from evfem.common.checks import (
 from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric
 from evfem.electrostatics.laws import Layer, Layers, traction_derivative
 from evfem.electrostatics.relaxation import seen_at
-from evfem.electrostatics.timesignals import FREQUENCY, Sampled, Sine, Square
+from evfem.electrostatics.timesignals import FREQUENCY, WAVEFORMS
 from evfem.protocols import ForceLaw, TimeSignal
-
-WAVEFORMS = ("sine", "square")
-#: peak over effective voltage
-CREST = {"sine": float(np.sqrt(2.0)), "square": 1.0}
-#: odd harmonics of a square wave that count one by one, groups of those above, and the highest one
-SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
-#: orders of samples that repeat: at least so many, and so many times the samples of a period
-SMOOTH, PERIODS = 4096, 8
 
 # keys that a scene file has beside others in [electrostatics]
 DriveFrequency = Annotated[float | None, FREQUENCY, "of the alternating voltage; without it a direct one"]
-Waveform = Annotated[str, one_of(*WAVEFORMS), "of the alternating voltage"]
+Waveform = Annotated[str, among(WAVEFORMS), "of the alternating voltage"]
 Skin = Annotated[
     Any,
     {"allowed": f"{' | '.join(SKINS)} | the path of a csv file", "type": str},
@@ -100,7 +92,7 @@ class Drive:
 
     def peak(self, effective: Values) -> Values:
         """Peak (V) of the waveform with this effective voltage (V)."""
-        return plain(CREST[self.waveform] * np.asarray(effective))
+        return plain(WAVEFORMS[self.waveform].crest * np.asarray(effective))
 
     def signal(self, voltage: float) -> TimeSignal | float:
         """The voltage of the moment with this effective value (V), where it is resolved: a signal,
@@ -108,7 +100,7 @@ class Drive:
         """
         if self.frequency is None:
             return voltage
-        return (Sine if self.waveform == "sine" else Square)(self.frequency, abs(self.peak(voltage)))
+        return WAVEFORMS[self.waveform](self.frequency, abs(self.peak(voltage)))
 
     def skin_layer(self, thickness: Values, eps_r: float) -> Layer:
         """The stratum corneum, `thickness` in mm, of the drive's skin or of the finger's `eps_r`."""
@@ -141,61 +133,17 @@ class CycleMean:
         return plain(np.tensordot(self.weights, np.asarray(values), 1))
 
 
-def harmonics() -> tuple[Floats, Floats]:
-    """Orders and weights of the harmonics of a square wave, the sum of the weights being 1.
-
-    >>> order, weight = harmonics()
-    >>> order[:3].tolist(), weight[:2].round(4).tolist(), round(float(weight.sum()), 12)
-    ([1.0, 3.0, 5.0], [0.8106, 0.0901], 1.0)
-    """
-    order = np.arange(1.0, HIGHEST, 2.0)
-    weight = 8.0 / (np.pi * order) ** 2
-    weight[-1] += 1.0 - weight.sum()
-    return grouped(order, weight)
-
-
-def grouped(order: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """The first `SINGLE` of these orders as they are, those above in at most `GROUPS` groups: orders
-    that grow, from 1 on, and weights, of the same total.
-    """
-    if order.size <= SINGLE:
-        return order, weight
-    ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
-    begins = np.concatenate([np.arange(SINGLE), ends])
-    sums = np.add.reduceat(weight, begins)
-    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / np.where(sums > 0.0, sums, 1.0))
-    return np.concatenate([order[:SINGLE], mean[SINGLE:]]), sums
-
-
 def powers(signal: Any) -> tuple[float, Floats, Floats] | None:
     """Effective voltage (V) of a signal that repeats, and the orders of its harmonics, 0 for its
     bias, with their shares of the squared voltage; None for one that does not repeat.
 
+    >>> from evfem.electrostatics.timesignals import Sine
     >>> effective, order, share = powers(Sine(50.0, 100.0, bias=50.0))
     >>> round(effective, 3), order.tolist(), share.round(4).tolist()
     (86.603, [0.0, 1.0], [0.3333, 0.6667])
     """
-    if isinstance(signal, Square):
-        return signal.amplitude, *harmonics()
-    if isinstance(signal, Sine):
-        order, square = np.array([0.0, 1.0]), np.array([signal.bias**2, 0.5 * signal.amplitude**2])
-    elif isinstance(signal, Sampled) and signal.repeat:
-        # straight lines between the samples: their transform times sinc^2, over and over
-        size = signal.voltage.size
-        above = np.arange(1.0, max(SMOOTH, PERIODS * size))
-        transform = np.abs(np.fft.fft(signal.voltage) / size) ** 2
-        square = 2.0 * transform[above.astype(int) % size] * np.sinc(above / size) ** 4
-        following = np.roll(signal.voltage, -1)
-        total = float(np.mean(signal.voltage**2 + signal.voltage * following + following**2)) / 3.0
-        bias = float(signal.voltage.mean()) ** 2
-        square[-1] += total - bias - float(square.sum())
-        order, square = grouped(above, square)
-        order, square = np.concatenate([[0.0], order]), np.concatenate([[bias], square])
-    else:
-        return None
-    total = float(square.sum())
-    kept = square > 0.0
-    return float(np.sqrt(total)), order[kept], square[kept] / (total if total > 0.0 else 1.0)
+    own = getattr(signal, "powers", None)
+    return None if own is None else own()
 
 
 def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
@@ -205,7 +153,7 @@ def spectrum(drive: Drive, signal: Any) -> tuple[Floats, Floats]:
     found = powers(signal)
     if found is not None:
         return found[1:]
-    return (np.ones(1), np.ones(1)) if drive.waveform == "sine" else harmonics()
+    return WAVEFORMS[drive.waveform].harmonics()
 
 
 def steady_layers(solids: tuple[Layer, ...], drive: Drive, gap_eps_r: float) -> Layers | None:
@@ -228,7 +176,8 @@ def mean_law(
     """
     gap_eps_r = getattr(law, "gap_eps_r", 1.0)
     given = {"gap_conductivity": drive.gap_conductivity, "gap_eps_r": gap_eps_r}
-    if frequency is None or (powers(signal) is None and drive.waveform == "sine"):
+    single = powers(signal) is None and WAVEFORMS[drive.waveform].harmonics()[0].size == 1
+    if frequency is None or single:
         return law, Layers.of(*solids, frequency=frequency, **given)
     order, weight = spectrum(drive, signal)
     steady = steady_layers(solids, drive, gap_eps_r) if 0.0 in order else None

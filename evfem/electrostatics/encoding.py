@@ -15,8 +15,9 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
-from evfem.electrostatics.drive import CREST, Drive, mean_law
+from evfem.electrostatics.drive import Drive, mean_law
 from evfem.electrostatics.laws import Layer, Layers
+from evfem.electrostatics.timesignals import WAVEFORMS
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw
 
@@ -110,7 +111,7 @@ class Encoding:
     layers: Layers
     area: AreaLaw
     friction: float
-    crest: float = CREST["sine"]
+    crest: float = WAVEFORMS["sine"].crest
 
     @classmethod
     def driven(
@@ -130,7 +131,10 @@ class Encoding:
         if drive.resolved:
             raise InputError("drive", "resolved in time", "the mean over the cycle")
         return cls(
-            *mean_law(law, drive, drive.frequency, (skin, solids[1])), area, friction, CREST[drive.waveform]
+            *mean_law(law, drive, drive.frequency, (skin, solids[1])),
+            area,
+            friction,
+            WAVEFORMS[drive.waveform].crest,
         )
 
     def __post_init__(self) -> None:

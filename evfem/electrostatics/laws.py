@@ -29,14 +29,13 @@ broadcast, real or complex (for derivatives by complex step); scalars give a flo
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Values, Within, above, at_least, finite, plain
+from evfem.common.checks import Values, Within, above, at_least, finite, number, plain
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
@@ -167,7 +166,7 @@ def _lengths(gap: Values, layers: Layers, gap_eps_r: float) -> tuple[Values, Val
 
 GapPermittivity = Annotated[
     float,
-    {"allowed": "a relative permittivity, at least 1", "test": Within(1.0)},
+    number("a relative permittivity, at least 1", Within(1.0)),
     "relative permittivity of what fills the gap",
 ]
 
@@ -176,8 +175,24 @@ def _check_medium(gap_eps_r: float) -> None:
     at_least("gap_eps_r", gap_eps_r, 1.0, "the relative permittivity of the gap, at least 1")
 
 
+#: force laws by their names in a scene file
+FORCE_LAWS: dict[str, Any] = {}
+
+
+class NamedLaw:
+    """A force law with a name in scene files, whose annotated fields are keys of [electrostatics]: a class
+    `class Own(NamedLaw, name="own")` is all that one needs, here or in a module that has been imported.
+    """
+
+    #: whether its force is the stress of a field between the conductors, which rigid layers alone have
+    of_a_field = False
+
+    def __init_subclass__(cls, name: str) -> None:
+        FORCE_LAWS[name] = cls
+
+
 @dataclass(frozen=True)
-class StrongTroxel:
+class StrongTroxel(NamedLaw, name="strong_troxel"):
     """Attraction of rigid layers over a movable gap, equations (3) and (6).
 
     ``p = e eps_0 U^2 / (2 (g + e s)^2)``, potential per area ``Pi = -e eps_0 U^2 / (2 (g + e s))``
@@ -190,6 +205,7 @@ class StrongTroxel:
     """
 
     gap_eps_r: GapPermittivity = 1.0
+    of_a_field = True
 
     def __post_init__(self) -> None:
         _check_medium(self.gap_eps_r)
@@ -241,7 +257,7 @@ def _atan_ratio(ratio: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 @dataclass(frozen=True)
-class Kaczmarek:
+class Kaczmarek(NamedLaw, name="kaczmarek"):
     """Attraction of layers that stretch with the gap, equations (5) and (7).
 
     ``p = e eps_0 U^2 / (2 (g + e s)(g + D))``, potential per area
@@ -292,10 +308,6 @@ class Kaczmarek:
             lossy = q * share - 0.5 * ratio * r * _log1p_ratio(r) + r * _atan_ratio(np.sqrt(r))
             share = np.where(q + r == 0.0, 1.0, lossy / np.where(q + r == 0.0, 1.0, q + r))
         return plain(-0.5 * self.gap_eps_r * eps_0 * np.asarray(voltage) ** 2 / near * share)
-
-
-#: force laws by their names in a scene file
-FORCE_LAWS: Mapping[str, type] = {"strong_troxel": StrongTroxel, "kaczmarek": Kaczmarek}
 
 
 def traction_derivative(law: ForceLaw, gap: Values, voltage: Values, layers: Layers) -> Values:

@@ -25,6 +25,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import (
     Values,
     Within,
@@ -39,6 +40,7 @@ from evfem.common.checks import (
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, read_columns
 from evfem.electrostatics import wav
+from evfem.electrostatics.spectrum import PERIODS, SMOOTH, grouped, shares, square_harmonics
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 
@@ -67,6 +69,11 @@ Frequency = Annotated[float, FREQUENCY, "of the sine, square wave or carrier"]
 Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 
+# A signal that repeats has `cycle`, its frequency (Hz), and `powers()`: its effective voltage (V), and the
+# orders of its harmonics with their shares of the squared voltage. One that a `Drive` can have by the name of
+# its kind also has `crest`, its peak over its effective voltage, and `harmonics()`, those without a bias.
+
+
 @dataclass(frozen=True)
 class Sine:
     """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`) in V; frequency in Hz, phase in rad.
@@ -80,9 +87,24 @@ class Sine:
     bias: Annotated[float, _BIAS, "mean voltage"] = 0.0
     phase: Annotated[float, _PHASE, "at time 0"] = 0.0
     kind = "sine"
+    crest = float(np.sqrt(2.0))
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    @staticmethod
+    def harmonics() -> tuple[Floats, Floats]:
+        """Orders and weights."""
+        return np.ones(1), np.ones(1)
+
+    def powers(self) -> tuple[float, Floats, Floats]:
+        """Effective voltage (V), orders and shares."""
+        return shares(np.array([0.0, 1.0]), np.array([self.bias**2, 0.5 * self.amplitude**2]))
+
+    @property
+    def cycle(self) -> float:
+        """Its frequency (Hz)."""
+        return self.frequency
 
     @property
     def largest(self) -> float:
@@ -112,9 +134,20 @@ class Square:
     frequency: Frequency
     amplitude: Amplitude
     kind = "square"
+    crest = 1.0
+    harmonics = staticmethod(square_harmonics)
 
     def __post_init__(self) -> None:
         check_fields(self)
+
+    def powers(self) -> tuple[float, Floats, Floats]:
+        """Effective voltage (V), orders and shares."""
+        return self.amplitude, *self.harmonics()
+
+    @property
+    def cycle(self) -> float:
+        """Its frequency (Hz)."""
+        return self.frequency
 
     @property
     def largest(self) -> float:
@@ -284,6 +317,28 @@ class Sampled:
             raise InputError("voltage", f"{voltage[np.argmax(np.abs(voltage))]:g}", _BIAS["allowed"])
         set_frozen(self, voltage=voltage)
 
+    @property
+    def cycle(self) -> float | None:
+        """Frequency (Hz) at which it repeats."""
+        return self.rate / self.voltage.size if self.repeat else None
+
+    def powers(self) -> tuple[float, Floats, Floats] | None:
+        """Effective voltage (V), orders and shares: straight lines between the samples, whose transform is
+        that of the samples times sinc^2, over and over.
+        """
+        if not self.repeat:
+            return None
+        size = self.voltage.size
+        above = np.arange(1.0, max(SMOOTH, PERIODS * size))
+        transform = np.abs(np.fft.fft(self.voltage) / size) ** 2
+        square = 2.0 * transform[above.astype(int) % size] * np.sinc(above / size) ** 4
+        following = np.roll(self.voltage, -1)
+        total = float(np.mean(self.voltage**2 + self.voltage * following + following**2)) / 3.0
+        bias = float(self.voltage.mean()) ** 2
+        square[-1] += total - bias - float(square.sum())
+        order, square = grouped(above, square)
+        return shares(np.concatenate([[0.0], order]), np.concatenate([[bias], square]))
+
     def __repr__(self) -> str:
         low, high = self.voltage.min(), self.voltage.max()
         text = f"{self.voltage.size} samples at {self.rate:g} Hz, {low:.4g} to {high:.4g} V"
@@ -361,3 +416,5 @@ class Sampled:
 SIGNALS: Mapping[str, Any] = {
     cls.kind: cls for cls in (Sine, Square, Carrier, Sampled, OpenCircuit, ChargeControl)
 }
+#: those that a drive can have
+WAVEFORMS: Mapping[str, Any] = {kind: cls for kind, cls in SIGNALS.items() if hasattr(cls, "crest")}

@@ -17,7 +17,7 @@ from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
-from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit, Sampled, Sine, Square
+from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import VoltageRamp
@@ -96,9 +96,7 @@ class Electrics:
             return given.frequency
         if drive.resolved and isinstance(given, TimeSignal):
             return given.highest_frequency or None
-        if isinstance(given, Sampled) and given.repeat:
-            return given.rate / given.voltage.size
-        return given.frequency if isinstance(given, (Sine, Square)) else None
+        return getattr(given, "cycle", None)
 
     @cached_property
     def largest_voltage(self) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from evfem.electrostatics.drive import spectrum
-from evfem.electrostatics.laws import StrongTroxel
 
 
 def without_field(scene: Any) -> tuple[str, str] | None:
@@ -20,7 +19,7 @@ def without_field(scene: Any) -> tuple[str, str] | None:
     """
     if scene.law is None:
         return "no law", "StrongTroxel and a voltage"
-    if type(scene.law) is not StrongTroxel:
+    if not getattr(scene.law, "of_a_field", False):
         allowed = "StrongTroxel: of rigid layers alone the force is that of a field"
         return type(scene.law).__name__, allowed
     if not scene.air_layer:

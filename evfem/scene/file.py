@@ -16,6 +16,7 @@ from typing import Any
 
 from evfem.common.checks import MOST_STEPS
 from evfem.contact.surfaces import Display
+from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.fingertip import tip_sizes
@@ -100,11 +101,11 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     insulated: dict[str, Any] = {}
     with mistakes.of_a_part():
         if top.electrostatics is not None:
-            found = read(Electrostatics, top.electrostatics, "electrostatics", folder, homes=HOMES)
+            found, law = _electrostatics(top.electrostatics, folder)
             ramped = any(
                 isinstance(one, Mapping) and one.get("kind") == VoltageRamp.kind for one in top.motion
             )
-            parts |= found.scene_keys(ramped, folder)
+            parts |= found.scene_keys(law, ramped, folder)
             insulated = {"insulator": found.layer(), "electrodes": found.electrodes}
     with mistakes.of_a_part():
         parts |= _surface(top.surface, folder, **insulated)
@@ -116,6 +117,21 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
                 parts[key] = read(cls, table, key, homes=HOMES)
     mistakes.report()
     return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
+
+
+def _electrostatics(table: Any, folder: Path) -> tuple[Electrostatics, Any]:
+    """The table, and the force law with those of its keys that are the law's."""
+    if not isinstance(table, Mapping) or "law" not in table:  # which says what may have been meant
+        return read(Electrostatics, table, "electrostatics", folder, homes=HOMES), None
+    cls = FORCE_LAWS[kind_of(table, "electrostatics", FORCE_LAWS, "law")]
+    own = [name for name in names(cls) if name not in names(Electrostatics)]
+    mistakes, law, found = Mistakes(), None, None
+    with mistakes.of_a_part():
+        law = read(cls, {name: table[name] for name in own if name in table}, "electrostatics")
+    with mistakes.of_a_part():
+        found = read(Electrostatics, table, "electrostatics", folder, beside=("law", *own), homes=HOMES)
+    mistakes.report()
+    return found, law
 
 
 def _motions(tables: list[Any]) -> list[Motion]:

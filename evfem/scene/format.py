@@ -10,14 +10,14 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Annotated, Any
 
-from evfem.common.checks import Within, instance, keys_of, number, one_of, yes_or_no
+from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
 from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.contact.surfaces import Flat, Friction, Profile, Shift, Sinusoid
 from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS, DielectricTable, dielectric
-from evfem.electrostatics.drive import CREST, Conductivity, Drive, DriveFrequency, Skin, Waveform
-from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, GapPermittivity, Layer
+from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
+from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer
 from evfem.electrostatics.signalfile import read_voltage
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import RATE, START, Sampled
@@ -46,6 +46,7 @@ _FRICTION_LAW = {
     "type": dict,
     "kinds": lambda: FRICTIONS,
 }
+_LAW = among(FORCE_LAWS)
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 
@@ -193,7 +194,7 @@ SIGNALS: Mapping[str, Any] = {**timesignals.SIGNALS, "sampled": SampledTable}
 class Electrostatics:
     """[electrostatics]: law, voltage and drive of a scene, and the insulator of its surface."""
 
-    law: Annotated[str, one_of(*FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
+    law: Annotated[str, _LAW, "force law of the paper, eqs (2) to (5)"]
     voltage: Annotated[
         float | None,
         number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V"),
@@ -240,7 +241,6 @@ class Electrostatics:
     insulator_eps_r: Annotated[
         float | None, number("a relative permittivity, at least 1", Within(1.0)), "its relative permittivity"
     ] = None
-    gap_eps_r: Annotated[GapPermittivity, number("a relative permittivity, at least 1", Within(1.0))] = 1.0
     air_layer: AirLayer = True
     direction: Direction = "vertical"
     field: FieldChoice = "local"
@@ -263,16 +263,16 @@ class Electrostatics:
                 raise InputError(f"electrostatics.{name}", given, "one of the two")
             with mistakes.of_a_part():
                 if self.insulator is None and value is None:
-                    rule = next(key.rule for key in keys_of(Electrostatics) if key.name == name)
-                    allowed = f"{rule['allowed']}; or insulator = {' | '.join(INSULATORS)}"
+                    allowed = next(key.allowed for key in keys_of(Electrostatics) if key.name == name)
+                    allowed = f"{allowed}; or insulator = {' | '.join(INSULATORS)}"
                     raise InputError(f"electrostatics.{name}", ABSENT, allowed)
         mistakes.report()
         return Layer(*own.values()) if self.insulator is None else INSULATORS[self.insulator]
 
-    def scene_keys(self, ramped: bool, folder: Path) -> dict[str, Any]:
-        """What it says of a scene; `ramped`: the voltage may begin without one."""
+    def scene_keys(self, law: Any, ramped: bool, folder: Path) -> dict[str, Any]:
+        """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""
         names = ("air_layer", "direction", "field", "grounded", "coupling", "roughness_gap")
-        own = {"law": FORCE_LAWS[self.law](gap_eps_r=self.gap_eps_r), "voltage": self._voltage(not ramped)}
+        own = {"law": law, "voltage": self._voltage(not ramped)}
         return own | {"drive": self._drive(folder)} | {name: getattr(self, name) for name in names}
 
     def _voltage(self, needed: bool) -> Any:
@@ -289,7 +289,7 @@ class Electrostatics:
             with at("electrostatics.voltage_profile"):
                 return VoltageProfile(*columns("electrostatics.voltage_profile", self.voltage_profile))
         if self.amplitude is not None:
-            return self.amplitude / CREST[self.waveform]
+            return self.amplitude / timesignals.WAVEFORMS[self.waveform].crest
         return self.signal or self.voltage or 0.0
 
     def _drive(self, folder: Path) -> Drive | None:

@@ -48,7 +48,7 @@ def read(
             if key.name in table:
                 given[key.field] = _value(key, table[key.name], _join(place, key.name), folder)
             elif key.required and key.name not in meant:
-                raise InputError(key.name, ABSENT, key.rule["allowed"])
+                raise InputError(key.name, ABSENT, key.allowed)
     mistakes.report()
     with at(place, **{key.field: f"{place}.{key.name}" for key in keys if key.field != key.name}):
         made = cls(**given)
@@ -79,7 +79,7 @@ def _value(key: Key, given: Any, place: str, folder: Path) -> Any:
         mistakes.report()
         return found
     if several and not isinstance(given, Mapping):
-        raise InputError(key.name, shown(given), key.rule["allowed"])
+        raise InputError(key.name, shown(given), key.allowed)
     if inner is not None and keys_of(inner):
         return read(inner, given, place, folder)
     file = key.rule.get("file")

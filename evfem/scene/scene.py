@@ -27,6 +27,7 @@ from evfem.common.views import called, changed, short, table
 from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
+from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
 from evfem.electrostatics.roughness import WIDEST, roughness_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
@@ -249,10 +250,10 @@ def _check_electrostatics(scene: Scene) -> None:
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
         if scene.voltage != 0.0:
-            allowed = "StrongTroxel(), Kaczmarek() or a law of your own"
+            allowed = f"{_laws()} or a law of your own"
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
-        allowed = "StrongTroxel(), Kaczmarek() or an object with a method traction(gap, voltage, layers)"
+        allowed = f"{_laws()} or an object with a method traction(gap, voltage, layers)"
         raise InputError("electrostatics.law", quoted(scene.law), allowed)
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
@@ -260,6 +261,10 @@ def _check_electrostatics(scene: Scene) -> None:
     elif scene.ground.insulator is None:
         allowed = "a surface with insulator=Layer(thickness, eps_r), for instance Display()"
         raise InputError("surface.insulator", "a law and no insulator", allowed)
+
+
+def _laws() -> str:
+    return ", ".join(f"{cls.__name__}()" for cls in FORCE_LAWS.values())
 
 
 def _check_hand(scene: Scene) -> None:

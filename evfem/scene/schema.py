@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from evfem.common.checks import Key, Within, keys_of
+from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.finger.fingertip import Fingertip
@@ -72,7 +73,7 @@ def section(name: str, *classes: Any, kind: str = "", tag: tuple[str, str] | Non
     """The keys of a table from the dataclasses that it describes; a `tag` is the key that says its kind, and
     what the kind is.
     """
-    own = [_entry(key) for cls in classes for key in keys_of(cls)]
+    own = [*{key.name: _entry(key) for cls in classes for key in keys_of(cls)}.values()]
     if tag is not None:
         key, meaning = tag
         needed = kind != "pad"
@@ -88,11 +89,11 @@ def _entry(key: Key) -> Entry:
         shape |= _limits(limits, shape.get("type") == "integer")
     if "names" in rule:
         shape["enum"] = list(rule["names"])
-    shape["description"] = f"{key.meaning}{f' ({unit})' if unit else ''}. Allowed: {rule['allowed']}"
+    shape["description"] = f"{key.meaning}{f' ({unit})' if unit else ''}. Allowed: {key.allowed}"
     if not key.required and isinstance(key.default, (bool, int, float, str)):
         shape["default"] = key.default
     default = "" if key.required else _toml(key.default)
-    return Entry(key.name, _spoken(shape), unit, default, key.required, rule["allowed"], key.meaning, shape)
+    return Entry(key.name, _spoken(shape), unit, default, key.required, key.allowed, key.meaning, shape)
 
 
 def _shape(types: tuple[Any, ...]) -> Schema:
@@ -154,7 +155,7 @@ def sections() -> list[Section]:
         section("finger.electrical", Electrical),
         *kinds("surface", file.SURFACES, "which kind", "kind", file.BesideSurface),
         *kinds("surface.friction_law", file.FRICTIONS, "which kind"),
-        section("electrostatics", file.Electrostatics),
+        section("electrostatics", file.Electrostatics, *FORCE_LAWS.values()),
         *kinds("electrostatics.signal", file.SIGNALS, "which kind"),
         *kinds(
             "electrostatics.roughness_gap",

@@ -14,7 +14,7 @@ import numpy as np
 from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.dielectrics import Dielectric
 from evfem.electrostatics.drive import powers
-from evfem.electrostatics.laws import Layer, StrongTroxel
+from evfem.electrostatics.laws import Layer
 from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
@@ -39,7 +39,7 @@ def time_scales(scene: Scene) -> str:
     how = "resolved in time with its charges" if drive.resolved else "by its mean over the cycle"
     charge = _charge(scene)
     parts = [f"{what}, {how}", *charge, f"mechanics: {_mechanics(scene)}"]
-    if drive.resolved and not isinstance(scene.law, StrongTroxel):
+    if drive.resolved and not getattr(scene.law, "of_a_field", False):
         parts.append("no balance of the source, which only Strong and Troxel's law has")
     if not drive.resolved and at is not None:
         parts.append(f"left out: the swing of the attraction at {slowest_swing(scene):g} Hz")

@@ -85,7 +85,6 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
-from evfem.electrostatics.laws import StrongTroxel
 from evfem.simulation.model import Model
 from evfem.solver.spatial import SkinInterface, slipped
 from evfem.solver.state import State
@@ -162,7 +161,7 @@ def tells_source(model: Model) -> bool:
     attraction = model.attraction
     if attraction is None or attraction.charging is None:
         return False
-    return isinstance(attraction.law, StrongTroxel)
+    return bool(getattr(attraction.law, "of_a_field", False))
 
 
 def unloaded(state: State) -> State:

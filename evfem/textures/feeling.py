@@ -15,21 +15,19 @@ only adds to it, and where the amplifier cannot follow.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, check_fields, number, one_of
+from evfem.common.checks import Within, among, check_fields, number, one_of
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.electrostatics.laws import FILM, TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.laws import FILM, FORCE_LAWS, TOUCHSCREEN, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
-from evfem.protocols import ForceLaw
 from evfem.simulation.rendering import (
     NOISE,
     ApparentFriction,
@@ -44,7 +42,6 @@ from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
-LAWS: Mapping[str, Callable[[], ForceLaw]] = {"kaczmarek": Kaczmarek, "strong_troxel": StrongTroxel}
 INSULATORS = {"film": FILM, "touchscreen": TOUCHSCREEN}
 #: of the plane finger: area per load (mm2/N), and the stratum corneum of Table 2
 AREA, SKIN = 112.0, Layer(0.38, 1650.0)
@@ -57,11 +54,11 @@ class Device:
 
     >>> Device(law="coulomb")
     Traceback (most recent call last):
-    evfem.errors.InputError: law: given "coulomb"; allowed: kaczmarek | strong_troxel
+    evfem.errors.InputError: law: given "coulomb"; allowed: strong_troxel | kaczmarek
     """
 
     friction: float = field(default=0.25, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
-    law: str = field(default="kaczmarek", metadata=one_of(*LAWS))
+    law: str = field(default="kaczmarek", metadata=among(FORCE_LAWS))
     insulator: str = field(default="film", metadata=one_of(*INSULATORS))
     voltage_max: float | None = field(default=None, metadata=number("V from 1 to 1e5", Within(1.0, 1e5)))
     slew: float | None = field(default=None, metadata=number("V/s from 1 to 1e9", Within(1.0, 1e9)))
@@ -73,7 +70,7 @@ class Device:
     def encoding(self) -> Encoding:
         """Its closed forms."""
         layers = Layers.of(SKIN, INSULATORS[self.insulator])
-        return Encoding(LAWS[self.law](), layers, AreaLaw(AREA), self.friction)
+        return Encoding(FORCE_LAWS[self.law](), layers, AreaLaw(AREA), self.friction)
 
     @property
     def amplifier(self) -> Amplifier | None:
@@ -216,5 +213,5 @@ def exact_voltage(reference: Recording, device: Device) -> Exact:
     """
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    rendered = exact(reference, display, LAWS[device.law](), largest)
+    rendered = exact(reference, display, FORCE_LAWS[device.law](), largest)
     return Exact(reference, rendered, compare(reference.result, rendered.result))

@@ -5,7 +5,7 @@ import pytest
 
 import evfem as ev
 from evfem.electrostatics import alternating_pressure, square_wave_pressure
-from evfem.electrostatics.drive import CycleMean, harmonics, mean_law, powers
+from evfem.electrostatics.drive import CycleMean, mean_law, powers
 from evfem.electrostatics.laws import eps_0
 
 SOLIDS = (ev.Layer(0.30, ev.electrostatics.SKINS["gabriel_dry"]), ev.TOUCHSCREEN)
@@ -31,7 +31,7 @@ def test_the_mean_law_of_a_square_wave_is_its_closed_form(frequency, error):
 
 
 def test_harmonics_are_those_of_a_square_wave():
-    order, weight = harmonics()
+    order, weight = ev.Square.harmonics()
     np.testing.assert_allclose(weight[:5], 8.0 / (np.pi * np.array([1, 3, 5, 7, 9])) ** 2, rtol=1e-14)
     assert weight.sum() == pytest.approx(1.0, abs=1e-14)
     assert (np.diff(order) > 0.0).all()

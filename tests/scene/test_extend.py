@@ -1,0 +1,90 @@
+"""A force law and a waveform more: one class each, and every door of the package knows them."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.common.checks import Within, check_fields, number, plain
+from evfem.electrostatics import timesignals
+from evfem.electrostatics.laws import FORCE_LAWS, GapPermittivity, NamedLaw
+from evfem.electrostatics.spectrum import grouped
+from evfem.errors import InputError
+from evfem.scene.file import dump, loads
+from evfem.scene.schema import schema
+
+TEXT = """
+version = 1
+[finger]
+ridges = false
+resolution = "coarse"
+[surface]
+kind = "flat"
+[electrostatics]
+law = "softened"
+softening = 0.02
+gap_eps_r = 2.0
+insulator = "film"
+voltage = 100.0
+[[motion]]
+kind = "hover"
+gap = 0.2
+"""
+
+
+@pytest.fixture
+def softened():
+    @dataclass(frozen=True)
+    class Softened(NamedLaw, name="softened"):
+        softening: Annotated[float, number("a length in mm, not negative", Within(0.0), "mm"), "of the gap"]
+        gap_eps_r: GapPermittivity = 1.0
+
+        def __post_init__(self):
+            check_fields(self)
+
+        def traction(self, gap, voltage, layers):
+            far = np.asarray(gap) + self.softening + self.gap_eps_r * layers.reduced
+            return plain(0.5 * self.gap_eps_r * ev.electrostatics.eps_0 * (voltage / far) ** 2)
+
+    yield Softened
+    del FORCE_LAWS["softened"]
+
+
+def test_a_law_more_is_a_class(softened):
+    scene = loads(TEXT)
+    assert scene.law == softened(0.02, 2.0)
+    assert loads(dump(scene)) == scene
+    found = schema()["properties"]["electrostatics"]["properties"]
+    assert found["softening"]["description"] == "of the gap (mm). Allowed: a length in mm, not negative"
+    with pytest.raises(InputError, match=r"electrostatics\.softening: given -1; allowed: a length in mm"):
+        loads(TEXT.replace("0.02", "-1"))
+    with pytest.raises(InputError, match=r"electrostatics\.softening: missing"):
+        loads(TEXT.replace("softening = 0.02", ""))
+    with pytest.raises(InputError, match=r"electrostatics\.softening: given an unknown key"):
+        loads(TEXT.replace("softened", "kaczmarek"))
+    with pytest.raises(InputError, match=r"electrostatics\.field: given full with"):
+        loads(TEXT.replace("voltage =", 'field = "full"\nvoltage ='))
+    assert ev.simulate(scene).normal_force[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_waveform_more_is_a_class(monkeypatch):
+    @dataclass(frozen=True)
+    class Triangle(timesignals.Square):
+        kind = "triangle"
+        crest = float(np.sqrt(3.0))
+
+        @staticmethod
+        def harmonics():
+            order = np.arange(1.0, 101.0, 2.0)
+            weight = 96.0 / (np.pi * order) ** 4
+            return grouped(order, weight / weight.sum())
+
+    monkeypatch.setitem(timesignals.WAVEFORMS, "triangle", Triangle)
+    drive = ev.Drive(50.0, waveform="triangle", skin="gabriel_dry")
+    assert drive.peak(100.0) == pytest.approx(173.205, rel=1e-5)
+    law, layers = ev.electrostatics.drive.mean_law(
+        ev.StrongTroxel(), drive, 50.0, (ev.TOUCHSCREEN, ev.TOUCHSCREEN)
+    )
+    assert 0.0 < law.traction(0.1, 100.0, layers) < ev.StrongTroxel().traction(0.0, 100.0, layers).max()
