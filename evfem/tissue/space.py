@@ -41,7 +41,7 @@ from evfem.mesh.hexahedron import EDGES, FACES, PLACES
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det
 from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.kernels.blocks import Cells, SolidCells, blocked
+from evfem.tissue.kernels.blocks import Cells, blocked
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -184,9 +184,9 @@ class Space:
         return self.sampled.of_mesh
 
     @cached_property
-    def cells(self) -> Cells | SolidCells:
+    def cells(self) -> Cells:
         """The same in blocks, for the compiled loops."""
-        return cells_of(self) if self.dim == 2 else solid_cells_of(self)
+        return cells_of(self)
 
     @cached_property
     def projection(self) -> Floats | None:
@@ -196,46 +196,28 @@ class Space:
 
 def cells_of(space: Space) -> Cells:
     """A space in blocks; what the loops read lies together."""
-    pointwise = space.modes is None or space.psi is None
-    E, n = space.nodes.shape
-    sampled = space.sampled
-    assert isinstance(sampled, Gradients), "no mean gradients in the plane"
-    reference = sampled.reference[:0] if pointwise else sampled.reference
-    inverse = sampled.inverse[:, :0] if pointwise else sampled.inverse
+    (E, n), D, sampled = space.nodes.shape, space.dim, space.sampled
+    modes = np.zeros((E, space.weight.shape[1], 0)) if space.modes is None else space.modes
     psi = np.zeros((E, 0, 0)) if space.psi is None else space.psi
-    mean = np.zeros((E, 0)) if space.modes is None else np.einsum("eq,eqm->em", space.weight, space.modes)
-    nodes = blocked(space.nodes.astype(np.int32))
-    Q, S, M = space.weight.shape[1], len(reference), mean.shape[1]
+    mean = np.einsum("eq,eqm->em", space.weight, modes)
+    nodes, Q = blocked(space.nodes.astype(np.int32)), space.weight.shape[1]
+    at_points = sampled is space.at if D == 3 else not mean.size
+    if isinstance(sampled, MeanGradients):
+        S, reference, inverse = 1, None, sampled.of_mesh[:, 0]
+    else:
+        S = 0 if at_points else len(sampled.reference)
+        reference = np.ascontiguousarray(sampled.reference[:S])
+        inverse = sampled.inverse[:, :S].reshape(E, S, D * D)
     return Cells(
-        (space.size, len(nodes), n, Q, S, M),
+        (space.size, len(nodes), n, Q, S, mean.shape[1]),
         nodes,
         blocked(space.weight),
         space.at.reference,
-        blocked(space.at.inverse.reshape(E, Q, 4)),
-        np.ascontiguousarray(reference),
-        blocked(inverse.reshape(E, S, 4)),
+        blocked(space.at.inverse.reshape(E, Q, D * D)),
+        reference,
+        blocked(inverse),
         blocked(psi),
         blocked(mean),
-    )
-
-
-def solid_cells_of(space: Space) -> SolidCells:
-    """A space of hexahedra in blocks."""
-    assert space.modes is not None, "hexahedra have modes of theta"
-    assert space.psi is not None
-    E, n = space.nodes.shape
-    nodes = blocked(space.nodes.astype(np.int32))
-    Q, M = space.weight.shape[1], space.modes.shape[2]
-    sampled = space.sampled
-    return SolidCells(
-        (space.size, len(nodes), n, Q, M),
-        nodes,
-        blocked(space.weight),
-        space.at.reference,
-        blocked(space.at.inverse.reshape(E, Q, 9)),
-        blocked(sampled.of_mesh[:, 0]) if isinstance(sampled, MeanGradients) else None,
-        blocked(space.psi),
-        blocked(np.einsum("eq,eqm->em", space.weight, space.modes)),
     )
 
 

@@ -1,7 +1,7 @@
 """Cells in blocks of `LANES`, the last axis of every array, as the compiled element loops take them.
 
-The loops (`loops.c`, in space `solids.c`) are built when the package is installed; where no
-compiler is, the weak forms do the same (`evfem.tissue.assembly`). Arrays: B blocks, n nodes of a
+The loops (`module.h`, once for the plane and once for space) are built when the package is installed;
+where no compiler is, the weak forms do the same (`evfem.tissue.assembly`). Arrays: B blocks, n nodes of a
 cell, Q quadrature points, S samples of ln J, M modes of theta, L lanes.
 """
 
@@ -19,11 +19,12 @@ LANES = 8
 
 
 class Cells(NamedTuple):
-    """A space in blocks. `sizes` (N, B, n, Q, S, M); `nodes` (B, n, L); `weight` (B, Q, L);
-    `reference` (Q, n, 2) gradients of the shape functions in the reference cell and `inverse` (B,
-    Q, 4, L) dxi/dX at the points; the same where ln J is sampled, `sample_reference` (S, n, 2) and
-    `sample_inverse` (B, S, 4, L); `psi` (B, M, S, L) and `mean` (B, M, L) of the modes of theta,
-    see `elastic.h`. S = M = 0 where theta is ln J of the quadrature point.
+    """A space in blocks, of D dimensions. `sizes` (N, B, n, Q, S, M); `nodes` (B, n, L); `weight` (B, Q,
+    L); `reference` (Q, n, D) gradients of the shape functions in the reference cell and `inverse` (B, Q,
+    D D, L) dxi/dX at the points; the same where ln J is sampled, `sample_reference` (S, n, D) and
+    `sample_inverse` (B, S, D D, L), or in space None and (B, n, D, L), the means of the shape gradients,
+    with S = 1; S = 0 where that is at the points. `psi` (B, M, S or Q, L) and `mean` (B, M, L) of the modes
+    of theta, see `elastic.h`; M = 0 in the plane where theta is ln J of the quadrature point.
     """
 
     sizes: tuple[int, ...]
@@ -31,25 +32,8 @@ class Cells(NamedTuple):
     weight: Floats
     reference: Floats
     inverse: Floats
-    sample_reference: Floats
+    sample_reference: Floats | None
     sample_inverse: Floats
-    psi: Floats
-    mean: Floats
-
-
-class SolidCells(NamedTuple):
-    """A space of hexahedra in blocks. `sizes` (N, B, n, Q, M); `nodes`, `weight`, `reference` (Q, n,
-    3), `inverse` (B, Q, 9, L) and `mean` as in the plane; ln J is sampled at the points, `psi` (B, M,
-    Q, L), or once with `mean_gradient` (B, n, 3, L), the means of the shape gradients, `psi` (B, M,
-    1, L).
-    """
-
-    sizes: tuple[int, ...]
-    nodes: Ints
-    weight: Floats
-    reference: Floats
-    inverse: Floats
-    mean_gradient: Floats | None
     psi: Floats
     mean: Floats
 

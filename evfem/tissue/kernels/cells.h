@@ -1,26 +1,48 @@
-/* Cells of the plane in vectors: LANES cells at a time, one in each lane. With reference gradients g_k
-   of the shape functions and A = dxi/dX at a point, H = grad u = (sum_k u_k g_k^T) A and the shape
-   gradients are A^T g_k. */
+/* Cells in vectors: LANES cells at a time, one in each lane. With reference gradients g_k of the shape
+   functions and A = dxi/dX at a point, H = grad u = (sum_k u_k g_k^T) A and the shape gradients are A^T g_k.
+   DIM is 2 for quadrilaterals and triangles of the plane, 3 for hexahedra. */
 
 #include "lanes.h"
 
-#define DIM 2
+#if DIM == 2
 #define MOST_NODES 9  /* of a cell */
 #define MOST_POINTS 9 /* where it is integrated, or ln J is sampled */
+#define MOST_MODES 9
+#define ZERO {{{{0}, {0}}, {{0}, {0}}}}
+#define DOT(x, m, y, n) ((x)[0] * (y)[0] + (x)[m] * (y)[n])
+#define SIZED(NAME, ...)                            \
+    switch (m->n) {                                 \
+    case 4: return NAME(m, 4, __VA_ARGS__);         \
+    case 6: return NAME(m, 6, __VA_ARGS__);         \
+    default: return NAME(m, 9, __VA_ARGS__);        \
+    }
+#else
+#define MOST_NODES 27
+#define MOST_POINTS 27
+#define MOST_MODES 4
+#define ZERO {{{{0}}}}
+#define DOT(x, m, y, n) ((x)[0] * (y)[0] + (x)[m] * (y)[n] + (x)[2 * (m)] * (y)[2 * (n)])
+#define SIZED(NAME, ...)                            \
+    switch (m->n) {                                 \
+    case 8: return NAME(m, 8, __VA_ARGS__);         \
+    default: return NAME(m, 27, __VA_ARGS__);       \
+    }
+#endif
+#define EACH(i) _Pragma("GCC unroll 3") for (int i = 0; i < DIM; i++)
 
-typedef struct { lanes xx, xy, yx, yy; } tensor;
+typedef struct { lanes a[DIM][DIM]; } tensor;
 
 /* Gradients of the shape functions at some points of all cells. */
 typedef struct {
     int count;
-    const double *reference; /* (count, n, 2) */
-    const stored *inverse;    /* (B, count, 4): dxi/dX as 11, 12, 21, 22 */
+    const double *reference; /* (count, n, DIM); NULL: `inverse` has the gradients themselves, of one point */
+    const stored *inverse;   /* (B, count, DIM DIM): dxi/dX, row by row; or (B, n, DIM) */
 } points;
 
 /* The cells of a space in B blocks, n nodes each. */
 typedef struct {
     Py_ssize_t blocks;
-    int n, modes;
+    int n, modes, apart;  /* whether ln J is sampled elsewhere than at the points */
     const int32_t *nodes; /* (B, n, LANES) */
     points at, sample;
     const stored *weight; /* (B, at.count) */
@@ -33,52 +55,106 @@ typedef struct {
 INLINE void gather(const double *u, const int32_t *nodes, int n, lanes *ue) {
     for (int k = 0; k < n; k++)
         for (int i = 0; i < LANES; i++) {
-            const double *at = u + 2 * (Py_ssize_t)nodes[k * LANES + i];
-            item(ue + 2 * k)[i] = at[0];
-            item(ue + 2 * k + 1)[i] = at[1];
+            const double *at = u + DIM * (Py_ssize_t)nodes[k * LANES + i];
+            EACH(c) item(ue + DIM * k + c)[i] = at[c];
         }
 }
 
 INLINE void spread(lanes *fe, const int32_t *nodes, int n, double *out) {
     for (int k = 0; k < n; k++)
         for (int i = 0; i < LANES; i++) {
-            double *at = out + 2 * (Py_ssize_t)nodes[k * LANES + i];
-            at[0] += item(fe + 2 * k)[i];
-            at[1] += item(fe + 2 * k + 1)[i];
+            double *at = out + DIM * (Py_ssize_t)nodes[k * LANES + i];
+            EACH(c) at[c] += item(fe + DIM * k + c)[i];
         }
 }
 
-/* H = (sum_k u_k g_k^T) A */
-INLINE tensor displacement_gradient(const lanes *ue, const double *g, const stored *A, int n) {
-    lanes xx = {0}, xy = {0}, yx = {0}, yy = {0};
-    for (int k = 0; k < n; k++) {
-        xx += ue[2 * k] * g[2 * k];
-        xy += ue[2 * k] * g[2 * k + 1];
-        yx += ue[2 * k + 1] * g[2 * k];
-        yy += ue[2 * k + 1] * g[2 * k + 1];
+/* H = (sum_k u_k g_k^T) A at point q of block b */
+INLINE tensor displacement_gradient(const points *at, Py_ssize_t b, int q, const lanes *ue, int n) {
+    tensor D = ZERO, H;
+    if (DIM == 3 && !at->reference) {
+        const stored *G = at->inverse + DIM * n * b;
+        for (int k = 0; k < n; k++)
+            EACH(i) EACH(j) D.a[i][j] += ue[DIM * k + i] * G[DIM * k + j];
+        return D;
     }
-    return (tensor){xx * A[0] + xy * A[2], xx * A[1] + xy * A[3],
-                    yx * A[0] + yy * A[2], yx * A[1] + yy * A[3]};
+    const double *g = at->reference + DIM * n * q;
+    const stored *A = at->inverse + DIM * DIM * (b * at->count + q);
+    for (int k = 0; k < n; k++)
+        EACH(i) EACH(j) D.a[i][j] += ue[DIM * k + i] * g[DIM * k + j];
+    EACH(i) EACH(j) H.a[i][j] = DOT(D.a[i], 1, A + j, DIM);
+    return H;
 }
 
-/* fe_k += P (A^T g_k) */
-INLINE void add_forces(tensor P, const double *g, const stored *A, int n, lanes *fe) {
-    lanes xx = P.xx * A[0] + P.xy * A[1], xy = P.xx * A[2] + P.xy * A[3];
-    lanes yx = P.yx * A[0] + P.yy * A[1], yy = P.yx * A[2] + P.yy * A[3];
-    for (int k = 0; k < n; k++) {
-        fe[2 * k] += xx * g[2 * k] + xy * g[2 * k + 1];
-        fe[2 * k + 1] += yx * g[2 * k] + yy * g[2 * k + 1];
+/* fe_k += P (A^T g_k) at point q of block b */
+INLINE void add_forces(tensor P, const points *at, Py_ssize_t b, int q, int n, lanes *fe) {
+    if (DIM == 3 && !at->reference) {
+        const stored *G = at->inverse + DIM * n * b;
+        for (int k = 0; k < n; k++)
+            EACH(i) fe[DIM * k + i] += DOT(P.a[i], 1, G + DIM * k, 1);
+        return;
     }
+    const double *g = at->reference + DIM * n * q;
+    const stored *A = at->inverse + DIM * DIM * (b * at->count + q);
+    tensor T;
+    EACH(i) EACH(j) T.a[i][j] = DOT(P.a[i], 1, A + DIM * j, 1);
+    for (int k = 0; k < n; k++)
+        EACH(i) fe[DIM * k + i] += DOT(T.a[i], 1, g + DIM * k, 1);
+}
+
+#if DIM == 2
+/* cofactors of 1 + H */
+INLINE tensor cofactors(tensor H) {
+    return (tensor){{{1.0 + H.a[1][1], -H.a[1][0]}, {-H.a[0][1], 1.0 + H.a[0][0]}}};
 }
 
 /* J - 1, with the digits that J loses where it is nearly 1 */
-INLINE lanes volume_change(tensor H) { return H.xx + H.yy + (H.xx * H.yy - H.xy * H.yx); }
-
-INLINE tensor inverse_transposed(tensor H, lanes e) {
-    lanes share = 1.0 / (1.0 + e);
-    return (tensor){(1.0 + H.yy) * share, -H.yx * share, -H.xy * share, (1.0 + H.xx) * share};
+INLINE lanes volume_change(tensor H) {
+    return H.a[0][0] + H.a[1][1] + (H.a[0][0] * H.a[1][1] - H.a[0][1] * H.a[1][0]);
 }
 
+INLINE lanes contracted(tensor S, tensor T) {
+    return S.a[0][0] * T.a[0][0] + S.a[0][1] * T.a[0][1] + S.a[1][0] * T.a[1][0] + S.a[1][1] * T.a[1][1];
+}
+
+INLINE lanes trace(tensor H) { return H.a[0][0] + H.a[1][1]; }
+#else
+INLINE lanes minor(tensor F, int i, int j) {
+    int k = (i + 1) % 3, l = (i + 2) % 3, p = (j + 1) % 3, q = (j + 2) % 3;
+    return F.a[k][p] * F.a[l][q] - F.a[k][q] * F.a[l][p];
+}
+
+INLINE tensor cofactors(tensor H) {
+    tensor C, F = H;
+    EACH(i) F.a[i][i] += 1.0;
+    EACH(i) EACH(j) C.a[i][j] = minor(F, i, j);
+    return C;
+}
+
+INLINE lanes volume_change(tensor H) {
+    tensor C;
+    EACH(i) EACH(j) C.a[i][j] = minor(H, i, j);
+    lanes det = H.a[0][0] * C.a[0][0] + H.a[0][1] * C.a[0][1] + H.a[0][2] * C.a[0][2];
+    return H.a[0][0] + H.a[1][1] + H.a[2][2] + (C.a[0][0] + C.a[1][1] + C.a[2][2] + det);
+}
+
+INLINE lanes contracted(tensor S, tensor T) {
+    lanes total = {0};
+    EACH(i) EACH(j) total += S.a[i][j] * T.a[i][j];
+    return total;
+}
+
+INLINE lanes trace(tensor H) { return H.a[0][0] + H.a[1][1] + H.a[2][2]; }
+#endif
+
 INLINE tensor scaled(lanes factor, tensor T) {
-    return (tensor){factor * T.xx, factor * T.xy, factor * T.yx, factor * T.yy};
+    EACH(i) EACH(j) T.a[i][j] *= factor;
+    return T;
+}
+
+INLINE tensor inverse_transposed(tensor H, lanes e) { return scaled(1.0 / (1.0 + e), cofactors(H)); }
+
+/* Add one pair's stiffness (DIM, DIM) to the entries of the matrix; what is below the diagonal of a node
+   with itself goes to the place beyond the last one. */
+INLINE void scatter(tensor K, const int32_t *place, double *data) {
+    EACH(i) EACH(j) for (int l = 0; l < LANES; l++) data[place[(DIM * i + j) * LANES + l]] += item(&K.a[i][j])[l];
 }

@@ -1,13 +1,20 @@
-/* The loops for Python, in the plane and in space: of each a version for every instruction set of x86,
-   chosen when the module is loaded; elsewhere for the one there is. What includes this has the loops, DIM,
-   SIZED (a loop for the cells' number of nodes), `read_cells`, `samples_of` and `points_of` a mesh. */
+/* The loops for Python, twins of the weak forms `neo_hookean` (`elastic.h`) and `kelvin_voigt` (`viscous.h`),
+   in the plane and in space (DIM): of each a version for every instruction set of x86, chosen when the module
+   is loaded; elsewhere for the one there is. */
+
+#define PY_SSIZE_T_CLEAN
+#define Py_LIMITED_API 0x030b0000
+#define STRAINS (DIM * (DIM + 1) / 2)
+#define STRESSES (DIM == 2 ? 4 : 6)
+#include "viscous.h"
+#include "arrays.h"
 
 /* -- one version for each instruction set ---------------------------------------------------- */
 
-#define STRAINS (DIM * (DIM + 1) / 2)
-#define STRESSES (DIM == 2 ? 4 : 6)
-
 #define VERSION(SUFFIX, ISA)                                                                             \
+    ISA static int outside_##SUFFIX(const int32_t *numbers, Py_ssize_t blocks, int32_t last) {           \
+        return outside((const wholes *)numbers, blocks, last);                                           \
+    }                                                                                                    \
     ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
                                       const stored *lmbda, double *out, double *smallest) {              \
         SIZED(elastic_forces, u, mu, lmbda, out, smallest)                                               \
@@ -43,7 +50,7 @@
     static const versions version_##SUFFIX = {                                                           \
         forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
         stresses_##SUFFIX, smallest_##SUFFIX, strains_##SUFFIX,    viscous_##SUFFIX,                     \
-        viscous_tangent_##SUFFIX};
+        viscous_tangent_##SUFFIX, outside_##SUFFIX};
 
 typedef struct {
     double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
@@ -57,6 +64,7 @@ typedef struct {
     double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
     void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
                             double *);
+    int (*outside)(const int32_t *, Py_ssize_t, int32_t);
 } versions;
 
 VERSION(plain, )
@@ -77,6 +85,13 @@ static const versions *chosen(void) {
 
 static const versions *version;
 
+/* Raise IndexError unless all of `count` numbers, whole blocks of LANES, are from 0 to below `end`. */
+static void check_within(const int32_t *numbers, Py_ssize_t count, Py_ssize_t end, const char *what) {
+    int32_t last = end > INT32_MAX ? INT32_MAX : (int32_t)end - 1;
+    if (!PyErr_Occurred() && version->outside(numbers, count / LANES, last))
+        PyErr_Format(PyExc_IndexError, "a %s outside 0 to %zd", what, end - 1);
+}
+
 typedef struct {
     held all;
     mesh m;
@@ -84,6 +99,37 @@ typedef struct {
     const stored *first; /* mu or rate, (B, LANES) */
     const stored *second; /* lmbda (B, LANES), or strains (B, Q, STRAINS, LANES) */
 } request;
+
+/* Read a tuple `evfem.tissue.kernels.blocks.Cells`; size is N of its sizes (N, B, n, Q, S, M). */
+static mesh read_cells(held *all, PyObject *cells, Py_ssize_t *size) {
+    mesh m = {0};
+    PyObject *nodes, *weight, *at[2], *sample[2], *psi, *mean;
+    int S = 0;
+    if (!PyArg_ParseTuple(cells, "(nniiii)OOOOOOOO", size, &m.blocks, &m.n, &m.at.count, &S, &m.modes,
+                          &nodes, &weight, &at[0], &at[1], &sample[0], &sample[1], &psi, &mean))
+        return m;
+    Py_ssize_t B = m.blocks, n = m.n, Q = m.at.count, M = m.modes;
+    int known = DIM == 2 ? n == 4 || n == 6 || n == 9 : (n == 8 || n == 27) && M > 0;
+    if (!known || *size < 0 || B < 0 || Q < 0 || Q > MOST_POINTS || S < 0 || S > MOST_POINTS || M < 0 ||
+        M > MOST_MODES || (DIM == 2 && !M != !S))
+        PyErr_SetString(PyExc_ValueError, "cells of a kind that the loops do not know");
+    m.nodes = hold(all, nodes, 'i', B * n * LANES, 0);
+    check_within(m.nodes, B * n * LANES, *size, "node number");
+    m.weight = hold(all, weight, 'd', B * Q * LANES, 0);
+    m.at.reference = hold(all, at[0], 'd', DIM * Q * n, 0);
+    m.at.inverse = hold(all, at[1], 'd', B * Q * DIM * DIM * LANES, 0);
+    m.apart = S > 0;
+    m.sample = m.at;
+    if (m.apart) {
+        int whole = DIM == 3 && sample[0] == Py_None; /* means over the cell */
+        m.sample.count = whole ? 1 : S;
+        m.sample.reference = whole ? NULL : hold(all, sample[0], 'd', DIM * S * n, 0);
+        m.sample.inverse = hold(all, sample[1], 'd', (whole ? n * DIM : (Py_ssize_t)S * DIM * DIM) * B * LANES, 0);
+    }
+    m.psi = hold(all, psi, 'd', B * M * (M ? m.sample.count : 0) * LANES, 0);
+    m.mean = hold(all, mean, 'd', B * M * LANES, 0);
+    return m;
+}
 
 /* Read what all loops begin with: cells, u and, where asked for, moduli or strains. */
 static Py_ssize_t read_request(request *r, PyObject *cells, PyObject *u, PyObject *first, PyObject *second,
@@ -94,11 +140,20 @@ static Py_ssize_t read_request(request *r, PyObject *cells, PyObject *u, PyObjec
     r->u = hold(&r->all, u, 'd', DIM * size, 0);
     if (first) r->first = hold(&r->all, first, 'd', r->m.blocks * LANES, 0);
     if (second)
-        r->second = hold(&r->all, second, 'd', r->m.blocks * (strains ? STRAINS * points_of(&r->m) : 1) * LANES, 0);
+        r->second = hold(&r->all, second, 'd', r->m.blocks * (strains ? STRAINS * r->m.at.count : 1) * LANES, 0);
     return size;
 }
 
 static Py_ssize_t pairs(const mesh *m) { return m->blocks * m->n * (m->n + 1) / 2; }
+
+/* The matrix's entries, and where in them those of the pairs go. */
+static const int32_t *hold_places(request *r, PyObject *places, PyObject *data, double **values) {
+    Py_ssize_t count = pairs(&r->m) * DIM * DIM * LANES;
+    const int32_t *place = hold(&r->all, places, 'i', count, 0);
+    *values = hold(&r->all, data, 'd', -1, 1);
+    if (*values) check_within(place, count, r->all.views[r->all.count - 1].len / (Py_ssize_t)sizeof(double), "place");
+    return place;
+}
 
 static PyObject *finish(request *r, PyObject *result) {
     release(&r->all);
@@ -120,7 +175,7 @@ static PyObject *call_forces(PyObject *self, PyObject *args) {
 
 /* An array (B, S, LANES) of what acts or is found where ln J is sampled. */
 static void *hold_samples(request *r, PyObject *array, int writable) {
-    return hold(&r->all, array, 'd', r->m.blocks * samples_of(&r->m) * LANES, writable);
+    return hold(&r->all, array, 'd', r->m.blocks * r->m.sample.count * LANES, writable);
 }
 
 static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
@@ -129,8 +184,8 @@ static PyObject *call_add_tangent(PyObject *self, PyObject *args) {
     if (!PyArg_ParseTuple(args, "OOOOOOO", &cells, &u, &mu, &lmbda, &pressure, &places, &data)) return NULL;
     read_request(&r, cells, u, mu, lmbda, 0);
     const stored *given = pressure == Py_None ? NULL : hold_samples(&r, pressure, 0);
-    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * DIM * DIM * LANES, 0);
-    double *values = hold(&r.all, data, 'd', -1, 1);
+    double *values;
+    const int32_t *place = hold_places(&r, places, data, &values);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
     version->tangent(&r.m, r.u, r.first, r.second, given, place, values);
@@ -171,7 +226,7 @@ static PyObject *call_stresses(PyObject *self, PyObject *args) {
     request r;
     if (!PyArg_ParseTuple(args, "OOOOO", &cells, &u, &mu, &pressure, &out)) return NULL;
     read_request(&r, cells, u, mu, NULL, 0);
-    const stored *given = hold(&r.all, pressure, 'd', r.m.blocks * points_of(&r.m) * LANES, 0);
+    const stored *given = hold(&r.all, pressure, 'd', r.m.blocks * r.m.at.count * LANES, 0);
     stored *found = hold(&r.all, out, 'd', r.m.blocks * (STRESSES + 1) * LANES, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
@@ -198,7 +253,7 @@ static PyObject *call_strains(PyObject *self, PyObject *args) {
     request r;
     if (!PyArg_ParseTuple(args, "OOO", &cells, &u, &out)) return NULL;
     read_request(&r, cells, u, NULL, NULL, 0);
-    stored *strain = hold(&r.all, out, 'd', r.m.blocks * points_of(&r.m) * STRAINS * LANES, 1);
+    stored *strain = hold(&r.all, out, 'd', r.m.blocks * r.m.at.count * STRAINS * LANES, 1);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
     version->strains(&r.m, r.u, strain);
@@ -224,8 +279,8 @@ static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
     request r;
     if (!PyArg_ParseTuple(args, "OOOOOO", &cells, &u, &rate, &strain0, &places, &data)) return NULL;
     read_request(&r, cells, u, rate, strain0, 1);
-    const int32_t *place = hold(&r.all, places, 'i', pairs(&r.m) * DIM * DIM * LANES, 0);
-    double *values = hold(&r.all, data, 'd', -1, 1);
+    double *values;
+    const int32_t *place = hold_places(&r, places, data, &values);
     if (PyErr_Occurred()) return finish(&r, NULL);
     Py_BEGIN_ALLOW_THREADS
     version->viscous_tangent(&r.m, r.u, r.first, r.second, place, values);

@@ -1,59 +1,74 @@
 /* The weak form `kelvin_voigt`: S = 2 r (E - E0), r = eta / time step, E = (H + H^T + H^T H)/2. */
 
-#include "elastic.h" /* cells, and where a pair's stiffness goes */
+#include "elastic.h"
 
-typedef struct { lanes xx, yy, xy; } symmetric;
+/* Rows and columns of the components of a symmetric tensor. */
+#if DIM == 2
+static const int ROW[STRAINS] = {0, 1, 0}, COLUMN[STRAINS] = {0, 1, 1};
+#else
+static const int ROW[STRAINS] = {0, 1, 2, 0, 1, 0}, COLUMN[STRAINS] = {0, 1, 2, 1, 2, 2};
+#endif
 
-INLINE symmetric green_strain(tensor H) {
-    return (symmetric){H.xx + 0.5 * (H.xx * H.xx + H.yx * H.yx), H.yy + 0.5 * (H.xy * H.xy + H.yy * H.yy),
-                       0.5 * (H.xy + H.yx + H.xx * H.xy + H.yx * H.yy)};
+INLINE void green_strain(tensor H, lanes *E) {
+    for (int c = 0; c < STRAINS; c++) {
+        int i = ROW[c], j = COLUMN[c];
+#if DIM == 2
+        if (i == j)
+            E[c] = H.a[i][i] + 0.5 * (H.a[0][i] * H.a[0][i] + H.a[1][i] * H.a[1][i]);
+        else
+            E[c] = 0.5 * (H.a[i][j] + H.a[j][i] + H.a[0][i] * H.a[0][j] + H.a[1][i] * H.a[1][j]);
+#else
+        E[c] = 0.5 * (H.a[i][j] + H.a[j][i] + H.a[0][i] * H.a[0][j] + H.a[1][i] * H.a[1][j] +
+                      H.a[2][i] * H.a[2][j]);
+#endif
+    }
 }
 
-/* Green strains of all points (B, at.count, 3). */
+/* Green strains of all points (B, at.count, STRAINS) as xx, yy, (zz,) xy(, yz, xz). */
 INLINE void viscous_strains(const mesh *m, int n, const double *u, stored *out) {
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
-        lanes ue[2 * MOST_NODES];
+        lanes ue[DIM * MOST_NODES], E[STRAINS];
         gather(u, m->nodes + b * n * LANES, n, ue);
         for (int q = 0; q < m->at.count; q++) {
-            Py_ssize_t point = b * m->at.count + q;
-            tensor H = displacement_gradient(ue, m->at.reference + 2 * n * q, m->at.inverse + 4 * point, n);
-            symmetric E = green_strain(H);
-            out[3 * point] = E.xx, out[3 * point + 1] = E.yy, out[3 * point + 2] = E.xy;
+            green_strain(displacement_gradient(&m->at, b, q, ue, n), E);
+            for (int c = 0; c < STRAINS; c++) out[STRAINS * (b * m->at.count + q) + c] = E[c];
         }
     }
 }
 
 /* F and the weighted S of one point; returns r w. */
 INLINE lanes viscous_stress(const mesh *m, Py_ssize_t b, int q, int n, const lanes *ue, lanes rate,
-                            const stored *strain0, tensor *F, symmetric *S) {
+                            const stored *strain0, tensor *F, tensor *S) {
     Py_ssize_t point = b * m->at.count + q;
-    lanes w = rate * m->weight[point];
-    *F = displacement_gradient(ue, m->at.reference + 2 * n * q, m->at.inverse + 4 * point, n);
-    symmetric E = green_strain(*F);
-    *S = (symmetric){2.0 * w * (E.xx - strain0[3 * point]), 2.0 * w * (E.yy - strain0[3 * point + 1]),
-                     2.0 * w * (E.xy - strain0[3 * point + 2])};
-    F->xx += 1.0, F->yy += 1.0;
+    lanes w = rate * m->weight[point], E[STRAINS];
+    *F = displacement_gradient(&m->at, b, q, ue, n);
+    green_strain(*F, E);
+    for (int c = 0; c < STRAINS; c++)
+        S->a[ROW[c]][COLUMN[c]] = S->a[COLUMN[c]][ROW[c]] = 2.0 * w * (E[c] - strain0[STRAINS * point + c]);
+    EACH(i) F->a[i][i] += 1.0;
     return w;
 }
 
-/* Nodal forces F S : grad v added to out (N, 2); returns what the step dissipates, S : (E - E0). */
+/* Nodal forces F S : grad v added to out (N, DIM); returns what the step dissipates, S : (E - E0). */
 INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored *rate,
                              const stored *strain0, double *out) {
     lanes total = {0};
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!any(rate[b])) continue;
-        lanes ue[2 * MOST_NODES], fe[2 * MOST_NODES] = {{0}};
+        lanes ue[DIM * MOST_NODES], fe[DIM * MOST_NODES] = {{0}};
         gather(u, m->nodes + b * n * LANES, n, ue);
         for (int q = 0; q < m->at.count; q++) {
-            tensor F;
-            symmetric S;
+            tensor F, S, P;
             lanes w = viscous_stress(m, b, q, n, ue, rate[b], strain0, &F, &S);
-            lanes square = S.xx * S.xx + S.yy * S.yy + 2.0 * S.xy * S.xy;
+#if DIM == 2
+            lanes square = S.a[0][0] * S.a[0][0] + S.a[1][1] * S.a[1][1] + 2.0 * S.a[0][1] * S.a[0][1];
+#else
+            lanes square = contracted(S, S);
+#endif
             for (int i = 0; i < LANES; i++)
                 if (w[i] != 0.0) total[i] += square[i] / (2.0 * w[i]);
-            tensor P = {F.xx * S.xx + F.xy * S.xy, F.xx * S.xy + F.xy * S.yy,
-                        F.yx * S.xx + F.yy * S.xy, F.yx * S.xy + F.yy * S.yy};
-            add_forces(P, m->at.reference + 2 * n * q, m->at.inverse + 4 * (b * m->at.count + q), n, fe);
+            EACH(i) EACH(j) P.a[i][j] = DOT(F.a[i], 1, &S.a[0][j], DIM);
+            add_forces(P, &m->at, b, q, n, fe);
         }
         spread(fe, m->nodes + b * n * LANES, n, out);
     }
@@ -64,40 +79,39 @@ INLINE double viscous_forces(const mesh *m, int n, const double *u, const stored
    grad v S grad w on the diagonal, and r w (F grad w . grad v F^T + grad v . grad w F F^T). */
 INLINE void viscous_tangent(const mesh *m, int n, const double *u, const stored *rate,
                             const stored *strain0, const int32_t *places, double *data) {
+    int Q = m->at.count;
     for (Py_ssize_t b = 0; b < m->blocks; b++) {
         if (!any(rate[b])) continue;
-        int Q = m->at.count;
-        lanes ue[2 * MOST_NODES], w[MOST_POINTS];
-        lanes shape[MOST_POINTS][2 * MOST_NODES], push[MOST_POINTS][2 * MOST_NODES];
-        symmetric S[MOST_POINTS], B[MOST_POINTS];
+        lanes ue[DIM * MOST_NODES], w[MOST_POINTS];
+        lanes shape[MOST_POINTS][DIM * MOST_NODES], push[MOST_POINTS][DIM * MOST_NODES];
+        lanes traction[MOST_POINTS][DIM * MOST_NODES];
+        tensor B[MOST_POINTS];
         gather(u, m->nodes + b * n * LANES, n, ue);
         for (int q = 0; q < Q; q++) {
-            tensor F;
-            const double *g = m->at.reference + 2 * n * q;
-            const stored *A = m->at.inverse + 4 * (b * Q + q);
-            w[q] = viscous_stress(m, b, q, n, ue, rate[b], strain0, &F, &S[q]);
-            B[q] = (symmetric){F.xx * F.xx + F.xy * F.xy, F.yx * F.yx + F.yy * F.yy,
-                               F.xx * F.yx + F.xy * F.yy};
+            tensor F, S;
+            const double *g = m->at.reference + DIM * n * q;
+            const stored *A = m->at.inverse + DIM * DIM * (b * Q + q);
+            w[q] = viscous_stress(m, b, q, n, ue, rate[b], strain0, &F, &S);
+            EACH(i) EACH(j) B[q].a[i][j] = DOT(F.a[i], 1, F.a[j], 1);
             for (int k = 0; k < n; k++) {
-                lanes x = A[0] * g[2 * k] + A[2] * g[2 * k + 1], y = A[1] * g[2 * k] + A[3] * g[2 * k + 1];
-                shape[q][2 * k] = x, shape[q][2 * k + 1] = y;
-                push[q][2 * k] = F.xx * x + F.xy * y, push[q][2 * k + 1] = F.yx * x + F.yy * y;
+                lanes *v = shape[q] + DIM * k;
+                EACH(i) v[i] = DOT(A + i, DIM, g + DIM * k, 1);
+                EACH(i) push[q][DIM * k + i] = DOT(F.a[i], 1, v, 1);
+                EACH(i) traction[q][DIM * k + i] = DOT(S.a[i], 1, v, 1);
             }
         }
-        const int32_t *place = places + b * (n * (n + 1) / 2) * 4 * LANES;
+        const int32_t *place = places + b * (n * (n + 1) / 2) * DIM * DIM * LANES;
         for (int k = 0; k < n; k++)
-            for (int l = k; l < n; l++, place += 4 * LANES) {
-                tensor K = {{0}, {0}, {0}, {0}};
+            for (int l = k; l < n; l++, place += DIM * DIM * LANES) {
+                tensor K = ZERO;
                 for (int q = 0; q < Q; q++) {
-                    const lanes *v = shape[q] + 2 * k, *h = shape[q] + 2 * l;
-                    const lanes *pv = push[q] + 2 * k, *ph = push[q] + 2 * l;
-                    lanes inner = w[q] * (v[0] * h[0] + v[1] * h[1]);
-                    lanes stress = (S[q].xx * v[0] + S[q].xy * v[1]) * h[0] +
-                                   (S[q].xy * v[0] + S[q].yy * v[1]) * h[1];
-                    K.xx += stress + inner * B[q].xx + w[q] * ph[0] * pv[0];
-                    K.xy += inner * B[q].xy + w[q] * ph[0] * pv[1];
-                    K.yx += inner * B[q].xy + w[q] * ph[1] * pv[0];
-                    K.yy += stress + inner * B[q].yy + w[q] * ph[1] * pv[1];
+                    const lanes *v = shape[q] + DIM * k, *h = shape[q] + DIM * l, *t = traction[q] + DIM * k;
+                    const lanes *pv = push[q] + DIM * k, *ph = push[q] + DIM * l;
+                    lanes inner = w[q] * DOT(v, 1, h, 1), stress = DOT(t, 1, h, 1);
+                    EACH(i) EACH(j) if (i == j)
+                        K.a[i][j] += stress + inner * B[q].a[i][j] + w[q] * ph[i] * pv[j];
+                    else
+                        K.a[i][j] += inner * B[q].a[i][j] + w[q] * ph[i] * pv[j];
                 }
                 scatter(K, place, data);
             }

@@ -13,6 +13,7 @@ import skfem
 from scipy.spatial import cKDTree
 from skfem.models.poisson import laplace
 from tools.grids import CELLS, SHAPES, grid_of, rectangle, tangent_of
+from tools.solids import box
 
 from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.elements import ELEMENTS
@@ -209,3 +210,27 @@ def test_blocks_without_viscosity_have_no_part():
         assert not forces[~touched].any()
         K = np.abs(tangent_of(space, u, term).toarray()).sum(axis=1).reshape(-1, 2)
         np.testing.assert_array_equal(K.any(axis=1), touched)
+
+
+@pytest.mark.parametrize(("element", "dim"), [("q1", 2), ("q2p1", 2), ("hex8", 3), ("hex27p1", 3)])
+@pytest.mark.parametrize("number", [50_000_000, -50_000_000, -1])
+def test_numbers_that_lead_out_of_an_array_are_refused(element, dim, number):
+    space = rectangle(element, (3, 3)) if dim == 2 else box(element, (2, 1, 1))
+    u, cells = np.zeros((space.size, dim)), space.cells
+    nodes = cells.nodes.copy()
+    nodes.flat[-1] = number
+    with pytest.raises(IndexError, match=f"node number outside 0 to {space.size - 1}"):
+        loops(dim).smallest_J(cells._replace(nodes=nodes), u)
+    _, B, n, *_ = cells.sizes
+    places = np.zeros((B, n * (n + 1) // 2, dim * dim, LANES), np.int32)
+    places.flat[3] = number
+    ones = np.ones((B, LANES))
+    with pytest.raises(IndexError, match="place outside 0 to 4"):
+        loops(dim).add_tangent(cells, u, ones, ones, None, places, np.zeros(5))
+
+
+@pytest.mark.parametrize("sizes", [(9, -1, 4, 4, 0, 0), (9, 1, 4, -1, 0, 0), (9, 1, 4, 4, -1, 0)])
+def test_counts_below_none_are_refused(sizes):
+    space = rectangle("q1", (2, 2))
+    with pytest.raises(ValueError, match="do not know"):
+        loops().smallest_J(space.cells._replace(sizes=sizes), np.zeros((space.size, 2)))

@@ -16,4 +16,4 @@ def test_loops_of_hexahedra_refuse_what_would_read_beyond_an_array():
         with pytest.raises(ValueError, match="expected"):
             tissue.loops.forces(cells, wrong, *tissue._moduli, out)
     with pytest.raises(ValueError, match="kind"):
-        tissue.loops.forces(cells._replace(sizes=(space.size, 1, 20, 8, 1)), out, *tissue._moduli, out)
+        tissue.loops.forces(cells._replace(sizes=(space.size, 1, 20, 8, 0, 1)), out, *tissue._moduli, out)
