@@ -45,7 +45,6 @@ _NAMES = {
     "electrostatics.drive": ("Drive",),
     "electrostatics.timesignals": ("Carrier", "ChargeControl", "OpenCircuit", "Sampled", "Sine", "Square"),
     "errors": ("EvfemError", "InputError", "NotConverged", "StopRun", "StorageError"),
-    "fast.model": ("FastModel", "reduce"),
     "finger.fingerpad": ("Electrical", "FingerPad", "MeshedFinger"),
     "finger.fingerprint": ("HeightMap",),
     "finger.fingertip": ("Fingertip",),
@@ -90,6 +89,12 @@ _MODULES = {
     "tensor": "tensor",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}
+#: public names of 0.2 that are gone, and what to use instead
+_GONE = dict.fromkeys(
+    ("FastModel", "reduce"),
+    "the fast model is gone since 0.3; run the scene itself with `ev.simulate` (a coarser `resolution` is "
+    "about as fast), several at a time with `ev.sweep`",
+)
 
 __all__ = sorted([*_HOME, *_MODULES])
 
@@ -100,6 +105,8 @@ def __getattr__(name: str) -> Any:
         value = getattr(_import_module(f"{__name__}.{_HOME[name]}"), name)
     elif name in _MODULES:
         value = _import_module(f"{__name__}.{_MODULES[name]}")
+    elif name in _GONE:
+        raise AttributeError(f"{name}: {_GONE[name]}")
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value

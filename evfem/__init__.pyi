@@ -57,8 +57,6 @@ from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
 from evfem.errors import StopRun as StopRun
 from evfem.errors import StorageError as StorageError
-from evfem.fast.model import FastModel as FastModel
-from evfem.fast.model import reduce as reduce
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger

@@ -9,18 +9,20 @@ from typing import Any
 from evfem.common.storage import format_of
 from evfem.errors import InputError
 
-Found = Any  # Result, FastModel, FitResult, VoltageProfile, Sampled, Scene, Sweep, Mesh or Texture
+Found = Any  # Result, FitResult, VoltageProfile, Sampled, Scene, Sweep, Mesh or Texture
 ALLOWED = (
-    "the folder of a run, a result or a fast model (.npz), a fit (.json), a signal (.csv, .wav), a scene "
-    "or a sweep (.toml), a mesh (.vtu, .msh), a texture (.json)"
+    "the folder of a run, a result (.npz), a fit (.json), a signal (.csv, .wav), a scene or a sweep (.toml), "
+    "a mesh (.vtu, .msh), a texture (.json)"
 )
+#: format of the fast models that 0.2 saved
+FAST_MODEL = "evfem-reduced-1"
 
 
 def load(path: str | Path) -> Found:
-    """What is in a file or folder: the `Result` that `evfem run` left in its folder, a `Result` or a
-    `FastModel` (as their `save` wrote them, under any name), a `FitResult` (.json), a
-    `VoltageProfile` (.csv, .wav) or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a
-    `Mesh` (.vtu, .msh), a `Texture` (.json with its .csv, or their folder).
+    """What is in a file or folder: the `Result` that `evfem run` left in its folder, a `Result`
+    (as its `save` wrote it, under any name), a `FitResult` (.json), a `VoltageProfile` (.csv, .wav)
+    or `Sampled` (.csv over time), a `Scene` or a `Sweep` (.toml), a `Mesh` (.vtu, .msh), a `Texture`
+    (.json with its .csv, or their folder).
 
     Raises InputError for any other or a damaged file, StorageError when the disk refuses.
 
@@ -51,13 +53,13 @@ def _run(path: Path) -> Found:
 
 
 def _archive(path: Path) -> Found:
-    from evfem.fast.model import FORMAT, FastModel
     from evfem.simulation.result import CHECKPOINT_FORMAT, RESULT_FORMAT
     from evfem.simulation.result import load as load_result
 
     form = format_of(path)
-    if form == FORMAT:
-        return FastModel.load(path)
+    if form == FAST_MODEL:
+        allowed = "other files: the fast model is gone since 0.3, `ev.simulate` runs the scene itself"
+        raise InputError("path", f"{path}, a fast model", allowed)
     if form == CHECKPOINT_FORMAT:
         raise InputError(
             "path", f"{path}, the checkpoint of a run", "`evfem run --resume`, which goes on there"

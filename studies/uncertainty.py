@@ -1,12 +1,10 @@
-"""How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed, by the fast
-model.
+"""How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed.
 
-Fast model: (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by quadrature. It
-is adequate because the fingers hover: nothing touches. What it leaves out, the study measures on
-some of its own samples by deformable finite elements (a sweep of scenes): deformation adds a few
-per cent with Kaczmarek's law, more with Strong-Troxel's at the smallest gaps, where it moves that
-law farther from what was measured. A condensed finite element model would be slower here: it must
-be built anew for every thickness and every finger.
+The closed forms are (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by
+quadrature. They are adequate because the fingers hover: nothing touches. What they leave out, the
+study measures on some of its own samples by deformable finite elements (a sweep of scenes):
+deformation adds a few per cent with Kaczmarek's law, more with Strong-Troxel's at the smallest
+gaps, where it moves that law farther from what was measured.
 
 Each sample has one value of every input for all participants (an instrument that is off is off for
 all); the answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed.

@@ -51,7 +51,7 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation slipping interface spatial linearisation pressure anderson "
         "travel front findings "
-        "equilibrium mirrored factorised relaxation path voltage stepping",
+        "factorised equilibrium mirrored relaxation path voltage stepping",
     ),
     "scene": (
         {"numpy", "tomli_w"},
@@ -62,7 +62,6 @@ ROOMS = {
         {"numpy", "scipy", "threadpoolctl"},
         "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
-    "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
         "samples file units schema folder pools run",
@@ -87,8 +86,6 @@ GROUND, MIDDLE, EDGES = (
     ("export", "fieldfiles", "runfolder", "loading", "templates", "arguments", "cli", "__main__"),
 )
 EDGE_PACKAGES = {"numpy", "scipy", "meshio", "matplotlib", "threadpoolctl"}
-#: rooms that do not know each other although both stand above the same ones
-STRANGERS = {"fast", "sweeps"}
 #: packages beside the rooms; an installed evfem has studies and meshes in its folder
 NO_ROOMS = ("data", "meshes", "studies")
 #: packages that take long to load
@@ -192,8 +189,6 @@ def test_a_module_imports_only_what_stands_before_it():
     for place, name in enumerate(ORDER):
         ours, _ = ours_and_others(name)
         edges += [f"{name} -> {other}" for other in sorted(ours - set(ORDER[:place]) - BUILT)]
-        room = name.split(".")[0]
-        edges += [f"{name} -> {o}" for o in ours if {room, o.split(".")[0]} == STRANGERS]
     assert not edges
 
 

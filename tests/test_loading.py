@@ -9,6 +9,7 @@ from tools.fakes import SQUARE_SCENE, fake_result
 from tools.meshes import square_mesh
 
 import evfem as ev
+from evfem.common.storage import save_arrays
 from evfem.electrostatics.signalfile import Playback, write_signal
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
@@ -45,24 +46,17 @@ def test_each_file_is_known_by_what_is_in_it(place):
     assert ev.load("square.msh").kind == "quad"
 
 
-def test_a_fast_model_is_loaded_as_such(place, monkeypatch):
-    from evfem.common.storage import save_arrays
-    from evfem.fast import model
-
-    save_arrays("some.npz", {"format": np.array(model.FORMAT)})
-    monkeypatch.setattr(model.FastModel, "load", classmethod(lambda cls, path: ("fast", path)))
-    assert ev.load("some.npz") == ("fast", place.__class__("some.npz"))
-
-
 def test_what_is_no_file_of_ours_gets_a_sentence(place):
     (place / "notes.txt").write_text("mine")
     (place / "empty.npz").write_text("")
     Checkpoint(place / "checkpoint.npz").write("digest", {}, [])
+    save_arrays("pad.npz", {"format": np.array("evfem-reduced-1")})  # as FastModel.save of 0.2 did
     cases = {
         "notes.txt": "notes.txt, of another kind; allowed: the folder of a run, a result",
         "none.npz": "none.npz, which does not exist",
         "empty.npz": "empty.npz, cut off or of another kind",
         "checkpoint.npz": "the checkpoint of a run; allowed: `evfem run --resume`",
+        "pad.npz": "a fast model; allowed: other files: the fast model is gone since 0.3, `ev.simulate`",
         "square.toml": "frictoin",
     }
     (place / "square.toml").write_text(PRESS.replace("friction", "frictoin"))

@@ -16,13 +16,6 @@ SMALLEST_J              no update shrinks a sampled volume below this ratio     
 SHORTEST_FRACTION       an update that must be cut below this fails the step                      tissue
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
                         body's height in one iteration
-PAD_BONE_INCREMENT      the same for the remembered pad, which has no cells to collapse           fast model
-PAD_WEIGHT_CHANGE       its mean compliance is kept while its weights change by less than this    fast model
-PAD_VOLTAGE_CHANGE      its negative stiffness is kept while the squared voltage changes by       fast model
-                        less than this fraction
-PAD_SPARE, PAD_FEWEST   so many times more of its nodes are in play than touch, and so many more  fast model
-PAD_SPRING              stiffness of the spring that holds it without contact, relative to that   fast model
-                        of a node
 SEARCH_START            where no travel of the bone settles a prescribed force, a search starts   attraction
                         with this fraction of the largest increment
 SEARCH_END              and ends at this fraction of the force that was lacking                   attraction
@@ -146,11 +139,6 @@ INCOMPRESSIBLE = 100.0
 SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05
-PAD_BONE_INCREMENT = 0.1
-PAD_WEIGHT_CHANGE = 0.3
-PAD_VOLTAGE_CHANGE = 0.1
-PAD_SPARE, PAD_FEWEST = 1.2, 8
-PAD_SPRING = 1e-9
 SEARCH_START = 1.0 / 16.0
 SEARCH_END = 0.5
 SEARCH_LIMIT = 12

@@ -198,9 +198,8 @@ class Part:
         viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
-        if np.isfinite(lost):  # the fast model has no tissue to ask
-            lost -= self._contact() + friction
-            lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        lost -= self._contact() + friction
+        lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
         if (hand := self.model.scene.hand) is not None:
             more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
             given, viscous, lost = given + more, viscous + damped, lost + more - damped

@@ -1,5 +1,4 @@
-r"""One equilibrium step: iterations from one accepted state to the next, for any body behind
-`LinearisedBody`.
+r"""One equilibrium step: iterations from one accepted state to the next.
 
 At the iterate u with contact forces :math:`\lambda` and attraction f the out-of-balance forces are
 :math:`R = f_{int}(u) - f(u) - \lambda`. Algorithm (`Equilibrium.step`)::
@@ -16,16 +15,13 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
-What a body must offer, and nothing else, is in `LinearisedBody`: finite elements
-(`evfem.solver.factorised`) and the remembered pad of the fast model (`evfem.fast.step`) are two of
-them. What the stepper, the ledger and the run need of a solver is in `StepSolver`. Friction is
-counted from the last accepted state; nothing is committed before acceptance.
+The body is `evfem.solver.factorised.FactorisedBody`. Friction is counted from the last accepted
+state; nothing is committed before acceptance.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Protocol
 
 import numpy as np
 
@@ -41,6 +37,7 @@ from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Force, Indentation, Loose, Target, sticks
+from evfem.solver.factorised import FactorisedBody
 from evfem.solver.front import Front
 from evfem.solver.interface import Interface
 from evfem.solver.state import (
@@ -54,95 +51,12 @@ from evfem.solver.state import (
     State,
     StepFailed,
 )
-from evfem.solver.strategy import Strategy, stuck
+from evfem.solver.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
 #: why an equilibrium is refused whose outline crosses itself; the place is its x in mm
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
-
-
-class LinearisedBody(Protocol):
-    """A body as the outer iteration sees it; its states have displacements (`size`, 2)."""
-
-    size: int
-    record: Record
-
-    def known(self, old: State, target: Target) -> State | None:
-        """The equilibrium at `target` where it follows from `old` without iterating."""
-
-    def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
-        """Prepare everything for a step, and say where its iterations start."""
-
-    def balance(self, state: State, attraction: Floats, target: Target) -> tuple[State, Balance]:
-        """How far the iterate is from equilibrium under this attraction (P, 2)."""
-
-    def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
-        """The next iterate; raises `ContactNotSolved` or `StepFailed`."""
-
-    def leaves(self, old: State, state: State, target: Target) -> Verge | None:
-        """What makes the body leave the equilibrium `state`, pushed aside by contact; None if it stays."""
-
-    def accepted(self, old: State, state: State) -> State:
-        """The converged state with everything that follows from it."""
-
-    def admit(self, state: State, gap: float) -> None:
-        """A node that was no candidate has penetrated by `gap` (mm, negative)."""
-
-    def forget(self) -> None:
-        """A step failed: what was kept from the steps before may be the cause."""
-
-    def findings(self, state: State, balance: Balance) -> str:
-        """How an iterate looks that is no equilibrium, in one line."""
-
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability on the way to `target`; None
-        where that is not known.
-        """
-
-    def reusable(self) -> Reusable:
-        """What the body takes with it to the next step."""
-
-    def resume(self, state: State, carried: Reusable) -> None:
-        """Put the body where it was after the step that led to `state`."""
-
-
-class StepSolver(Protocol):
-    """What the stepper, the ledger, the run and its checkpoints need of a solver."""
-
-    interface: Interface
-    attraction: Attraction | None
-    tolerance: float
-    strategy: Strategy
-    record: Record
-
-    def rest(self, bone: Floats, voltage: float) -> State:
-        """The undeformed body, translated by `bone` (dim,)."""
-
-    def positions(self, u: Floats) -> Floats:
-        """Current positions of the pad nodes (P, 2)."""
-
-    def contact_forces(self, state: State) -> Floats:
-        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
-
-    def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) at the positions of `state`, touching as in `old`."""
-
-    def step(
-        self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
-    ) -> State:
-        """The equilibrium at `target`; raises `StepFailed`."""
-
-    def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability on the way to `target`; None
-        where that is not known.
-        """
-
-    def reusable(self) -> Reusable:
-        """What the solver takes with it to the next step."""
-
-    def resume(self, state: State, carried: Reusable) -> None:
-        """Put the solver where it was after the step that led to `state`."""
 
 
 class Statics:
@@ -196,7 +110,7 @@ class Equilibrium(Statics):
 
     def __init__(
         self,
-        body: LinearisedBody,
+        body: FactorisedBody,
         interface: Interface,
         attraction: Attraction | None,
         limits: Limits,
@@ -262,10 +176,6 @@ class Equilibrium(Statics):
         self.body.resume(state, carried)
 
     def _try(self, old: State, target: Target, frozen: Floats | None, start: State | None) -> State:
-        if start is None and frozen is None:
-            known = self.body.known(old, target)
-            if known is not None:
-                return known
         try:
             return self._find(old, target, frozen, start or old)
         except (ContactNotSolved, StepFailed) as error:
@@ -389,3 +299,7 @@ class RigidOutline(Statics):
 
     def resume(self, state: State, carried: Reusable) -> None:
         """Nothing to put back."""
+
+
+#: what the stepper, the ledger, the run and its checkpoints know of a solver
+StepSolver = Equilibrium | RigidOutline

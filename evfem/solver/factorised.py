@@ -1,5 +1,5 @@
-r"""Finite elements behind `evfem.solver.equilibrium.LinearisedBody`: factorise, solve contact,
-move.
+r"""The finger's finite elements in an equilibrium step (`evfem.solver.equilibrium`): factorise, solve
+contact, move.
 
 With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and
 the bone b,
@@ -104,10 +104,6 @@ class FactorisedBody:
         self._scaled_down = 0
 
     # -- a step begins
-
-    def known(self, old: State, target: Target) -> None:
-        """Nothing is known without iterating."""
-        return
 
     def begin(self, old: State, target: Target, frozen: bool, start: State) -> State:
         """Prepare everything for a step, and say where its iterations start."""

@@ -191,21 +191,3 @@ def test_the_first_step_of_a_signal_acts_in_full_as_a_number_does():
     number = run(press, voltage=1500.0)
     for name in ("electrostatic_force", "electrostatic_work", "external_work"):
         np.testing.assert_allclose(getattr(over_time, name)[:2], getattr(number, name), rtol=1e-9)
-
-
-def test_the_fast_model_takes_signals_over_time():
-    pad = ev.FingerPad(ridges=False, resolution="coarse")
-    display = ev.Display(friction=0.3)
-    trained = ev.reduce(
-        ev.Scene(
-            pad, display, ev.Kaczmarek(), 2000.0, [ev.Press(force=0.05, steps=4), ev.Slide(1.5, steps=8)]
-        )
-    )
-    hum = ev.Sine(50.0, 1500.0)
-    motion = ev.Press(force=0.05, steps=4), ev.Slide(1.0, steps=20, speed=50.0, hold="force")
-    asked = ev.Scene(pad, display, ev.Kaczmarek(), hum, motion)
-    fast = trained.simulate(asked)
-    assert not fast.provenance["fast"]["fallback"]
-    np.testing.assert_allclose(fast.voltage, hum(fast.time), atol=1e-9)
-    full = ev.simulate(asked)
-    np.testing.assert_allclose(fast.electrostatic_force, full.electrostatic_force, rtol=2e-3, atol=1e-6)

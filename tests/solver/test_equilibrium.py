@@ -452,17 +452,6 @@ def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
     assert set(solver.record.residuals) == {1.0}
 
 
-def test_what_follows_without_iterating_is_taken_where_nothing_else_is_asked(monkeypatch):
-    """Not where iterations are to begin elsewhere, or the attraction is given."""
-    model, old = pressed(Display())
-    solver, known = model.equilibrium, replace(old, voltage=7.0)
-    monkeypatch.setattr(solver.body, "known", lambda old, target: known)
-    target = Target.held(model.bone(0.0, 0.2), 0.0)
-    assert solver.step(old, target) is known
-    assert solver.step(old, target, start=old).voltage == 0.0
-    assert solver.step(old, target, frozen=old.attraction).voltage == 0.0
-
-
 def test_iterations_go_on_while_a_front_of_contact_does(monkeypatch):
     at_rest = iterations_with(monkeypatch, lambda i: [0])
     assert at_rest < 20

@@ -82,7 +82,7 @@ def test_ridges_take_away_more_than_deformation_adds(participants):
 
 
 def test_samples_without_spread_are_fig05():
-    """With every input at Table 2's value the fast model gives Fig. 5's own forces."""
+    """With every input at Table 2's value the closed forms give Fig. 5's own forces."""
     exact = {
         "gap_error": 0.0, "voltage_factor": 1.0, "stratum_corneum": 0.38, "stratum_corneum_eps_r": 1650.0,
         "insulator": 0.09, "insulator_eps_r": 3.35, "width_error": 0.0, "height_error": 0.0,

@@ -22,11 +22,6 @@ def finger(mesh, E=0.1, nu=0.4, viscosity=0.0):
     return MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=nu)}, SKIN, viscosity)
 
 
-def layered_finger(mesh):
-    """A body of tissue and skin with the benchmark's laws."""
-    return MeshedFinger(mesh, BENCHMARK_LAWS, SKIN)
-
-
 def coarse_pad():
     """Table 2's finger without ridges on its coarsest mesh."""
     return FingerPad(ridges=False, resolution="coarse")
@@ -34,7 +29,7 @@ def coarse_pad():
 
 def benchmark_finger(level=0):
     """The finger of the press-and-slide benchmark."""
-    return layered_finger(half_finger(*LEVELS[level]))
+    return MeshedFinger(half_finger(*LEVELS[level]), BENCHMARK_LAWS, SKIN)
 
 
 def benchmark_scene(kind, level, element=None, steps=15):

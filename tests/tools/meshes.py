@@ -70,12 +70,11 @@ def square_mesh(kind="quad"):
     return held(mesh, region=upper.astype(int), names={"soft": 0, "hard": 1})
 
 
-def half_finger(around=60, tissue=10, skin=2, *, free_ends=False):
+def half_finger(around=60, tissue=10, skin=2):
     """Half a finger between two ellipses, the press-and-slide benchmark's: lines from the bone to
     the skin.
 
-    `tissue` and `skin` are numbers of cells across them; `free_ends`: the cut edges do not belong
-    to `bone`.
+    `tissue` and `skin` are numbers of cells across them.
     """
     theta = np.pi * (1.0 + np.arange(around + 1) / around)
     circle = np.stack([np.cos(theta), np.sin(theta)])
@@ -87,11 +86,10 @@ def half_finger(around=60, tissue=10, skin=2, *, free_ends=False):
     lines += [middle + s * (outer - middle) for s in np.arange(skin + 1) / skin]
     x, y = np.stack(lines[::-1], axis=1)  # from the skin up
     mesh = between(x, y)
-    ends = [] if free_ends else [mesh.node_sets["left"], mesh.node_sets["right"]]
     in_skin = np.arange(len(mesh.cells)) < skin * around
     return held(
         mesh,
-        bone=np.unique(np.concatenate([mesh.node_sets["top"], *ends])),
+        bone=np.unique(np.concatenate([mesh.node_sets[side] for side in ("top", "left", "right")])),
         region=in_skin.astype(int),
         names={"tissue": 0, "skin": 1},
     )

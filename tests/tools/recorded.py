@@ -1,7 +1,7 @@
 """Small scenes that together go through every branch of the model, and what is recorded of them.
 
-Contact, friction, attraction, time, own parts, elements, laws, encoding, resuming, sweeps, the
-fast model, and closed forms; a minute in all. Only the public interface of evfem is used.
+Contact, friction, attraction, time, own parts, elements, laws, encoding, resuming, sweeps
+and closed forms; a minute in all. Only the public interface of evfem is used.
 """
 
 import tempfile
@@ -286,25 +286,6 @@ def resumed() -> Numbers:
         return numbers(result.load(Path(folder) / "run.npz"))
 
 
-def fast_model() -> Numbers:
-    """A fast model, saved and loaded; two scenes by it, one with other law, friction and motions."""
-    display, motion = ev.Display(friction=0.5), [ev.Press(force=0.05, steps=4), ev.Slide(1.0, steps=8)]
-    scene = ev.Scene(smooth(), display, ev.Kaczmarek(), 1000.0, motion, output=LAST)
-    other = [ev.Press(force=0.04, steps=3), ev.Slide(0.8, steps=6), ev.Slide(-0.4, steps=3, hold="force")]
-    table = ev.Display(friction=[[0.0, 0.3], [0.5, 0.4]])
-    asked = replace(scene, surface=table, law=ev.StrongTroxel(), voltage=300.0, motion=other)
-    with tempfile.TemporaryDirectory() as folder:
-        ev.reduce(scene).save(Path(folder) / "fast.npz")
-        fast = ev.FastModel.load(Path(folder) / "fast.npz")
-    found, even = (fast.simulate(one, tolerance=0.1) for one in (asked, replace(scene, voltage=500.0)))
-    more = {"even slide": even.tangential_force, "even slide, iterations": even.newton_iterations}
-    for name, run in (("table", found), ("even", even)):
-        told = run.provenance["fast"]
-        more |= {f"{name} errors": list(told["error"].values()), f"{name} checked": told["checked"]}
-        more |= {f"{name} outside": [told["outside"]]}
-    return with_columns(numbers(found), more)
-
-
 def sweep_of_four() -> Numbers:
     """A grid of two values, each with two samples."""
     scene = ev.Scene(smooth(), ev.Flat(), motion=[INDENT, SLIDE], solver=ev.Solver(element="q1"))
@@ -374,7 +355,6 @@ def signals_and_references() -> Numbers:
 SPECIAL: dict[str, Callable[[], Numbers]] = {
     "exact encoding": exact_encoding,
     "resumed, from files": resumed,
-    "fast model": fast_model,
     "sweep": sweep_of_four,
     "shapes": shapes,
     "laws at points": laws_at_points,

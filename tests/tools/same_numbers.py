@@ -5,7 +5,7 @@
     python tests/tools/same_numbers.py compare BEFORE.json AFTER.json [--tolerance 1e-12]
 
 `record` runs small scenes that together go through every branch of the model (contact, friction,
-attraction, time, own parts, elements, laws, encoding, resuming, sweeps, the fast model), a minute
+attraction, time, own parts, elements, laws, encoding, resuming, sweeps), a minute
 in all, and closed forms. It keeps every column of the histories but `seconds`, sums and extremes
 of the last fields, and the solver's counts, with every digit. `record OUT.json --only WORD` runs
 scenes with that word in their names.

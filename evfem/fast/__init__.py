@@ -1,1 +1,0 @@
-"""The fast model: a pad remembered from a few equilibria."""
