@@ -24,7 +24,7 @@ BLOCK = re.compile(r"(<!-- measured: ([\w-]+) -->\n\n).*?(\n<!-- end -->)", re.S
 PACKAGES = {"evfem": "evfem", "fenicsx": "FEniCSx", "felupe": "FElupe", "getfem": "GetFEM"}
 #: cells by name: evfem's element and the others'
 CELLS = {"linear": ("q1", "q1"), "quadratic": ("q2p1", "q2")}
-LEVELS, HALF = ("L0", "L1", "L2"), "-half"
+LEVELS = ("L0", "L1", "L2")
 Found = dict[str, Any]
 
 
@@ -86,10 +86,9 @@ def ratios(found: Found) -> str:
     numbers, rows = found["numbers"], []
     for scene in "ABC":
         for name, (own, _) in CELLS.items():
-            for element, said in ((own, name), (own + HALF, f"{name}, half of the mesh")):
-                keys = [f"{scene}.{level}.fastest_over_evfem.{element}.cpu_s" for level in LEVELS]
-                if any(key in numbers for key in keys):
-                    rows.append([f"{scene}, {said}", *(short(numbers.get(key)) for key in keys)])
+            keys = [f"{scene}.{level}.fastest_over_evfem.{own}.cpu_s" for level in LEVELS]
+            if any(key in numbers for key in keys):
+                rows.append([f"{scene}, {name}", *(short(numbers.get(key)) for key in keys)])
             whole = [_with_imports(numbers, f"{scene}.{level}", own) for level in LEVELS]
             if any(whole):
                 rows.append([f"{scene}, {name}, with imports", *map(short, whole)])
@@ -105,17 +104,15 @@ def race(found: Found) -> str:
     """CPU seconds to 0.1 % by number of steps, and with the best."""
     numbers, rows = found["numbers"], []
     goals = {"A": "normal force", "B": "friction force after 3 mm"}
-    names = dict(zip(PACKAGES, PACKAGES.values(), strict=True))
-    names = {"evfem": "evfem", f"evfem{HALF}": "half of the mesh", **names}
     for scene, goal in goals.items():
         for way in ("15+30_steps", "5+10_steps", "3+6_steps", "best"):
             key = f"race.{scene}.{way}"
-            values = [numbers.get(f"{key}.{name}.cpu_s") for name in names]
+            values = [numbers.get(f"{key}.{name}.cpu_s") for name in PACKAGES]
             if any(values):
                 ratio = numbers.get(f"{key}.fastest_over_evfem.cpu_s")
                 said = "each its best" if way == "best" else way.replace("_", " ")
                 rows.append([f"{scene}, {goal}", said, *map(short, values), short(ratio)])
-    return table(["goal", "steps", *names.values(), "fastest / evfem"], rows)
+    return table(["goal", "steps", *PACKAGES.values(), "fastest / evfem"], rows)
 
 
 def cheapest(found: Found) -> str:

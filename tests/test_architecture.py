@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh symmetry archive faces solids quality formats vtu msh file",
+        "hexahedron mesh archive faces solids quality formats vtu msh file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},
@@ -51,12 +51,12 @@ ROOMS = {
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation slipping interface spatial linearisation pressure anderson "
         "travel front findings "
-        "factorised equilibrium mirrored relaxation path voltage stepping",
+        "factorised equilibrium relaxation path voltage stepping",
     ),
     "scene": (
         {"numpy", "tomli_w"},
         "motion terms electrics fieldless options scene written keys format schema file resolution drift "
-        "partchecks parts sense fieldchoice timescales spatial way symmetry plan",
+        "partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},

@@ -20,6 +20,8 @@ import numpy as np
 from evfem.errors import InputError, Mistakes, quoted
 
 MOST_STEPS = 1_000_000
+#: keys that were, and what is allowed in their place, for one release
+GONE = {"solver.symmetry": "nothing: gone since 0.3, the whole finger is computed"}
 Values = Any  # a number, or an array of numbers: real, or complex in a complex step
 
 

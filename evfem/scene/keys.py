@@ -13,7 +13,7 @@ from dataclasses import is_dataclass
 from pathlib import Path
 from typing import Any, get_origin
 
-from evfem.common.checks import Key, keys_of
+from evfem.common.checks import GONE, Key, keys_of
 from evfem.errors import ABSENT, InputError, Mistakes, near, readable, together, unknown
 
 #: largest file of numbers, in bytes
@@ -39,9 +39,12 @@ def read(
     keys = keys_of(cls)
     known = [*beside[:1], *(key.name for key in keys), *beside[1:]]
     mistakes, meant = Mistakes(), set[str]()
-    for name in table:
-        if name not in known:
-            mistakes.found.append(_unknown_key(_join(place, name), name, known, homes or {}))
+    for name, value in table.items():
+        path = _join(place, name)
+        if path in GONE:
+            mistakes.found.append(InputError(path, shown(value), GONE[path]))
+        elif name not in known:
+            mistakes.found.append(_unknown_key(path, name, known, homes or {}))
             meant |= {*near(name, known)}
     for key in keys:
         with mistakes.of_a_part(), at(place):

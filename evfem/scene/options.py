@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import Within, check_fields, number, one_of, whole, yes_or_no
+from evfem.common.checks import GONE, Within, check_fields, number, one_of, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -23,8 +23,7 @@ class Solver:
 
     `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
     largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
-    (N/mm3) go with `contact="penalty"` alone. With `symmetry` a scene that is its own mirror image
-    is computed from its right half. `strategy` says how hard steps are tried.
+    (N/mm3) go with `contact="penalty"` alone. `strategy` says how hard steps are tried.
     """
 
     element: Annotated[str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles"] = None
@@ -38,14 +37,14 @@ class Solver:
         float, _TOLERANCE, "largest free residual over the largest reaction, of every step"
     ] = 1e-8
     threads: Annotated[int, whole(1024), "of the factorisation"] = 1
-    symmetry: Annotated[
-        bool, yes_or_no(), "whether a scene that is its own mirror image is computed from its right half"
-    ] = False
     strategy: Annotated[Strategy, {"allowed": "a table [solver.strategy]"}, "how hard steps are tried"] = (
         field(default_factory=Strategy)
     )
+    symmetry: InitVar[object] = None
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, symmetry: object) -> None:
+        if symmetry is not None:
+            raise InputError("symmetry", quoted(symmetry), GONE["solver.symmetry"])
         if not isinstance(self.strategy, Strategy):
             raise InputError("strategy", quoted(self.strategy), "a Strategy")
         for key in ("penalty_normal", "penalty_tangential"):
@@ -59,15 +58,14 @@ class Solver:
     @classmethod
     def within(cls, error: float = 1e-3) -> Solver:
         """What costs least where forces shall err by at most this share beside the mesh's own error:
-        residuals of a thousandth of it, steps that are cut only where the path would err by more,
-        and half of a symmetric scene.
+        residuals of a thousandth of it, and steps that are cut only where the path would err by more.
 
         >>> auto = Strategy(steps="auto", path_error=0.001)
-        >>> Solver.within(0.001) == Solver(tolerance=1e-6, symmetry=True, strategy=auto)
+        >>> Solver.within(0.001) == Solver(tolerance=1e-6, strategy=auto)
         True
         """
         strategy = Strategy(steps="auto", path_error=error)
-        return cls(tolerance=1e-3 * error, symmetry=True, strategy=strategy)
+        return cls(tolerance=1e-3 * error, strategy=strategy)
 
     def element_on(self, corners: int) -> str:
         """The element used on cells with that many corners (3, 4 or 8).

@@ -27,7 +27,6 @@ from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import doubts, hover_share, locking
 from evfem.scene.spatial import check_space, memory
-from evfem.scene.symmetry import half_of
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
 from evfem.scene.way import said
@@ -152,7 +151,6 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
-        *_symmetry(scene, mesh),
         *_hand(scene),
         _forms(scene, mesh),
     )
@@ -275,14 +273,6 @@ def _time(scene: Scene) -> Term:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
     return Term("time", True, f"{dynamics}, backward Euler{lost}")
-
-
-def _symmetry(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
-    """Whether half of the mesh will do, where the scene asks for it."""
-    if not scene.solver.symmetry:
-        return ()
-    half, reason = half_of(scene, mesh)
-    return (Term("symmetry", half is not None, reason),)
 
 
 def _hand(scene: Scene) -> tuple[Term, ...]:

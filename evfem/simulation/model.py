@@ -4,7 +4,7 @@ equilibrium solver.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,17 +21,14 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.mesh.symmetry import Half
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
-from evfem.scene.symmetry import half_of
 from evfem.scene.terms import Boundary
 from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.mirrored import Halves, Mirrored
 from evfem.solver.spatial import SkinInterface
 from evfem.solver.state import Limits
 from evfem.tissue.body import Body
@@ -99,26 +96,7 @@ def make_model(scene: Scene) -> Model:
     if needed.has("tissue"):
         factorised = FactorisedBody(body, interface, attraction, limits)
         equilibrium = Equilibrium(factorised, interface, attraction, limits)
-        half = half_of(scene, mesh)[0] if solver.symmetry else None
-        if half is not None:
-            equilibrium = by_halves(scene, equilibrium, half, element, limits)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
-
-
-def by_halves(scene: Scene, whole: Equilibrium, half: Half, element: str, limits: Limits) -> Mirrored:
-    """The solver of a symmetric scene: its right half, mirrored."""
-    pad, attraction, surface = make_pad(half.mesh), whole.attraction, whole.interface.surface
-    halves = Halves.of(half, whole.interface.pad.nodes, pad.nodes)
-    if attraction is not None:
-        layers = (attraction.layers.reduced, attraction.layers.thickness, attraction.layers.loss)
-        nodes = whole.interface.pad.nodes.shape
-        own = Layers(*(np.broadcast_to(values, nodes)[halves.right] for values in layers))
-        attraction = replace(attraction, pad=pad, layers=own)
-    space = make_space(half.mesh, element)
-    body = Body(space, scene.finger.materials, middle=np.flatnonzero(half.middle))
-    interface = make_interface(scene, half.mesh, pad, surface)
-    factorised = FactorisedBody(body, interface, attraction, limits, whole.record)
-    return Mirrored(whole, Equilibrium(factorised, interface, attraction, limits), halves)
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:

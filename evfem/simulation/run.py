@@ -49,7 +49,6 @@ from evfem.solver.control import (
     VoltageControl,
 )
 from evfem.solver.hand import AT_REST, Grip
-from evfem.solver.mirrored import Mirrored
 from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
@@ -366,8 +365,6 @@ class Run:
         }
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
-        if isinstance(self.model.equilibrium, Mirrored):
-            solver["halved"] = not self.model.equilibrium.broken
         return Result.from_rows(
             self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
         )

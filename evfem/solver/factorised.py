@@ -54,7 +54,7 @@ from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
-from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Record, Reusable, State, StepFailed
+from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
 from evfem.solver.travel import Travel
 from evfem.tissue.body import Body
 
@@ -89,11 +89,10 @@ class FactorisedBody:
         interface: Interface,
         attraction: Attraction | None,
         limits: Limits,
-        record: Record | None = None,
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad
-        self.linearisation = Linearisation(body, interface, attraction, limits, record)
+        self.linearisation = Linearisation(body, interface, attraction, limits)
         self.pressure = Pressure(body.tissue, self.linearisation)
         self.record = self.linearisation.record
         longest = LARGEST_BONE_INCREMENT * float(np.ptp(body.space.mesh.points[:, 1]))

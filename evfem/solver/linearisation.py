@@ -91,11 +91,10 @@ class Linearisation:
         interface: Interface,
         attraction: Attraction | None,
         limits: Limits,
-        record: Record | None = None,
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad
-        self.record = record or Record()
+        self.record = Record()
         self.candidates: Ints = np.zeros(0, dtype=np.int64)
         depth = float(np.ptp(body.space.mesh.points[:, 1]))
         self.softest = min(law.shear_modulus for law, _ in body.tissue.groups) / depth

@@ -21,9 +21,6 @@ from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
 
-#: no nodes
-NOWHERE: Ints = np.zeros(0, dtype=np.int64)
-
 
 class Body:
     """Tissue plus user terms on a space, reduced to the free nodes and the bone's translation."""
@@ -34,9 +31,7 @@ class Body:
         laws: Mapping[str, Any],
         terms: Sequence[Any] = (),
         dynamics: Dynamics | None = None,
-        middle: Ints = NOWHERE,
     ) -> None:
-        """Of the right half of a symmetric body, the nodes `middle` (k,) and the bone keep their x."""
         self.space = space
         self.tissue = Tissue(space, laws)
         self.dynamics = dynamics
@@ -52,10 +47,6 @@ class Body:
         self.unknowns: Ints = np.empty((space.size, dim), dtype=np.int64)
         self.unknowns[free] = np.arange(dim * free.size).reshape(-1, dim)
         self.unknowns[bone] = self.bone
-        self.held: Ints = self.unknowns[middle, 0] if middle.size else middle
-        if middle.size:
-            self.held = np.union1d(self.held, self.bone[:1])
-        self._uncoupled = self.pattern.beside(self.held) if middle.size else middle
 
     @cached_property
     def pattern(self) -> Pattern:
@@ -80,9 +71,7 @@ class Body:
 
     def reduce(self, nodal: Floats) -> Floats:
         """Nodal forces (N, dim) to reduced forces (n,): sums over the bone."""
-        forces = np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
-        forces[self.held] = 0.0  # what a support carries
-        return forces
+        return np.bincount(self.unknowns.ravel(), nodal.ravel(), self.size).astype(float, copy=False)
 
     def expand(self, reduced: Floats) -> Floats:
         """Reduced displacements (n,) to nodal ones (N, dim)."""
@@ -116,9 +105,7 @@ class Body:
         self.tissue.add_tangent(u, self.pattern, data, pressure)
         for term in self._acting:
             term.add_tangent(u, self.pattern, data)
-        upper = self.pattern.finish(data)
-        upper[self._uncoupled] = 0.0
-        return upper
+        return self.pattern.finish(data)
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) at the end of a step that ends at u."""

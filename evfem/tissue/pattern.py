@@ -125,13 +125,6 @@ class Pattern:
         data[self.diagonal[-self.dim :]] += 2.0 * data[-self.dim :]
         return data[: self.indices.size]
 
-    def beside(self, unknowns: Ints) -> Ints:
-        """Places of the entries that join one of these unknowns with another."""
-        there = np.zeros(self.size, dtype=bool)
-        there[unknowns] = True
-        rows = np.repeat(np.arange(self.size), np.diff(self.indptr))
-        return np.flatnonzero((there[rows] | there[self.indices]) & (rows != self.indices))
-
     @cached_property
     def blocks(self) -> Ints:
         """The places (B, P, dim, dim, L) as the compiled loops take them."""

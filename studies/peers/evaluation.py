@@ -12,7 +12,6 @@ import numpy as np
 
 from ..common import Series
 from .problem import GIVEN, Way, errors, quantities
-from .run import HALF
 
 #: with whom evfem is compared
 PEERS = ("felupe", "fenicsx", "getfem")
@@ -22,8 +21,6 @@ ELEMENTS = {"q1": "q1", "q2p1": "q2"}
 CONTENDERS = tuple(
     who for own, its in ELEMENTS.items() for who in (("evfem", own), *((peer, its) for peer in PEERS))
 )
-#: evfem from half of a symmetric scene, and the scenes that are
-HALVES, SYMMETRIC = (("evfem", f"q1{HALF}"), ("evfem", f"q2p1{HALF}")), "AC"
 #: what is measured of a run
 MEASURED = (
     "cpu_s",
@@ -93,8 +90,7 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
     for own in (run for run in runs if run.package == "evfem"):
         place, fastest = f"{own.scene}.L{own.level}", []
         for run in runs:
-            element = ELEMENTS[own.element.removesuffix(HALF)]
-            same = (run.scene, run.level, run.element) == (own.scene, own.level, element)
+            same = (run.scene, run.level, run.element) == (own.scene, own.level, ELEMENTS[own.element])
             if run.package == "evfem" or not same:
                 continue
             for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .evaluation import CONTENDERS, HALVES, PEERS, Run, cost_of
+from .evaluation import CONTENDERS, PEERS, Run, cost_of
 from .problem import GIVEN, Way
-from .run import HALF
 
 #: what is judged of a scene: the beginning of the names of its forces
 JUDGED = {"A": "Fn", "B": "Ft_after_3.0"}
@@ -40,15 +39,14 @@ def numbers(runs: list[Run]) -> dict[str, float]:
 
 
 def _costs(runs: list[Run], scene: str, way: Way) -> dict[str, float]:
-    """CPU seconds to the goal of each package that gets there; evfem-half: from half of the mesh."""
+    """CPU seconds to the goal of each package that gets there."""
     costs: dict[str, float] = {}
-    for package, element in (*CONTENDERS, *HALVES):
+    for package, element in CONTENDERS:
         who = (package, element, scene, way)
         its = [run for run in runs if (run.package, run.element, run.scene, run.way) == who]
         cost = cost_of(GOAL, [(run.measured["cpu_s"], run.error(JUDGED[scene])) for run in its])
         if cost is not None:
-            name = f"{package}{HALF}" if element.endswith(HALF) else package
-            costs[name] = min(cost, costs.get(name, cost))
+            costs[package] = min(cost, costs.get(package, cost))
     return costs
 
 
@@ -56,5 +54,6 @@ def _named(key: str, costs: Mapping[str, float]) -> dict[str, float]:
     """The costs, and the fastest peer's over evfem's own."""
     found = {f"{key}.{name}.cpu_s": cost for name, cost in costs.items()}
     others = [cost for name, cost in costs.items() if name in PEERS]
-    own = [name for name in costs if name not in PEERS]
-    return found | {f"{key}.fastest_over_{name}.cpu_s": min(others) / costs[name] for name in own if others}
+    if others and "evfem" in costs:
+        found[f"{key}.fastest_over_evfem.cpu_s"] = min(others) / costs["evfem"]
+    return found

@@ -33,26 +33,22 @@ from .problem import (
     scene_mesh,
 )
 
-#: ending of an element's name where evfem may use the symmetry of a scene
-HALF = "-half"
-
 #: what evfem would import while it runs
 LATE = ("evfem.simulation.model", "evfem.scene.file", "skfem", "tqdm.auto", "scipy.sparse.linalg")
 
 
 def evfem_scene(scene: str, element: str, level: int, way: Way = GIVEN) -> Scene:
-    """The scene for evfem; of an element like q1-half from half of the mesh."""
+    """The scene for evfem."""
     from evfem.electrostatics.laws import Kaczmarek
 
     electrical = Electrical(STRATUM_CORNEUM.thickness, STRATUM_CORNEUM.eps_r)
-    name = element.removesuffix(HALF)
-    finger = MeshedFinger(scene_mesh(name, level), MATERIALS, electrical)
+    finger = MeshedFinger(scene_mesh(element, level), MATERIALS, electrical)
     surface = Display(insulator=INSULATOR, friction=FRICTION[scene], y=PLANE)
     motion: list[Any] = [Press(indentation=1.5, steps=way.press)]
     if scene == "B":
         motion.append(Slide(distance=3.0, steps=way.slide))
     law = Kaczmarek() if VOLTAGE[scene] else None
-    solver = Solver(element=name, tolerance=way.tolerance, symmetry=name != element)
+    solver = Solver(element=element, tolerance=way.tolerance)
     how: dict[str, Any] = {"solver": solver, "output": Output(every=1000)}
     return Scene(finger, surface, law, VOLTAGE[scene], motion, **how)
 

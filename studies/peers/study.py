@@ -21,7 +21,7 @@ from typing import Any
 from evfem.common.storage import write_text
 
 from ..common import Study, make_folder
-from .evaluation import CONTENDERS, HALVES, SYMMETRIC, Run, histories, numbers, series
+from .evaluation import CONTENDERS, Run, histories, numbers, series
 from .hosts import PACKAGES, missing, run_once
 from .problem import GIVEN, TOLERANCE, Way
 from .race import FEWER, LEVELS
@@ -62,7 +62,6 @@ ASSUMPTIONS = {
     "coarsest level already meets costs that level; no extrapolation to finer ones",
     "race": "F_n of A and F_t after 3 mm of B to 0.1 %: each package with the fastest of 15+30 steps (press "
     "and slide) at a tolerance of 1e-8 and of 5+10 and 3+6 at 1e-6, interpolated between the levels",
-    "half": "evfem from half of the mesh (symmetry), which the others could do too",
     "tolerance": TOLERANCE,
     "finest": f"no runs above these levels, where they take several times as long as others: {dict(FINEST)}",
     "threads": 1,
@@ -81,11 +80,8 @@ def compete(
     for level, (scenes, rounds) in plan.items():
         able = [who for who in present if level <= FINEST.get(who[0], level)]
         for scene in scenes:
-            contenders = [who for who in able if who not in HALVES or scene in SYMMETRIC]
-            tries = [
-                [run_once(*who, scene, level, compiled, way) for who in contenders] for _ in range(rounds)
-            ]
-            for who, found in zip(contenders, zip(*tries, strict=True), strict=True):
+            tries = [[run_once(*who, scene, level, compiled, way) for who in able] for _ in range(rounds)]
+            for who, found in zip(able, zip(*tries, strict=True), strict=True):
                 good = [one for one in found if "failed" not in one]
                 if len(good) < rounds:
                     name = Run(*who, scene, level, {}, way).key
@@ -132,10 +128,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         compiled = Path(folder)
         cold = {} if quick else warm_up("BAC", min(FULL), present, compiled)
-        halves = [] if quick else list(HALVES)
-        runs, failed = compete(QUICK if quick else FULL, [*present, *halves], compiled)
+        runs, failed = compete(QUICK if quick else FULL, present, compiled)
         for way in () if quick else FEWER:
-            more, lost = compete(LEVELS, [*present, *halves], compiled, way)
+            more, lost = compete(LEVELS, present, compiled, way)
             runs, failed = runs + more, failed | lost
     said = {"missing": absent, "failed": failed, "peers": versions(runs), "table": table(runs, failed)}
     curves = series(runs) + histories(runs)

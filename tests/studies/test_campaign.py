@@ -105,7 +105,6 @@ NEVER = {
     "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
     "finger.ridge_scan": "a measured outline, which no generator can draw",
-    "solver.symmetry": "of scenes that are their own mirror image, which hardly any drawn one is",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 
