@@ -72,10 +72,10 @@ from evfem.scene.motion import Press as Press
 from evfem.scene.motion import Slide as Slide
 from evfem.scene.motion import VoltageRamp as VoltageRamp
 from evfem.scene.motion import Wait as Wait
+from evfem.scene.options import Output as Output
+from evfem.scene.options import Solver as Solver
 from evfem.scene.plan import plan as plan
-from evfem.scene.scene import Output as Output
 from evfem.scene.scene import Scene as Scene
-from evfem.scene.scene import Solver as Solver
 from evfem.scene.scene import default_scene as default_scene
 from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
