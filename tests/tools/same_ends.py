@@ -1,0 +1,157 @@
+"""Do drawn scenes still end as they did? For changes of the solver that may take other iterations.
+
+    python tests/tools/same_ends.py record BEFORE.csv --seed 77 --scenes 270
+    python tests/tools/same_ends.py compare BEFORE.csv AFTER.csv [--tolerance 1e-6]
+
+`record` runs scenes of `evfem study campaign`, each in a process of its own with a limit of CPU
+time, and writes how each ends: forces and indentation of the last row, counts and CPU seconds.
+`compare` lists the scenes that end elsewhere, or not, and the sums. A force differs relative to
+the largest force of its scene. `tests/tools/ends.csv` holds the ends that a change is judged by.
+"""
+
+import argparse
+import csv
+import multiprocessing
+import os
+import resource
+import signal
+import sys
+import time
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from multiprocessing.connection import Connection
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from threadpoolctl import threadpool_limits
+
+FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
+COLUMNS = ("seed", "scene", "end", "requested", "rows", "substeps", "iterations", "factorisations", "cuts",
+           "cpu_s", "indentation", *FORCES)  # fmt: skip
+LIMIT_S = 300.0
+Row = dict[str, str]
+
+
+def run(seed: int, number: int, line: Connection) -> None:
+    """Run one scene in this process and send its row."""
+    from evfem.studies.campaign.drawing import draw
+    from evfem.studies.campaign.tables import text_of, with_files
+
+    from evfem.errors import InputError, NotConverged
+    from evfem.scene.file import loads
+    from evfem.simulation.run import simulate
+
+    warnings.simplefilter("ignore")
+    begin, row = time.process_time(), {"end": "equilibrium"}
+    with TemporaryDirectory() as folder:
+        try:
+            scene = loads(text_of(with_files(draw(seed, number), Path(folder))), Path(folder))
+            row["requested"] = str(scene.total_steps)
+            result = simulate(scene)
+        except NotConverged as error:
+            explained = "there is no equilibrium" in error.advice
+            row["end"], result = "explained" if explained else "not_converged", error.result
+        except InputError as error:
+            row["end"], result = f"refused: {error.key}", None
+    row["cpu_s"] = f"{time.process_time() - begin:.2f}"
+    if result is not None and len(result.step):
+        counts = result.provenance["solver"]
+        row |= {
+            name: str(counts[name]) for name in ("iterations", "factorisations", "cuts") if name in counts
+        }
+        row |= {"rows": str(len(result.step)), "substeps": str(int(result.substeps.sum()))}
+        row |= {name: f"{getattr(result, name)[-1]:.12g}" for name in ("indentation", *FORCES)}
+    line.send(row)
+
+
+def guarded(key: tuple[int, int]) -> Row:
+    """The row of one scene, run in a process of its own that may die or take too long."""
+    context = multiprocessing.get_context("fork")
+    mine, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=limited, args=(*key, theirs))
+    process.start()
+    theirs.close()
+    try:
+        row = mine.recv()
+    except EOFError:
+        process.join()
+        row = {"end": "timeout" if process.exitcode == -signal.SIGXCPU else f"died: {process.exitcode}"}
+    process.join()
+    print(*key, *row.values(), flush=True)
+    return {"seed": str(key[0]), "scene": str(key[1]), **row}
+
+
+def limited(seed: int, number: int, line: Connection) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (int(LIMIT_S), int(LIMIT_S) + 5))
+    signal.signal(signal.SIGXCPU, signal.SIG_DFL)
+    with threadpool_limits(1):
+        run(seed, number, line)
+
+
+def record(path: Path, keys: list[tuple[int, int]], workers: int) -> int:
+    """Run the scenes and write their rows."""
+
+    with ThreadPoolExecutor(workers) as pool, path.open("w", newline="") as file:
+        table = csv.DictWriter(file, COLUMNS, restval="", lineterminator="\n")
+        table.writeheader()
+        for row in pool.map(guarded, keys):
+            table.writerow(row)
+            file.flush()
+    return 0
+
+
+def read(path: Path) -> dict[tuple[str, str], Row]:
+    with path.open(newline="") as file:
+        return {(row["seed"], row["scene"]): row for row in csv.DictReader(file)}
+
+
+def difference(one: Row, other: Row) -> float:
+    """Largest difference of the last row: of forces relative to the largest one, of the indentation."""
+    if not one["rows"] or one["rows"] != other["rows"]:
+        return 0.0 if one["rows"] == other["rows"] else float("inf")
+    scale = max(*(abs(float(row[name])) for row in (one, other) for name in FORCES), 1e-9)
+    worst = max(abs(float(one[name]) - float(other[name])) for name in FORCES) / scale
+    depth = max(abs(float(one["indentation"])), abs(float(other["indentation"])), 1e-3)
+    return max(worst, abs(float(one["indentation"]) - float(other["indentation"])) / depth)
+
+
+def compare(before: Path, after: Path, tolerance: float) -> int:
+    """Print the scenes that end elsewhere and the sums; 1 if any ends worse than before."""
+    first, second = read(before), read(after)
+    keys = [key for key in first if key in second]
+    worse = [key for key in keys if first[key]["end"] == "equilibrium" != second[key]["end"]]
+    other = [key for key in keys if difference(first[key], second[key]) > tolerance]
+    for key in sorted({*worse, *other}, key=keys.index):
+        one, two = first[key], second[key]
+        ends = f"{one['end']:>13} -> {two['end']:<13} {difference(one, two):8.1e}"
+        parts = f"{one['substeps']:>5} -> {two['substeps']:>5} parts"
+        print(f"{'/'.join(key):>12} {ends}  {one['cpu_s']:>7} -> {two['cpu_s']:>7} s  {parts}")
+    print(f"{len(keys)} scenes: {len(keys) - len(other)} the same to {tolerance:g}, {len(worse)} end worse")
+    for name in ("cpu_s", "iterations", "factorisations", "cuts", "substeps"):
+        sums = [sum(float(table[key][name] or 0.0) for key in keys) for table in (first, second)]
+        print(f"{name:<15} {sums[0]:10.0f} -> {sums[1]:10.0f}")
+    return 1 if worse else 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    recording = commands.add_parser("record", help="run the scenes and write their ends")
+    recording.add_argument("out", type=Path)
+    recording.add_argument("--seed", type=int, default=77)
+    recording.add_argument("--scenes", type=int, default=270)
+    recording.add_argument("--only", type=int, nargs="*", help="numbers of the scenes")
+    recording.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    comparing = commands.add_parser("compare", help="compare two recordings")
+    comparing.add_argument("before", type=Path)
+    comparing.add_argument("after", type=Path)
+    comparing.add_argument("--tolerance", type=float, default=1e-6)
+    given = parser.parse_args()
+    if given.command == "record":
+        numbers = given.only if given.only else range(given.scenes)
+        return record(given.out, [(given.seed, number) for number in numbers], given.workers)
+    return compare(given.before, given.after, given.tolerance)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
