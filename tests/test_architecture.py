@@ -50,8 +50,7 @@ ROOMS = {
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation slipping interface spatial linearisation pressure anderson "
-        "travel front findings "
-        "factorised equilibrium relaxation path voltage stepping",
+        "travel findings factorised equilibrium relaxation path voltage stepping",
     ),
     "scene": (
         {"numpy", "tomli_w"},

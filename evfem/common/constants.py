@@ -16,12 +16,8 @@ SMALLEST_J              no update shrinks a sampled volume below this ratio     
 SHORTEST_FRACTION       an update that must be cut below this fails the step                      tissue
 LARGEST_BONE_INCREMENT  under a prescribed force the bone moves at most this fraction of the      contact
                         body's height in one iteration
-SEARCH_START            where no travel of the bone settles a prescribed force, a search starts   attraction
-                        with this fraction of the largest increment
-SEARCH_END              and ends at this fraction of the force that was lacking                   attraction
-SEARCH_LIMIT            or after so many contact problems                                         attraction
-GROWTH_LIMIT            a residual so many times the smallest of the step ends it,                contact
-GROWTH_GRACE            but not before so many iterations
+SHORTEST_FLIGHT         a body that touches nothing moves in one iteration at least this          attraction
+                        fraction of the largest increment
 SPARE                   candidates are chosen so many times more than needed, and with            A
                         attractions so many times less steep, as every new choice costs an
                         analysis of the matrix
@@ -50,12 +46,7 @@ ALIKE                   below this residual iterations with a new tangent each a
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
                         the last ones, have no residual below
 FALLING                 this fraction of those before
-SAME                    residuals that differ by so much less are the same, and iterations that
-LONGEST_CIRCLE          come back to them after at most so many are given up                        slides
-MORE                    so many times the iterations may be used where the residuals' fall        thin
-                        promises the end by then                                                  insulators
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
-TURNED_BACK             part of their way that iterations go where nodes open and close by turns  full field
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
 HOPELESS                where the body gives way, and between rough faces, an active set with       attraction
                         more violated nodes after a third of its solves is given up
@@ -77,8 +68,6 @@ STABLE                  fraction of the critical negative stiffness that is used
 LEFT_OVER               least share of a contact force that the tangent leaves where the          attraction
                         attraction between rough faces grows as fast as it
 LOST                    so many such iterations in a row show that nodes are being lost           attraction
-WEAKENED                a step is given up, if so many of its contact problems were solved with   slides
-                        weakened turning forces, after so many iterations without gain
 ROUNDING                violations below this fraction of the largest force are rounding
 FIELD_ROUNDING          forces of the full field are known to this fraction of the largest nodal    full field
                         one: changes of 1e-15 mm change them by 4e-13 to 1.4e-10 of it
@@ -95,8 +84,6 @@ SHORT_RAMP              ramps of friction shorter than this fraction of a node d
                         jumps to a node that crosses them in one iteration
 CHANGES                 so many changes of side in one step show that neither side is             jumps
                         consistent
-WEDGED                  so many turns of a slipping node's contact force, up and down, show that     adhesion
-                        friction has no equilibrium between
 SHORTEST_LENGTH         penalties take tributary lengths as at least this fraction of a node
                         distance
 PATH_FIRST              where the error of the path decides, the first part of a scene, as a      press
@@ -115,16 +102,7 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_LEAST              what rests with drag of such a rate, but not without, is given up         snaps
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
-STEADY                  after a step of a release that went more than this fraction of the one      snaps
-                        before, the next begins ahead
-NUDGE                   what would leave its rest is pushed aside by so much once, mm: far above  crests
-                        what iterations leave, far below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
-ROUND                   a released body is back where it was within this fraction of how far it    circles
-                        had been away
-ROUNDS                  so many times back, it goes round in circles                               circles
-NOT_SMALLER             unless one of them is smaller than this fraction of the one before         circles
-PATIENT                 most steps for which a rate of drag stays after a lower one has failed      snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near; the second, where
                         the body gave way in its iterations
@@ -139,11 +117,7 @@ INCOMPRESSIBLE = 100.0
 SMALLEST_J = 0.05
 SHORTEST_FRACTION = 1.0 / 64.0
 LARGEST_BONE_INCREMENT = 0.05
-SEARCH_START = 1.0 / 16.0
-SEARCH_END = 0.5
-SEARCH_LIMIT = 12
-GROWTH_LIMIT = 1e3
-GROWTH_GRACE = 8
+SHORTEST_FLIGHT = 1.0 / 16.0
 SPARE = 1.5
 REACH = 1.2
 FAR = 1.3
@@ -158,10 +132,7 @@ SHORTER, LONGER = 0.67, 1.5
 ALIKE = 1e-3
 STUCK = 8
 FALLING = 0.9
-SAME, LONGEST_CIRCLE = 0.02, 5
-MORE = 1.5
 ANDERSON_DEPTH = 3
-TURNED_BACK = 1.0 / 8.0
 ACTIVE_SET_LIMIT = 60
 FEW_SOLVES = 2
 UPDATED = 0.1
@@ -172,7 +143,6 @@ HOPELESS = 12
 STABLE = 0.9
 LEFT_OVER = 0.01
 LOST = 3
-WEAKENED = 3
 ROUNDING = 1e-12
 FIELD_ROUNDING = 2e-10
 UNHELD = 1e-10
@@ -182,7 +152,6 @@ NEAR = 0.3
 BACK = 0.5
 SHORT_RAMP = 0.5
 CHANGES = 3
-WEDGED = 2
 SHORTEST_LENGTH = 1e-3
 PATH_FIRST, PATH_CHANGE, PATH_SAFETY = 1.0 / 16.0, 4.0, 0.9
 RELEASED = 1.0 / 32.0
@@ -190,10 +159,6 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_LEAST, DRAG_MOST, DRAG_STEPS = 1e-9, 1e6, 400
-STEADY = 0.6
-NUDGE = 1e-5
-ROUND, ROUNDS, NOT_SMALLER = 0.1, 2, 0.75
-PATIENT = 16
 VERGE, VERGE_LOST = 0.9, 0.5
 STAGGERED_LIMIT = 60
 NAMED = 3

@@ -51,7 +51,6 @@ def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
         "factor_status": np.zeros_like(state.status) if at is None else at.status,
         "factor_pressure": NO_PRESSURE if at is None else at.pressure,
         "duration": np.array(carried.duration),
-        "factor_single": np.array(carried.single),
     }
 
 
@@ -69,8 +68,7 @@ def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
             status=arrays["factor_status"].astype(np.int64),
             pressure=arrays["factor_pressure"],
         )
-    candidates, single = arrays["candidates"].astype(np.int64), bool(arrays["factor_single"])
-    return Reusable(candidates, at, float(arrays["duration"]), single)
+    return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 
 def ledger_arrays(ledger: Ledger, state: State) -> dict[str, Any]:

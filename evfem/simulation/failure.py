@@ -15,10 +15,6 @@ from evfem.simulation.model import Model
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 
 FINER = "less friction or a finer mesh"
-CIRCLES = (
-    "there is no equilibrium at rest near here that holds: the finger, released at {}, comes back to where "
-    "it was and goes round in circles"
-)
 
 
 def advice(scene: Scene, model: Model, failed: StepFailed) -> str:
@@ -42,11 +38,10 @@ def _lost(model: Model, failed: StepFailed) -> str:
         return ""
     # a trial far from equilibrium may give way too: alone that shows nothing
     if verge is None or verge.share < (VERGE_LOST if failed.unstable else VERGE):
-        return CIRCLES.format(_place(model, state)) if failed.circles else ""
+        return ""
     passing = model.body.dynamics is not None and target.duration > 0.0
     rest = "within a time step as short as this" if passing else "at rest"
-    end = "goes round in circles" if failed.circles else "does not come to rest"
-    released = f", and released there it {end}" if failed.released else ""
+    released = ", and released there it does not come to rest" if failed.released else ""
     return (
         f"there is no equilibrium {rest} near here: {verge.cause}, {verge.share:.3g} times as hard as its "
         f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
@@ -84,7 +79,7 @@ def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
         passing = failed.last is None or failed.last[1].duration > 0.0
         time = "a larger viscosity of the finger" if passing else "a motion with a speed"
         return f"try smaller steps, {time}, {FINER}"
-    if failed.circles and _may_have_an_energy(scene):
+    if failed.released and _may_have_an_energy(scene):
         return (
             "try direction = normal, an attraction with an energy, or time: a speed, with dynamics = viscous"
         )

@@ -15,13 +15,11 @@ so a combination obeys them too as long as no status has changed. Source: D. G. 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT, TURNED_BACK
-from evfem.contact.signorini import OPEN
+from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
 from evfem.solver.state import State
 
 
@@ -68,42 +66,6 @@ class Anderson:
         ]
         products[-1] = products[:, -1] = [step @ change for change, _ in self._changes]
         self._products = products
-
-
-class Turning:
-    """Shortens the iterations of a step in which nodes open and close by turns and nothing is gained.
-
-    The full field between finger and display may pull a node harder where it has opened by a hair than
-    the tangent says, which is that of the column law: open, it closes; closed, it opens too far.
-    Between both is the equilibrium. From there on the iterations go the part `TURNED_BACK` of their
-    way, and such a node counts as open on it: a map with a slope from -1 / `TURNED_BACK` to 1 contracts
-    then, and can be mixed. Without `fringes`, under the column law, a node that has opened is on its
-    way to where the column law holds it, and goes the whole of it.
-    """
-
-    def __init__(self, fringes: bool) -> None:
-        self._fringes = fringes
-        self.reset()
-
-    def reset(self) -> None:
-        """A step begins."""
-        self._before: Any = None
-        self.turned = False
-
-    def next_iterate(self, before: State, after: State, stalled: bool) -> State:
-        """What to take of the way from `before` to `after`; `stalled`: the residuals go to and fro."""
-        changed = after.touching != before.touching
-        back = self._before is not None and np.array_equal(after.touching, self._before)
-        self._before = before.touching
-        self.turned = self.turned or bool(self._fringes and stalled and back and changed.any())
-        if not self.turned:
-            return after
-        start, end = _vector(before), _vector(after)
-        part = _state(after, start + TURNED_BACK * (end - start))
-        part.contact_force[changed] = 0.0
-        # what is given is kept to the last digit
-        voltage = part.voltage if after.voltage != before.voltage else after.voltage
-        return replace(part, status=np.where(changed, OPEN, after.status), voltage=voltage)
 
 
 def _vector(state: State) -> Floats:

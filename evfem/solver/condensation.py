@@ -83,12 +83,11 @@ def shift_of_kept(pattern: Pattern, kept: Ints, upper: Floats) -> Floats:
 
 class Pardiso:
     """Condensation by MKL PARDISO through pypardiso's library handle; one symbolic analysis, many
-    factorisations. Factors of `single` precision give way to double ones where they fail.
+    factorisations.
     """
 
-    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False) -> None:
+    def __init__(self, pattern: Pattern, kept: Ints, threads: int = 1) -> None:
         self.pattern, self.kept = pattern, kept
-        self.real: type[np.float32] | type[np.float64] = np.float32 if single else np.float64
         library = pardiso_library()
         library.libmkl.MKL_Set_Num_Threads(threads)
         self._call_pardiso = library._mkl_pardiso
@@ -105,8 +104,7 @@ class Pardiso:
         self._iparm = np.zeros(64, dtype=np.int32)
         # user values; METIS; no refinement; pivots below 1e-13 are perturbed (and counted); C indices; dense
         # Schur complement kept for solves
-        single = int(self.real is np.float32)
-        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 27: single, 34: 1, 35: 2}.items():
+        for index, value in {0: 1, 1: 2, 7: 0, 9: 13, 34: 1, 35: 2}.items():
             self._iparm[index] = value
         self._mark[:] = 0
         self._mark[self.kept] = 1
@@ -146,15 +144,13 @@ class Pardiso:
         factorisation fails.
         """
         shift = shift_of_kept(self.pattern, self.kept, upper)
-        ways: list[tuple[int, Any]] = [(2, np.float32), (2, np.float64), (-2, np.float64)]
-        for mtype, real in ways[ways.index((self.mtype, self.real)) :]:
-            if (mtype, real) != (self.mtype, self.real):
+        self._values = upper.copy()
+        self._values[self.pattern.diagonal[self.kept]] += shift
+        for mtype in (self.mtype, -2):
+            if mtype != self.mtype:
                 self.close()
-                self.real = real
                 self._start(mtype)
-            self._values = upper.astype(self.real)
-            self._values[self.pattern.diagonal[self.kept]] += shift
-            S, b = np.zeros(self.schur.shape, self.real), np.zeros(self.pattern.size, self.real)
+            S, b = np.zeros(self.schur.shape), np.zeros(self.pattern.size)
             self._open = True
             error = 0 if self._analysed else self._call(11, b, S)
             error = error or self._call(22, b, S)
@@ -167,24 +163,18 @@ class Pardiso:
         raise Singular(f"PARDISO error {error}, {self._iparm[PERTURBED]} perturbed pivots")
 
     def forward(self, b: Floats) -> tuple[Floats, Floats]:
-        # the entries of the kept unknowns go past the factor: the bone's reaction, in single precision,
-        # would have a rounding larger than the forces that are left
-        interior = b.astype(self.real)
-        interior[self.kept] = 0.0
-        y = self._solve(331, interior)
-        g = b[self.kept] + y[self.kept]
+        y = self._solve(331, np.ascontiguousarray(b))
+        g = y[self.kept]
         if self.mtype == -2:
             y = self._solve(332, y)
         return y, g
 
     def backward(self, state: Floats, kept: Floats) -> Floats:
-        given = state.astype(self.real)  # sums of states are of double precision
+        given = state.copy()
         given[self.kept] = kept
-        x = self._solve(333, given).astype(np.float64)
-        x[self.kept] = kept
-        return x
+        return self._solve(333, given)
 
-    def _solve(self, phase: int, b: Any) -> Any:
+    def _solve(self, phase: int, b: Floats) -> Floats:
         x = np.zeros_like(b)
         self._call(phase, b, x)
         return x
@@ -260,12 +250,10 @@ class SuperLU:
         return state + self._solve(b)
 
 
-def make_condensation(
-    pattern: Pattern, kept: Ints, threads: int = 1, single: bool = False
-) -> Pardiso | SuperLU:
+def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
     """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
     try:
         pardiso_library()
     except ImportError:
         return SuperLU(pattern, kept, threads)
-    return Pardiso(pattern, kept, threads, single)
+    return Pardiso(pattern, kept, threads)

@@ -10,8 +10,7 @@ At the iterate u with contact forces :math:`\lambda` and attraction f the out-of
         accept if the bone is where it should be, the residual is below the tolerance, no open node has
             penetrated, closed gaps, stick, slip direction and friction cone hold, and the controls agree
         give up if what would be accepted has an outline that crosses itself, or is not stable
-        give up if the residual grows or is not finite, or goes to and fro while no front peels off,
-            or after the strategy's iterations, unless their fall promises the end soon
+        give up if the residual is not finite or stagnates, or after the strategy's iterations
         state <- the body's next iterate: linearise, solve contact exactly, move
         nodes that keep crossing a jump of friction are pinned to it
 
@@ -26,19 +25,13 @@ from dataclasses import replace
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import (
-    GROWTH_GRACE,
-    GROWTH_LIMIT,
-    MORE,
-    SMALLEST_FORCE,
-)
+from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Force, Indentation, Loose, Target, sticks
 from evfem.solver.factorised import FactorisedBody
-from evfem.solver.front import Front
 from evfem.solver.interface import Interface
 from evfem.solver.state import (
     NO_AGE,
@@ -188,42 +181,36 @@ class Equilibrium(Statics):
             raise failed from error
 
     def _find(self, old: State, target: Target, frozen: Floats | None, start: State) -> State:
+        """The iterations at the head of this file."""
         target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.drive.begin(old)
         if self.attraction is not None:
             self.attraction.begin()
         state = self.body.begin(old, target, frozen is not None, start)
-        history: list[float] = []
-        self.record.residuals, self.record.weakened, front, refused = history, 0, Front(), 0
-        while len(history) < self.strategy.iterations or self._nearly(history):
+        residuals: list[float] = []
+        self.record.residuals, changed = residuals, 0
+        for iteration in range(self.strategy.iterations):
             if self._keeps_columns(state, frozen):
-                refused = len(history)
+                changed = iteration
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
-            front.watch(state.touching)
             reached = target.reached(state.bone)
-            history.append(balance.remaining if reached else max(balance.remaining, 1.0))
+            residuals.append(balance.remaining if reached else max(balance.remaining, 1.0))
             if not np.isfinite(balance.residual):
-                raise StepFailed("the residual is not finite", history)
+                raise StepFailed("the residual is not finite", residuals)
             if reached and balance.residual <= self.tolerance:
                 if self._accepts(old, state, target):
-                    self._refuse_fold(state)
-                    if (verge := self.body.leaves(old, state, target)) is not None:
-                        raise Unstable(NOT_STABLE.format(verge.cause, verge.share))
-                    return self._settled(old, self.body.accepted(old, state), target)
-                if len(history) > refused + 1:  # what follows is another problem: nodes let go or admitted
-                    refused = len(history)
-            since = history[refused:]
-            if len(since) > GROWTH_GRACE and since[-1] > GROWTH_LIMIT * max(min(since), self.tolerance):
-                raise StepFailed("the residual grows", history)
-            if stuck(since, self.record.weakened) and not front.advances():
+                    return self._accepted(old, state, target)
+                if iteration > changed:  # nodes were let go or admitted: what follows is another problem
+                    changed = iteration + 1
+            if stuck(residuals[changed:]):
                 break
             state = self.body.advance(old, state, target, balance)
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
-        raise StepFailed(f"no equilibrium in {len(history)} iterations", history)
+        raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
     def _keeps_columns(self, state: State, frozen: Floats | None) -> bool:
         """Whether the attraction keeps its columns from this iterate on: what follows is another problem."""
@@ -231,25 +218,17 @@ class Equilibrium(Statics):
             return False
         return self.attraction.watch(self.interface.resting(state))
 
-    def _settled(self, old: State, state: State, target: Target) -> State:
-        """The accepted state with what friction and hand remember of it."""
-        state = self.interface.aged(old, state)
-        return state if target.hand is None else target.hand.settled(state)
-
-    def _nearly(self, history: list[float]) -> bool:
-        """Whether up to `MORE` times the iterations will do, as fast as the residuals (i,) fell in
-        the last quarter: a part that is cut would lose all of them.
+    def _accepted(self, old: State, state: State, target: Target) -> State:
+        """The balanced state with what body, friction and hand remember of it; raises where its outline
+        crosses itself or it is not stable.
         """
-        most, window = int(MORE * self.strategy.iterations), len(history) // 4
-        if not 0 < window < len(history) < most or history[-1] <= self.tolerance:
-            return False
-        rate = (history[-1] / history[-1 - window]) ** (1.0 / window)
-        return history[-1] * rate ** (most - len(history)) < self.tolerance
-
-    def _refuse_fold(self, state: State) -> None:
         place = self.interface.fold(state)
         if place is not None:
             raise Folded(FOLDED.format(place), self.record.residuals)
+        if (verge := self.body.leaves(old, state, target)) is not None:
+            raise Unstable(NOT_STABLE.format(verge.cause, verge.share))
+        state = self.interface.aged(old, self.body.accepted(old, state))
+        return state if target.hand is None else target.hand.settled(state)
 
     def _accepts(self, old: State, state: State, target: Target) -> bool:
         if not self.obeys_contact(old, state):

@@ -16,16 +16,14 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
     next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless it goes
-        too far, or the attraction's negative stiffness had to be scaled down; a part of
-        the way where nodes have opened and closed by turns
+        too far, or the attraction's negative stiffness had to be scaled down
 
-Where contact has no solution, the iteration is done again with `Linearisation.another` tangent.
+If contact has no solution with an older tangent, the iteration is done again with a new one.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -48,7 +46,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, Verge, verge
-from evfem.solver.anderson import Anderson, Turning
+from evfem.solver.anderson import Anderson
 from evfem.solver.control import DrivenStep, Target, VoltageProblem
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
@@ -57,9 +55,6 @@ from evfem.solver.pressure import Pressure
 from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
 from evfem.solver.travel import Travel
 from evfem.tissue.body import Body
-
-#: whether a travel of the bone is searched for that the contact problem is known not to settle
-Search = Literal["never", "only"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +94,6 @@ class FactorisedBody:
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
-        self._turning = Turning(attraction is not None and attraction.has_fringes)
         self._scaled_down = 0
 
     # -- a step begins
@@ -114,7 +108,6 @@ class FactorisedBody:
         self._anderson.reset()
         self._renewed = False
         self._scaled_down = 0
-        self._turning.reset()
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
@@ -151,10 +144,10 @@ class FactorisedBody:
         nodal[self.pad.nodes] -= attraction + self.interface.contact_forces(state)
         forces = self.body.reduce(nodal)
         state = replace(state, attraction=attraction, reaction=forces[self.body.bone])
-        residual, mixed = self._largest(state, target, forces), self._mixed(state, target, forces)
+        residual, mixed = self._largest(state, target, forces), self._with_pressure(state, target, forces)
         return state, Balance(forces, residual, attraction, mixed)
 
-    def _mixed(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
+    def _with_pressure(self, state: State, target: Target, forces: Floats) -> MixedBalance | None:
         """The balance with the pressure as an unknown, where it is one; `forces` (n,) without."""
         if not self.pressure.active:
             return None
@@ -201,39 +194,32 @@ class FactorisedBody:
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)
-        except ContactNotSolved as error:
+        except ContactNotSolved:
+            if self.linearisation.made_at(state):
+                raise
+            self.linearisation.factorise(state)
             self._anderson.reset()
-            after = self._linear_step_anew(old, state, target, balance, error)
+            after = self._linear_step(old, state, target, balance)
         after = self._grown(old, state, target, balance, after)
         if self._scaled_down:  # a part of the way to where it leads: no image of the map that is mixed
             self._anderson.reset()
             return after
-        if target.reached(state.bone) and not self.linearisation.fringes:
-            after = self._turning.next_iterate(state, after, to_and_fro(residuals))
+        return self._mixed(state, after, target)
+
+    def _mixed(self, state: State, after: State, target: Target) -> State:
+        """Anderson's combination of `after` with the iterates before; `after` itself if that goes too far.
+        Prescribed values are copied exactly.
+        """
         mixed = self._anderson.next_iterate(state, after)
         if mixed is not after and self._goes_too_far(state, mixed, target):
             self._anderson.reset()
             return after
-        # what is given is kept to the last digit
         bone = after.bone.copy()
         bone[1] = mixed.bone[1] if target.height.free else after.bone[1]
         voltage = mixed.voltage if target.drive.free else after.voltage
         if target.hand is not None:
             bone[0] = mixed.bone[0]
         return replace(mixed, bone=bone, voltage=voltage)
-
-    def _linear_step_anew(
-        self, old: State, state: State, target: Target, balance: Balance, error: ContactNotSolved
-    ) -> State:
-        """The next iterate after the `error`: with other tangents, at last with the travel searched for."""
-        while self.linearisation.another(state):
-            try:
-                return self._linear_step(old, state, target, balance)
-            except ContactNotSolved as again:
-                error = again
-        if not target.height.free:
-            raise error
-        return self._linear_step(old, state, target, balance, "only")
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
         """Whether a combination of iterates turns cells inside out, or the bone leaves: where nothing holds
@@ -261,26 +247,13 @@ class FactorisedBody:
             after = self._linear_step(old, state, target, balance)
         return after
 
-    def _linear_step(
-        self, old: State, state: State, target: Target, balance: Balance, search: Search = "never"
-    ) -> State:
-        """Solve the contact problem of the linearised body, move, shorten where cells would
-        collapse; `search` says whether a travel of the bone that the problem cannot settle is
-        searched for, or whether it is known that it cannot.
-        """
+    def _linear_step(self, old: State, state: State, target: Target, balance: Balance) -> State:
+        """Solve the contact problem of the linearised body, move, shorten where cells would collapse."""
         factor = self.linearisation.factor
         saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
-        try:
-            if search == "only":
-                raise ContactNotSolved("known from the same linear step")
-            driven = self._driven(step, state, target)
-            found, bone = self.travel.limited(step, driven.solution, state, target)
-        except ContactNotSolved:
-            if search == "never" or not step.unknowns:
-                raise
-            found, bone = self.travel.searched(step, state)
-            driven = DrivenStep(found)
+        driven = self._driven(step, state, target)
+        found, bone = self.travel.limited(step, driven.solution, state, target)
         if driven.change:
             saved = saved + driven.change * driven.unit
         delta = self.body.expand(factor.backward(saved, np.concatenate([found.moved, bone])))
@@ -320,7 +293,6 @@ class FactorisedBody:
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
         self.record.contact_solves += found.solves
-        self.record.weakened += found.weakened
         self._scaled_down = self._scaled_down + 1 if found.reduced else 0
         return found
 
@@ -385,9 +357,9 @@ class FactorisedBody:
 
     def leaves(self, old: State, state: State, target: Target) -> Verge | None:
         """How crests push the finger out of the equilibrium `state` faster than it is held, by the
-        tangent at hand and by its own: iterations may come to such a one from afar. Not asked of tissue
-        in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue that
-        gives way by itself, a negative compliance, is not seen.
+        tangent at hand and by the one there: iterations may come to such a one from afar. Not asked of
+        tissue in time, in three dimensions, and of the attraction, whose loss the iterations see; tissue
+        that gives way by itself, a negative compliance, is not seen.
         """
         dynamics, linearisation = self.body.dynamics, self.linearisation
         crests = (state.status >= FORWARD) & (self.interface.surface_at(state).curvature < 0.0)
@@ -397,7 +369,8 @@ class FactorisedBody:
         if linearisation.refused:
             linearisation.factorise(state)
         found = self._pushed_out(old, state, target)
-        if found is not None and linearisation.sharpen(state):
+        if found is not None and not linearisation.made_at(state):
+            linearisation.factorise(state)
             found = self._pushed_out(old, state, target)
         return found
 
@@ -429,14 +402,14 @@ class FactorisedBody:
         return findings(self.body, state, balance)
 
     def reusable(self) -> Reusable:
-        """Candidates, where the factorisation was made and how precisely, and the last time step."""
+        """Candidates, where the factorisation was made, and the last time step."""
         dynamics, linearisation = self.body.dynamics, self.linearisation
         duration = 0.0 if dynamics is None else dynamics.step
-        return Reusable(linearisation.candidates, linearisation.reusable, duration, linearisation.single)
+        return Reusable(linearisation.candidates, linearisation.reusable, duration)
 
     def resume(self, state: State, carried: Reusable) -> None:
         """Make the factorisation again that the interrupted run had at hand."""
-        self.linearisation.candidates, self.linearisation.single = carried.candidates, carried.single
+        self.linearisation.candidates = carried.candidates
         if (at := carried.tangent_point) is not None:
             self.pressure.check(at.pressure)
             self.linearisation.restore(state, at)

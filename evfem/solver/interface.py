@@ -28,7 +28,7 @@ from evfem.contact.friction import Slipping
 from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
-from evfem.solver.slipping import Returned, Wedged
+from evfem.solver.slipping import Returned
 from evfem.solver.state import State
 
 
@@ -127,14 +127,14 @@ class Interface:
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
-        self._returned, self._wedged = Returned(pad.nodes.size), Wedged(pad.nodes.size)
+        self._returned = Returned(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
 
     def begin(self, old: State, duration: float) -> None:
         """A step of so many seconds starts from `old`."""
         self.pins.begin(self.positions(old.u)[:, 0])
-        self._returned, self._wedged = Returned(self.pad.nodes.size), Wedged(self.pad.nodes.size)
+        self._returned = Returned(self.pad.nodes.size)
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
@@ -212,12 +212,8 @@ class Interface:
         series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
-        weak = self._weak(state)
-        beyond = np.abs(known.force[:, 1]) - moving.bound(law) > weak
-        opened = self._wedged.opens(c, known.force[:, 0], slips & beyond, found.offset > weak)
         return replace(
             known,
-            status=np.where(opened, OPEN, known.status),
             slip=known.slip / series,
             interface_compliance=known.interface_compliance / np.column_stack([np.ones_like(series), series]),
             friction=series * found.slope,

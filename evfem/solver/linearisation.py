@@ -10,13 +10,7 @@ A factorisation is kept across iterations and steps. Algorithm (`refactorise_if_
     S <- Schur complement on (candidates, bone),  C <- (S_cc - coupling)^-1
 
 The coupling is the stiffness that the attraction's tributary lengths add between neighbouring
-nodes; under the full field, once iterations gain nothing or contact has no solution, that of the
-field itself, as long as contact has a solution with it.
-
-A tangent only leads to the equilibrium, and what is accepted is balanced in double precision: so its
-factors are of single precision, which takes two thirds of the time and half of the memory. They are
-of double precision where the tissue is nearly incompressible, and from a step on in which a tangent
-was made near the equilibrium and had to be made again.
+nodes; under the full field, once iterations gain nothing, that of the field itself.
 """
 
 from __future__ import annotations
@@ -28,7 +22,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import (
-    ALIKE,
     FAINT,
     FAR,
     FIRST,
@@ -101,23 +94,22 @@ class Linearisation:
         self.steep = STEEP * self.softest
         height = self.interface.points[:, 1]
         self._deep = height - height.min() <= FAR * limits.deepest
-        self.single = not body.tissue.nearly_incompressible
         self.factor: Any = None
         self.tangent: Any = None
         self.stiffest = 0.0
         self.touching: Any = np.zeros(self.pad.nodes.size, dtype=bool)
         self.frozen = False
         self._made_at: TangentPoint | None = None
-        self._outdated = self._renewed_near = False
+        self._outdated = False
         self._lets_go = True
         self._status: Ints = np.zeros(0, dtype=np.int64)
         self._drag_rate = 0.0
-        self.fringes = self._held_with_fringes = False
+        self.fringes = False
 
     def begin(self, old: State, frozen: bool) -> None:
         """Start a step from `old`, with an attraction that is `frozen` or follows the gap."""
         self.touching, self.frozen = old.status != OPEN, frozen
-        self._renewed_near, self._lets_go, self._held_with_fringes = False, True, True
+        self._lets_go = True
         self._outdated = self.fringes
         if self.fringes:
             self.fringes, self._made_at = False, None
@@ -182,12 +174,11 @@ class Linearisation:
         new one saves iterations; says whether it did.
         """
         same, self._status = np.array_equal(self._status, state.status), state.status
-        if self._held_with_fringes and self._has_fringes(state) and in_vain(history, same):
+        if self._has_fringes(state) and in_vain(history, same):
             self._outdated |= not self.fringes
             self.fringes = True
         if not self.refused and not self._too_old(history):
             return False
-        self._doubt_single_precision(history)
         self.factorise(state)
         return True
 
@@ -196,39 +187,10 @@ class Linearisation:
         """Whether there is no factorisation, or one of other candidates, another drag or time step."""
         return self.factor is None or self._outdated
 
-    def _doubt_single_precision(self, history: list[float]) -> None:
-        near = len(history) > 1 and history[-1] < ALIKE
-        if self.single and near and self._renewed_near:
-            self.single, self.factor = False, None
-        self._renewed_near = near
-
     def _has_fringes(self, state: State) -> bool:
         """Whether the attraction at `state` has a stiffness of its own beside that of columns."""
         has = self.attraction is not None and self.attraction.has_fringes
         return has and state.voltage != 0.0 and not self.frozen
-
-    def another(self, state: State) -> bool:
-        """Factorise otherwise where contact has no solution: at `state`, then with the field's own stiffness,
-        at last with the columns' for the rest of the step; says whether there was another way.
-        """
-        if self.made_at(state):
-            if not self._held_with_fringes or not self._has_fringes(state):
-                return False
-            self._held_with_fringes = not self.fringes
-            self.fringes = not self.fringes
-        self.factorise(state)
-        return True
-
-    def sharpen(self, state: State) -> bool:
-        """Factorise at `state`, under the full field with its own stiffness; says whether the factorisation
-        at hand was another one.
-        """
-        fringes = self._has_fringes(state)
-        if self.made_at(state) and self.fringes == fringes:
-            return False
-        self.fringes = fringes
-        self.factorise(state)
-        return True
 
     def factorise(self, state: State) -> None:
         """Factorise at `state`; raises `StepFailed` if the tangent is singular."""
@@ -236,7 +198,7 @@ class Linearisation:
         if self.factor is None:
             unknowns = self.body.unknowns[self.pad.nodes[self.candidates]].ravel()
             kept = np.concatenate([unknowns, self.body.bone])
-            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads, self.single)
+            self.factor = make_condensation(self.body.pattern, kept, self.limits.threads)
             self.record.backend = type(self.factor).__name__
         pressure = state.pressure if state.pressure.size else None
         upper = self.body.tangent(state.u, pressure)

@@ -8,16 +8,13 @@ equilibrium after the snap may be far away, and iterations of a static problem s
 Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of the part held::
 
     rate <- 1
-    repeat
-        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state; iterations
-            begin ahead of it, as far along the last step's way as steps become shorter
-        if it failed: a higher rate, slower
-        else: accept; a lower rate, faster, but not while the speed grows, nor soon where lower ones have
-            failed again and again
-            give up where a finger that is pulled has lost the surface: nothing brings it back
-        while it slows down, once the rate is small: solve the equilibrium without drag; it is the end if
-            it is found; the body is nudged where it would leave that
-        give up where even the least drag holds the body and none does not
+    repeat, at most `DRAG_STEPS` times
+        solve one equilibrium with drag of this rate (`evfem.tissue.drag`) from the last state
+        if it failed: raise the rate, by twice the last factor; give up beyond `DRAG_MOST`
+        else: accept; give up if a finger that is pulled has lost the surface
+            if the body slows down and the rate is small: solve the equilibrium without drag; if it is
+                found, it is the end
+            lower the rate, or raise it if the speed grows; give up below `DRAG_LEAST`
 
 Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
 finger that swings may jump over the equilibrium next to it, so the way would depend on a density
@@ -30,19 +27,14 @@ friction and attraction like any other, in the scene's own coupling and to its t
 counts from step to step, and what is dissipated is counted by its definitions
 (`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
 
-*A nudge*: a symmetric finger on the middle of a crest has an equilibrium, and drag would lead it there,
-but the least push makes it leave. In the plane such an equilibrium is refused
-(`evfem.solver.equilibrium`), with drag as without. Drag of the next step then holds the body at a place
-`NUDGE` aside, and the motion that is lost grows from there.
-
 A hand with a mass or a damper goes on in its own time, and charge flows in its own: in the first step
 of a release. Then the bone stays at that x, and each node keeps its charge, while the tissue, which has no
 time of its own, comes to rest below.
 
-*Circles*: with a traction that is the derivative of an energy, energy can only fall on the way, and the
+With a traction that is the derivative of an energy, that energy can only fall on the way, and the
 body comes to rest. The vertical attraction of the paper is none: a node that moves changes what its
 neighbours carry without work (`evfem.contact.attraction`), and a finger without friction on slopes may go
-round for ever. A body whose pad has come back to where it was `ROUNDS` times is given up (`Rounds`).
+round for ever, until the steps are used up.
 
 A wished friction force is not followed on the way, where drag would be part of it: the voltage
 stays as it is until the end.
@@ -54,7 +46,7 @@ doi:10.1137/S0036142996304796 (pseudo-transient continuation).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -67,16 +59,9 @@ from evfem.common.constants import (
     DRAG_MOST,
     DRAG_REST,
     DRAG_STEPS,
-    NOT_SMALLER,
-    NUDGE,
-    PATIENT,
-    ROUND,
-    ROUNDS,
-    SMALLEST_J,
-    STEADY,
 )
 from evfem.solver.control import GivenVoltage, Target
-from evfem.solver.state import Circling, Folded, LiftedOff, State, StepFailed
+from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
 #: why a release ends in the air
@@ -88,12 +73,12 @@ LIFTED = (
 
 @dataclass
 class Relaxation:
-    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included, with
-    iterations that begin at a third argument, or there if that is None; `charged` where charge flows.
+    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included; `charged`
+    where charge flows.
     """
 
     body: Body
-    solve: Callable[[State, Target, State | None], State]
+    solve: Callable[[State, Target], State]
     charged: bool = False
 
     def applies(self, target: Target) -> bool:
@@ -118,62 +103,41 @@ class Relaxation:
         end, held = target, target if passing else replace(target, duration=0.0)  # a snap takes no time
         if target.drive.follows:
             held = replace(held, drive=GivenVoltage(state.voltage))
-        pace, rounds, pad = Pace(), Rounds(), self.body.space.mesh.node_sets["pad"]
+        pace = Pace()
         for _ in range(DRAG_STEPS):
-            self.body.release(state.u + pace.nudge * self._aside, pace.rate)
+            self.body.release(state.u, pace.rate)
             try:
-                new = self.solve(state, held, self._ahead(state, pace.ahead))
+                new = self.solve(state, held)
             except Folded:
                 raise
-            except StepFailed as failed:
-                if pace.failed(failed.unstable):
+            except StepFailed:
+                if pace.failed():
                     raise
                 continue
             accept(state, new)
             if held.duration > 0.0:
                 held, end = (_at_once(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
-            calm = pace.went(float(np.abs(new.u - state.u).max()))
+            slows = pace.went(float(np.abs(new.u - state.u).max()))
             state = new
-            if rounds.closed(state.u[pad]):
-                raise Circling("the released finger goes round in circles", [])
-            if calm:
-                rest, left = self._rest(state, end)
+            if slows and pace.rate < pace.quiet:
+                rest = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                pace.refused(left)
+                pace.quiet = DRAG_CALMER * pace.rate
             pace.choose()
             if pace.rate < DRAG_LEAST:
                 break
         raise StepFailed("the released finger does not come to rest", [])
 
-    def _ahead(self, state: State, fraction: float) -> State | None:
-        """Where iterations of the next step begin: a fraction of the last step's way ahead; None for the
-        state itself.
-        """
-        u = state.u + fraction * state.last_increment
-        if fraction == 0.0 or not self.body.tissue.smallest_J(u) > SMALLEST_J:
-            return None
-        return replace(state, u=u, bone=u[self.body.space.mesh.node_sets["bone"][0]].copy())
-
-    @property
-    def _aside(self) -> Floats:
-        """A shear along x (N, dim) that leaves the top where it is, with more of it on the right, so that it
-        has a part of symmetric motions and of antisymmetric ones.
-        """
-        points = self.body.space.mesh.points
-        height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
-        shear[:, 0] = (points[:, 1].max() - points[:, 1]) * (1.0 + points[:, 0] / height) / height
-        return shear
-
-    def _rest(self, state: State, target: Target) -> tuple[State | None, bool]:
-        """The equilibrium without drag, if it is found from here; if not, whether one is left."""
+    def _rest(self, state: State, target: Target) -> State | None:
+        """The equilibrium without drag, if it is found from here."""
         self.body.release(state.u, 0.0)
         try:
-            return self.solve(state, target, None), False
-        except StepFailed as failed:
-            return None, failed.unstable
+            return self.solve(state, target)
+        except StepFailed:
+            return None
 
 
 def _at_once(bone: Floats, target: Target) -> Target:
@@ -197,122 +161,42 @@ def pull(state: State, target: Target) -> float:
     return target.height.missing(float(state.bone[1]), np.zeros(2)) if target.height.free else 0.0
 
 
-class Rounds:
-    """How often a released body came back to where it had been.
-
-    >>> rounds, angles = Rounds(), np.linspace(0.0, 4.2 * np.pi, 43)
-    >>> [rounds.closed(np.array([np.cos(angle), np.sin(angle)])) for angle in angles].index(True)
-    40
-    >>> rest = Rounds()
-    >>> any(rest.closed(np.array([np.exp(-0.2 * step) * np.cos(step)])) for step in range(100))
-    False
-    """
-
-    def __init__(self) -> None:
-        self._places: list[Floats] = []
-        self._away, self._farthest = np.zeros(0), np.zeros(0)
-        self._came_back = np.zeros(0, dtype=int)
-
-    def closed(self, u: Floats) -> bool:
-        """Whether the pad, now at displacements u (P, dim), has come back somewhere `ROUNDS` times, to
-        within the fraction `ROUND` of how far it had been away, and the rounds do not become smaller. A
-        pad that sticks while the tissue above it moves goes no round, whatever its rounding.
-        """
-        apart = np.array([float(np.abs(u - place).max()) for place in self._places])
-        back = (apart < ROUND * self._away) & (self._away > NUDGE)
-        smaller = self._away < NOT_SMALLER * self._farthest
-        self._came_back = np.where(back, np.where(smaller, 1, self._came_back + 1), self._came_back)
-        self._farthest = np.where(back, self._away, self._farthest)
-        self._away = np.where(back, 0.0, np.maximum(self._away, apart))
-        self._places.append(u)
-        self._away, self._farthest = np.append(self._away, 0.0), np.append(self._farthest, 0.0)
-        self._came_back = np.append(self._came_back, 0)
-        return bool((self._came_back >= ROUNDS).any())
-
-
-@dataclass
-class Patience:
-    """For how many steps a rate of drag stays after a lower one has failed: twice as long each time
-    that the next lower one fails at once. A front that peels node by node needs the same drag all the
-    way; asked again after each step, whether less would do, most of the work is in vain.
-    """
-
-    longest: int = 0
-    left: int = 0
-    lowered: bool = False
-
-    def failed(self) -> None:
-        """A step failed."""
-        self.longest = min(2 * self.longest, PATIENT) if self.lowered and self.longest else 1
-        self.left, self.lowered = self.longest, False
-
-    def least(self, change: float) -> float:
-        """The least factor of the rate after a step that succeeded and would have it changed by the
-        factor `change`.
-        """
-        if self.lowered:
-            self.longest = 0
-        self.left = max(self.left - 1, 0)
-        self.lowered = change < 1.0 and not self.left
-        return 1.0 if self.left else 0.0
-
-
 @dataclass
 class Pace:
-    """How a release goes on: the `rate` of drag of the next step, how far `ahead` its iterations begin, as
-    a fraction of the last one's way, and by how much it is nudged (mm).
+    """The `rate` of drag of the next step of a release, and below which rate the body may be at rest
+    without, `quiet`.
 
     >>> pace = Pace()
     >>> pace.went(0.4), pace.choose(), pace.rate
     (False, None, 0.5)
-    >>> pace.went(0.3), round(pace.ahead, 12)
-    (False, 0.75)
+    >>> pace.went(0.3), pace.failed(), pace.rate
+    (True, False, 1.0)
     """
 
     rate: float = 1.0
-    ahead: float = 0.0
-    nudge: float = 0.0
+    quiet: float = DRAG_REST
     slower: float = DRAG_CHANGE
-    way: float = 0.0
     speed: float = 0.0
     growth: float = 0.0
-    quiet: float = DRAG_REST
-    patience: Patience = field(default_factory=Patience)
 
-    def failed(self, left: bool) -> bool:
-        """A step failed: the next one is slower, and nudged where the body would leave. Whether drag holds
-        it by so much that this is no snap.
+    def failed(self) -> bool:
+        """A step failed: the next one is slower. Whether drag holds the body by so much that this is no
+        snap.
         """
-        self.patience.failed()
-        self.nudge = NUDGE if left else self.nudge
-        self.ahead, self.rate, self.slower = 0.0, self.slower * self.rate, DRAG_CHANGE * self.slower
+        self.rate, self.slower = self.slower * self.rate, DRAG_CHANGE * self.slower
         return self.rate > DRAG_MOST
 
     def went(self, way: float) -> bool:
-        """A step went so far (mm). Whether the body may be at rest: it slows down, with hardly any drag."""
-        before, self.speed = self.speed, self.rate * way
+        """A step went so far (mm); whether that was not faster than the step before."""
+        before, self.speed, self.slower = self.speed, self.rate * way, DRAG_CHANGE
         self.growth = self.speed / before if before > 0.0 else 0.0
-        self.ahead = min(way / self.way, 1.0) if way > STEADY * self.way > 0.0 else 0.0
-        self.way, self.slower, self.nudge = way, DRAG_CHANGE, 0.0
         if self.speed > before:
             self.quiet = DRAG_REST
-            return False
-        return self.rate < self.quiet
-
-    def refused(self, left: bool) -> None:
-        """It was not at rest; nudged where that is because it would leave."""
-        self.quiet, self.nudge = DRAG_CALMER * self.rate, NUDGE if left else 0.0
+        return self.speed <= before
 
     def choose(self) -> None:
-        """The rate after a step that succeeded."""
-        change = _next(self.growth)
-        self.rate *= max(change, self.patience.least(change))
-
-
-def _next(growth: float) -> float:
-    """What the rate of drag is multiplied with after a step whose speed was `growth` times the last
-    one's: while an instability grows, drag stays above its rate.
-    """
-    if growth < DRAG_GROWTH[0]:
-        return 1.0 / DRAG_CHANGE
-    return 1.0 if growth < DRAG_GROWTH[1] else DRAG_CHANGE
+        """The rate after a step that succeeded: while an instability grows, drag stays above its rate."""
+        if self.growth < DRAG_GROWTH[0]:
+            self.rate /= DRAG_CHANGE
+        elif self.growth >= DRAG_GROWTH[1]:
+            self.rate *= DRAG_CHANGE

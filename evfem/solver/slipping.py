@@ -1,26 +1,18 @@
 r"""Nodes that go to and fro under a law of friction, in the iterations of one step.
 
-The contact problem sees a law by its tangent at the iterate. Where a node comes back to where it has
-been, the tangents do not lead to the law, and what has been seen of it takes their place:
-
-- friction that rises steeply from rest with the speed and levels off, or has a kink: `Returned`,
-- friction that grows less and less with the load, of a node that it presses: `Wedged`. With the load
-  :math:`\lambda_n = \alpha + \beta T` under the shear force T, equilibria are the roots of
-  :math:`b(\alpha + \beta T) = T`. Where the node would leave the surface without friction,
-  :math:`\alpha < 0`, a concave bound b has two of them, or none once they have met. Its tangents lie
-  above b and have roots all the same, so that they go on for ever; T = 0, an open node, solves the
-  contact problem all the while.
+The contact problem takes a law by its tangent at the iterate. If the law rises steeply from rest and
+levels off, or has a kink, a node may come back to where it has been: Newton's iterations cycle. The
+values of the law found so far take the place of its tangents then (`Returned`).
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import BACK, NEAR, WEDGED
+from evfem.common.constants import BACK, NEAR
 from evfem.contact.friction import Linearised, Slipping
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
@@ -107,31 +99,3 @@ def speed_under(law: FrictionLaw, seen: Slipping, force: Floats, fastest: Floats
         below = replace(seen, speed=middle).bound(law) < force
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return np.where(within, high, 0.0)
-
-
-class Wedged:
-    """Nodes that slip where friction has no equilibrium left: the tangent below and the tangent above
-    both put it too high, and each leads to where the other one holds. Where that has been seen, the
-    contact problem begins with the node open.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._turns, self._way = np.zeros(size, dtype=np.int64), np.zeros(size)
-        self._force, self._concave = np.full(size, np.nan), np.zeros(size, dtype=bool)
-
-    def opens(self, c: Ints, normal: Floats, beyond: Any, concave: Any) -> Any:
-        """Which of the nodes c (k,) begin open, at an iterate with contact forces (k,), where they slip
-        and hold more than the law allows (k,) bool, and where the tangent of the law leaves friction at
-        no load (k,) bool: once in a step.
-
-        >>> wedged, node, yes = Wedged(1), np.array([0]), np.array([True])
-        >>> [bool(wedged.opens(node, np.array([p]), yes, yes)[0]) for p in (2.0, 3.0, 1.9, 3.1)]
-        [False, False, False, True]
-        """
-        self._concave[c] |= concave
-        way = np.sign(normal - self._force[c])
-        turned = beyond & (way * self._way[c] < 0.0)
-        self._way[c] = np.where(beyond & np.isfinite(way), way, 0.0)
-        self._force[c] = np.where(beyond, normal, np.nan)
-        self._turns[c] += turned
-        return turned & self._concave[c] & (self._turns[c] == WEDGED)

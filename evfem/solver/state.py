@@ -25,14 +25,13 @@ class StepFailed(ArithmeticError):
     """An equilibrium was not found; `residuals` is the history, `reason` says what went wrong,
     `findings` how the last iterate looked; `unstable`: the linearised body gives way the more, the
     more it is loaded. Of a step that was given up, `last` is the state it was tried from and its
-    target, `released` whether the body was released there, and `circles` whether it came back to
-    where it had been.
+    target, and `released` whether the body was released there.
     """
 
     def __init__(self, reason: str, residuals: list[float]) -> None:
         super().__init__(reason)
         self.reason, self.residuals, self.findings = reason, residuals, ""
-        self.unstable = self.released = self.circles = False
+        self.unstable = self.released = False
         self.last: tuple[State, Any] | None = None
 
 
@@ -42,10 +41,6 @@ class Folded(StepFailed):
 
 class LiftedOff(StepFailed):
     """A released finger that is pulled harder than the attraction holds has lost the surface."""
-
-
-class Circling(StepFailed):
-    """A released finger comes back to where it was again and again."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,14 +99,12 @@ class TangentPoint:
 @dataclass(frozen=True, eq=False)
 class Reusable:
     """What a solver takes with it from step to step: the contact candidates (numbers of pad
-    nodes), where its factorisation was made if it has one, the seconds of the last time step, and
-    whether factors of single precision have served so far.
+    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
     """
 
     candidates: Ints
     tangent_point: TangentPoint | None
     duration: float
-    single: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,9 +121,8 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start; of
-    the last step the residuals, and how many of its contact problems were solved with weakened
-    turning forces, as the body would not have held the whole ones.
+    """Work done: iterations, factorisations and dense contact solves, counted since the start; and
+    the residuals of the last step.
     """
 
     iterations: int = 0
@@ -138,7 +130,6 @@ class Record:
     contact_solves: int = 0
     backend: str = "none"
     residuals: list[float] = field(default_factory=list)
-    weakened: int = 0
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ from evfem.solver.control import GivenVoltage, KeptCharge, Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
-from evfem.solver.state import Circling, Folded, LiftedOff, State, StepFailed
+from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
 from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
@@ -86,16 +86,14 @@ class Part:
 
 @dataclass
 class Release:
-    """Below which part of the present step the body is released, and the part that worked last;
+    """Below which part of the present step the body is released, and the part that worked last; and
     whether a part from the present state failed because the body gives way the more, the more it is
-    loaded: shorter ones may fail otherwise; and whether the body, released there, goes round in circles:
-    it would do so again.
+    loaded: shorter ones may fail otherwise.
     """
 
     least: float
     trusted: float
     unstable: bool = False
-    circles: bool = False
 
 
 @dataclass
@@ -145,7 +143,7 @@ class Stepper:
                 continue
             if not self._keeps(error, fraction - done):
                 continue
-            self._release = replace(self._release, trusted=self.substep, unstable=False, circles=False)
+            self._release = replace(self._release, trusted=self.substep, unstable=False)
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
@@ -244,9 +242,7 @@ class Stepper:
             raise failed
         if not relaxation.applies(target):
             return None
-        failed.released, failed.circles, mark = True, self._release.circles, accounts.mark()
-        if failed.circles:
-            return None
+        failed.released, mark = True, accounts.mark()
         try:
             rest = relaxation.follow(state, target, accounts.accept)
         except StepFailed as error:
@@ -254,7 +250,6 @@ class Stepper:
             if isinstance(error, Folded | LiftedOff):
                 error.last = failed.last
                 raise
-            failed.circles = self._release.circles = isinstance(error, Circling)
             return None
         self.relaxations += 1
         return rest

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from evfem.common.checks import Within, check_fields, number, one_of, whole, yes_or_no
-from evfem.common.constants import FALLING, LONGEST_CIRCLE, SAME, STUCK, WEAKENED
+from evfem.common.constants import FALLING, STUCK
 
 _COUNT = whole(10_000)
 _PATIENCE = number("a number of iterations, not negative", Within(0.0))
@@ -33,7 +33,7 @@ _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part, or half as many again if the end is near; `patience`: renew
+    `iterations`: most of one part; `patience`: renew
     the factorisation when more iterations than this would be left with the old one;
     `smallest_part`: of what is left of a requested step, before it counts as not converged, and its
     square where the step takes time, for tissue with viscosity or inertia is the stiffer the shorter a
@@ -78,30 +78,11 @@ class Strategy:
         check_fields(self)
 
 
-def stuck(history: Sequence[float], weakened: int = 0) -> bool:
-    """Whether more iterations with these residuals or changes (i,) are in vain, where a shorter part
-    ends soon: they come round in a circle, or the last ones are hardly below those before. Where
-    so many contact problems were `weakened`, fewer are enough.
+def stuck(history: Sequence[float]) -> bool:
+    """Whether iterations with these residuals or changes (i,) stagnate: the last `STUCK` of them, after
+    as many before, have none below `FALLING` times the least of those before.
 
-    >>> stuck([1e-3, 2e-4] * 4), stuck([0.5**i for i in range(30)])
-    (False, False)
-    >>> stuck([1e-3, 2e-4] * 5), stuck([1.0, 0.02, 0.05, 0.03, 0.07] + [0.02 + 1e-3 * i for i in range(12)])
-    (True, True)
-    >>> stuck([1e-1, 4e-3, 5e-3, 4e-3, 5e-3], weakened=2), stuck([1e-1, 4e-3, 5e-3, 4e-3, 5e-3], weakened=3)
-    (False, True)
+    >>> stuck([0.5**i for i in range(30)]), stuck([1e-3, 2e-4] * 4), stuck([1e-3, 2e-4] * 9)
+    (False, False, True)
     """
-    if any(_circle(history, period) for period in range(1, LONGEST_CIRCLE + 1)):
-        return True
-    last, least = (WEAKENED, WEAKENED + 1) if weakened >= WEAKENED else (STUCK, 2 * STUCK)
-    return len(history) > least and min(history[-last:]) >= FALLING * min(history[:-last])
-
-
-def _circle(history: Sequence[float], period: int) -> bool:
-    """Whether the last residuals (i,), at least `STUCK`, are those one period before; a bone that is
-    still on its way, 1 or more, is none.
-    """
-    count = max(2 * period, STUCK)
-    if len(history) < count + period:
-        return False
-    last, before = history[-count:], history[-count - period : -period]
-    return all(b < 1.0 and abs(a - b) <= SAME * a for a, b in zip(last, before, strict=True))
+    return len(history) > 2 * STUCK and min(history[-STUCK:]) >= FALLING * min(history[:-STUCK])

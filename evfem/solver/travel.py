@@ -1,17 +1,16 @@
-"""How far the bone travels in one linear step: as far as the contact problem says, shortened where
-that is too long for a linear step, or searched for where no travel settles the problem.
+"""How far the bone travels in one linear step: as far as the contact problem says, but not farther than
+a linear step holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.constants import SEARCH_END, SEARCH_LIMIT, SEARCH_START
+from evfem.common.constants import SHORTEST_FLIGHT
 from evfem.contact.condensed import LinearContactStep, StepSolution
 from evfem.contact.signorini import ContactNotSolved
 from evfem.solver.control import Target
@@ -67,45 +66,5 @@ class Travel:
         far again, at least a small fraction of the largest increment.
         """
         gap = float(self.interface.surface_at(state).gap.min())
-        least = SEARCH_START * self.longest
+        least = SHORTEST_FLIGHT * self.longest
         return float(np.clip(2.0 * gap, least, self.longest))
-
-    def searched(self, step: LinearContactStep, state: State) -> tuple[StepSolution, Floats]:
-        """The solution and the bone's increment (dim,) at which the bone lacks least force, where no
-        travel settles it: an attraction that is extrapolated over a long way has none, for
-        example.
-
-        The travel grows towards the lacking force, twice as far each time, and is halved where
-        that overshoots. A body that hovers is attracted the more, the lower it is, and lacks more on
-        its whole way to where it touches: it goes there at once.
-        """
-
-        def at(travel: float) -> tuple[float, StepSolution, Floats]:
-            bone = step.bone.copy()
-            bone[step.unknowns[0].axis] += travel
-            found = self.solve(replace(step, bone=bone, unknowns=()))
-            return step.lacking(found, travel), found, bone
-
-        first = best = at(0.0)
-        travel = 0.0
-        way = float(np.copysign(SEARCH_START * self.longest, first[0]))
-        falls = first[0] < 0.0 and not first[1].status.any()
-        for _ in range(SEARCH_LIMIT):
-            try:
-                new = at(travel + way)
-            except ContactNotSolved:
-                way *= 0.5
-                continue
-            if abs(new[0]) >= abs(best[0]):
-                way *= 0.5
-                continue
-            way = -0.5 * way if new[0] * best[0] < 0.0 else 2.0 * way
-            best, travel = new, travel + (new[2] - best[2])[step.unknowns[0].axis]
-            if abs(best[0]) < SEARCH_END * abs(first[0]):
-                break
-        if travel == 0.0 and falls:
-            for part in range(SEARCH_LIMIT):
-                with suppress(ContactNotSolved):
-                    best = at(-(0.5**part) * self._longest_flight(state))
-                    break
-        return best[1], best[2]

@@ -15,7 +15,7 @@ from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
 from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
-from evfem.solver.slipping import Returned, Wedged, speed_under
+from evfem.solver.slipping import Returned, speed_under
 
 pytestmark = pytest.mark.solver
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)
@@ -255,25 +255,6 @@ def test_the_speed_under_a_force_is_that_of_the_law_or_none():
     at = [replace(seen, speed=np.full(4, v)).bound(POWER)[0] for v in (0.0, 2.0, 9.0)]
     found = speed_under(POWER, seen, np.array([at[0], at[1], at[1], at[2]]), np.full(4, 8.0))
     np.testing.assert_allclose(found, [0.0, 2.0, 2.0, 0.0], rtol=1e-12)
-
-
-def test_a_node_begins_open_where_both_tangents_put_friction_too_high():
-    """Loads up and down: node 0 holds more than the law allows all the while, node 1 once does not and
-    is counted anew, node 2 never turns, friction of node 3 is in proportion to the load; node 0 does
-    not open again.
-    """
-    wedged, four = Wedged(4), np.arange(4)
-    concave = np.array([True, True, True, False])
-
-    def opens(load, beyond=(True, True, True, True)):
-        loads = np.array([load, load, rising.pop(), load])
-        return wedged.opens(four, loads, np.array(beyond), concave & (load > 2.5)).tolist()
-
-    rising = [8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0]
-    assert [any(opens(load)) for load in (2.0, 3.0, 1.9)] == [False] * 3
-    assert opens(3.1, (True, False, True, True)) == [True, False, False, False]
-    assert [any(opens(load)) for load in (1.9, 3.1)] == [False] * 2
-    assert opens(1.9) == [False, True, False, False]
 
 
 def test_friction_around_the_kink_of_its_law_is_found_without_many_cuts():

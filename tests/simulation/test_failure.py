@@ -20,9 +20,7 @@ from evfem.solver.state import Folded, LiftedOff, StepFailed
 from evfem.solver.strategy import Strategy
 
 
-def said(
-    share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, circles=False, **solver
-):
+def said(share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, **solver):
     """What is said of a step from a pressed finger whose loss is at `share`."""
     body = finger(block(4, 2), viscosity=1e-3)
     motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
@@ -30,7 +28,6 @@ def said(
     going.advance(next(going.requests()))
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
-    failed.circles = circles
     failed.last = going.state, replace(Target.held(going.state.bone, 0.0), duration=duration)
     going.model.equilibrium.verge = lambda state, target: Verge(share, SLOPES)
     return advice(going.scene, going.model, failed).split("; ")
@@ -49,15 +46,6 @@ def test_the_sentence_names_the_force_its_amount_and_the_place():
     assert "relaxation of the strategy switched on" in said(strategy=off)[-1]
 
 
-def test_a_finger_that_goes_round_in_circles_is_told_of():
-    assert said(released=True, circles=True)[0].endswith("released there it goes round in circles")
-    lost = said(share=0.5, released=True, circles=True)[0]
-    assert lost.startswith(
-        "there is no equilibrium at rest near here that holds: the finger, released at pos"
-    )
-    assert "direction = normal" not in said(released=True, circles=True)[-1]
-
-
 class NoPotential:
     """A law whose attraction cannot be along the normal."""
 
@@ -67,7 +55,7 @@ class NoPotential:
 
 
 @pytest.mark.parametrize(
-    ("circles", "law", "options", "advised"),
+    ("released", "law", "options", "advised"),
     [
         (True, Kaczmarek(), {}, True),
         (False, Kaczmarek(), {}, False),
@@ -76,11 +64,11 @@ class NoPotential:
         (True, StrongTroxel(), {"field": "full"}, False),
     ],
 )
-def test_an_attraction_with_an_energy_is_advised_where_it_may_be_had(circles, law, options, advised):
+def test_an_attraction_with_an_energy_is_advised_where_it_may_be_had(released, law, options, advised):
     surface = Flat(insulator=Layer(0.05, 3.0))
     scene = Scene(coarse_pad(), surface, law, 100.0, Press(indentation=0.5, steps=1), **options)
     failed = StepFailed("nodes keep changing", [1.0])
-    failed.circles = circles
+    failed.released = released
     assert ("direction = normal" in advice(scene, None, failed)) == advised
 
 

@@ -3,7 +3,6 @@ refused.
 """
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -303,19 +302,3 @@ def test_a_node_that_sticks_again_yields_and_slips_in_series():
         assert seen == pytest.approx(1.7 * way * slip, abs=1e-12)
         assert (abs(taken) == pytest.approx(limit, rel=1e-9)) == (slip > 0.0)
         assert abs(taken) <= limit * (1.0 + 1e-9)
-
-
-def test_iterations_go_on_only_where_their_fall_promises_the_end():
-    """At 0.7 per iteration from 1e-6 on the tolerance is reached within half as many again."""
-    limits = SimpleNamespace(strategy=Strategy(iterations=40), tolerance=1e-8)
-
-    def nearly(history):
-        return Equilibrium._nearly(limits, history)
-
-    falls = [1e-6 * 0.7 ** (k - 30) for k in range(70)]
-    assert nearly(falls[:40])
-    assert not nearly(falls[:60])
-    assert not nearly([1e-1 * 0.98**k for k in range(40)])  # too slow
-    assert not nearly([1e-6] * 40)
-    assert not nearly([1e-9] * 40)  # it is contact that does not settle
-    assert not nearly([])

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT, TURNED_BACK
+from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
 from evfem.contact.signorini import OPEN, STICK
-from evfem.solver.anderson import Anderson, Turning
+from evfem.solver.anderson import Anderson
 from evfem.solver.state import State
 
 NODES = 2
@@ -128,52 +128,3 @@ def test_what_is_remembered_is_the_combination_of_the_last_differences():
         expected = images[-1] - shares @ np.diff(images[-1 - ANDERSON_DEPTH :], axis=0)
         values = np.concatenate([found.u.ravel(), found.contact_force.ravel(), found.bone])
         np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)
-
-
-def pulled_back(gap, slope=6.0, root=1.0):
-    """The next gap of a node that goes `slope` times too far: closed, with a force, or open."""
-    wanted = root - slope * (gap - root)
-    if wanted <= 0.0:
-        return state([0.0, 0.0, 0.0, 0.0], force=-wanted, status=STICK)
-    return state([0.0, wanted, 0.0, 0.0])
-
-
-def gaps(shortens, steps=20):
-    """Gaps (steps + 1,) of a node that starts closed."""
-    mixing, turning, now = Anderson(), Turning(fringes=True), pulled_back(9.0)
-    found = [0.0]
-    for k in range(steps):
-        after = pulled_back(now.u[0, 1])
-        if shortens:
-            after = turning.next_iterate(now, after, stalled=k > 3)
-        now = mixing.next_iterate(now, after)
-        found.append(now.u[0, 1])
-    return found
-
-
-def test_a_node_that_opens_and_closes_by_turns_is_found_in_between():
-    """Alone it goes on for ever between 0 and root (1 + slope)."""
-    assert gaps(shortens=False) == pytest.approx([0.0, 7.0] * 10 + [0.0])
-    assert gaps(shortens=True)[-1] == pytest.approx(1.0, abs=1e-12)
-
-
-def test_only_nodes_that_turn_back_in_vain_shorten_the_way():
-    turning, closed, opened = Turning(fringes=True), pulled_back(9.0), pulled_back(0.0)
-    for stalled in (False, False, True):
-        assert turning.next_iterate(closed, opened, stalled) is opened  # it opens, and never closed again
-    turning.reset()
-    assert turning.next_iterate(closed, opened, True) is opened
-    assert turning.next_iterate(opened, closed, False) is closed
-    part = turning.next_iterate(closed, opened, True)
-    assert part.u[0, 1] == pytest.approx(7.0 * TURNED_BACK)
-    assert not part.touching.any()
-    assert not part.contact_force.any()
-    turning.reset()
-    assert turning.next_iterate(opened, closed, True) is closed
-
-
-def test_under_the_column_law_the_way_is_never_shortened():
-    """A node that a column holds further away has to go there."""
-    turning, closed, opened = Turning(fringes=False), pulled_back(9.0), pulled_back(0.0)
-    for before, after in ((closed, opened), (opened, closed)) * 3:
-        assert turning.next_iterate(before, after, True) is after

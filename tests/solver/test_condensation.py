@@ -273,54 +273,6 @@ def test_the_library_of_this_installation_is_found_where_its_package_is():
     assert place is None or Path(place).is_file()
 
 
-#: SuperLU has no single precision
-needs_pardiso = pytest.mark.parametrize("back_end", BACK_ENDS[:-1])
-
-
-@needs_pardiso
-def test_single_precision_condenses_to_its_digits(back_end):
-    problem = random_problem()
-    pattern = Pattern(problem.unknowns, 1)
-    factor = back_end(pattern, KEPT, single=True)
-    factor.factorise(entries(pattern, problem.cells))
-    compare(factor, problem, KEPT, 1e-5)
-    assert np.abs(factor.schur - problem.condensed(KEPT, np.zeros(40))[0]).max() > 1e-12
-
-
-@needs_pardiso
-def test_forces_on_kept_unknowns_go_past_the_single_precision(back_end):
-    """A reaction of 1e6 beside forces of 1e-6: what is condensed has seven digits of these."""
-    problem = random_problem()
-    pattern = Pattern(problem.unknowns, 1)
-    factor = back_end(pattern, KEPT, single=True)
-    factor.factorise(entries(pattern, problem.cells))
-    small = 1e-6 * np.random.default_rng(2).normal(size=problem.size)
-    small[KEPT] = 0.0
-    exact = problem.condensed(KEPT, small)[1]
-    _, found = factor.forward(small + np.isin(np.arange(problem.size), KEPT) * 2.0**20)
-    np.testing.assert_allclose(found - 2.0**20, exact, atol=1e-3 * np.abs(exact).max())
-    # and sums of states with numbers of double precision serve as well as states
-    state, _ = factor.forward(small)
-    half = np.float64(0.5)
-    doubled = factor.backward(half * state + half * state, np.zeros(KEPT.size))
-    np.testing.assert_allclose(doubled, factor.backward(state, np.zeros(KEPT.size)), atol=1e-12)
-    _, alone = factor.forward(small)
-    np.testing.assert_allclose(alone, exact, atol=1e-5 * np.abs(exact).max())
-
-
-@needs_pardiso
-def test_where_single_precision_does_not_factorise_double_does(back_end):
-    """Springs of 1 and 1e8 in a row: in single precision the soft one is lost, and a pivot with it."""
-    stiff = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    cells = np.array([1e8 * stiff, 1e8 * stiff, stiff])
-    unknowns = np.array([[0, 1], [1, 2], [2, 3]])
-    pattern, kept = Pattern(unknowns, 1), np.array([3])
-    factor = back_end(pattern, kept, single=True)
-    factor.factorise(entries(pattern, cells))
-    assert factor.real is np.float64
-    np.testing.assert_allclose(factor.schur, [[0.0]], atol=1e-6)
-
-
 #: a factorisation is collected while numpy's error state is set back, in a context that holds other
 #: variables too, as those of pytest and Jupyter do
 COLLECTED = """

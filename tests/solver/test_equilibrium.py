@@ -10,7 +10,6 @@ import pytest
 from tools.builders import INSULATOR, balance, benchmark_finger, finger
 from tools.meshes import block
 
-from evfem.common.constants import STUCK
 from evfem.contact import condensed
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
@@ -21,7 +20,7 @@ from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.solver import equilibrium
-from evfem.solver.control import Force, GivenVoltage, Target
+from evfem.solver.control import Target
 from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
 
@@ -398,7 +397,7 @@ def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
     def given_up(one, other):
         return next(n for n in range(1, 41) if stuck([1.0, *[one, other] * 20][:n]))
 
-    assert given_up(0.3, 0.01) == 11
+    assert given_up(0.3, 0.01) == 17
     crawling = [0.09 * 0.97**i for i in range(40)]
     assert not any(stuck(crawling[:n]) for n in range(1, 41))
     wandering = [0.5, *(0.1 + 0.003 * (i * i % 17) for i in range(40))]
@@ -407,35 +406,6 @@ def test_iterations_that_go_to_and_fro_are_given_up_and_falling_ones_are_not():
     assert not any(stuck([0.1] * 7 + [0.09**i for i in range(n)]) for n in range(1, 20))
     # a bone that goes its way in strides is not where it should be
     assert not any(stuck([1.0] * n) for n in range(1, 17))
-    circle = [3e-3, 1e-4, 4e-4, 2e-4, 9e-4]
-    assert not stuck(circle * 2 + circle[:4])
-    assert stuck(circle * 3)
-    assert not stuck([value * 0.9**i for i, value in enumerate(circle * 3)])
-
-
-def iterations_with(monkeypatch, opens):
-    """How many iterations are made while nothing is gained, if `opens` says of iteration i which nodes
-    are open after it.
-    """
-    model, old = pressed(Display())
-    solver = model.equilibrium
-
-    def after(i, state):
-        status = np.full(state.status.size, STICK)
-        status[opens(i)] = OPEN
-        return replace(state, status=status)
-
-    nothing_gained = Balance(np.zeros(1), 0.01, old.attraction)
-    monkeypatch.setattr(solver.body, "balance", lambda state, *_: (state, nothing_gained))
-
-    def advance(old, state, target, balance):
-        return after(len(solver.record.residuals), state)
-
-    monkeypatch.setattr(solver.body, "advance", advance)
-    monkeypatch.setattr(solver.body, "findings", lambda *_: "")
-    with pytest.raises(StepFailed, match="no equilibrium in"):
-        solver.step(after(0, old), Target.held(model.bone(0.0, 0.2), 0.0))
-    return len(solver.record.residuals)
 
 
 def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
@@ -450,46 +420,6 @@ def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
     with pytest.raises(StepFailed, match="no equilibrium in"):
         solver.step(old, Target.held(model.bone(0.0, 0.3), 0.0))
     assert set(solver.record.residuals) == {1.0}
-
-
-def test_iterations_go_on_while_a_front_of_contact_does(monkeypatch):
-    at_rest = iterations_with(monkeypatch, lambda i: [0])
-    assert at_rest < 20
-    # nodes that open by turns, and by turns of three
-    assert iterations_with(monkeypatch, lambda i: [i % 2]) == at_rest
-    assert iterations_with(monkeypatch, lambda i: [i % 3]) <= at_rest + 2
-    most = Strategy().iterations
-    assert iterations_with(monkeypatch, lambda i: np.arange(i // 3)) == most
-    # one that closes goes as far as the linear problems say
-    assert iterations_with(monkeypatch, lambda i: np.arange(15 - i // 3)) == at_rest
-    # one that rests is known to do so `STUCK` iterations later
-    assert iterations_with(monkeypatch, lambda i: np.arange(min(i, 24) // 3)) == 25 + STUCK
-
-
-def test_a_contact_problem_known_to_have_no_solution_is_not_solved_again(monkeypatch):
-    model, _ = pressed(Display(), law=Kaczmarek(), voltage=500.0)
-    solver = model.equilibrium
-    old = solver.rest(model.bone(0.0, 0.0), 500.0)
-    solver.body.forget()
-    own, steps = type(solver.body)._linear_step, []
-
-    def linear_step(self, *known):
-        steps.append(known[4:])
-        if len(steps) == 1:  # under the tangent of this very state
-            raise ContactNotSolved("none")
-        return own(self, *known)
-
-    monkeypatch.setattr(type(solver.body), "_linear_step", linear_step)
-    solves = []
-    driven = type(solver.body)._driven
-    monkeypatch.setattr(
-        type(solver.body), "_driven", lambda self, *known: solves.append(len(steps)) or driven(self, *known)
-    )
-    target = Target(0.0, Force(0.02), GivenVoltage(500.0))
-    state = solver.step(old, target)
-    assert steps[:2] == [(), ("only",)]
-    assert 2 not in solves
-    assert state.reaction[1] == pytest.approx(-0.02, rel=1e-6)
 
 
 def test_every_step_begins_with_free_columns_and_shows_them_every_iterate(monkeypatch):
@@ -518,7 +448,7 @@ def test_residuals_before_the_columns_were_kept_do_not_end_a_step(monkeypatch):
     scene = Scene(ROUND, Display(), StrongTroxel(), 300.0, [Press(indentation=0.1)], field="full")
     model = make_model(scene)
     lengths = []
-    monkeypatch.setattr(equilibrium, "stuck", lambda since, weakened: lengths.append(len(since)) or False)
+    monkeypatch.setattr(equilibrium, "stuck", lambda since: lengths.append(len(since)) or False)
     watched = iter([False, False, True])
     monkeypatch.setattr(model.equilibrium.attraction.sight, "watch", lambda places: next(watched, False))
     old = model.equilibrium.rest(model.bone(0.0, 0.0), 300.0)

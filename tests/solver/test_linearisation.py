@@ -21,7 +21,6 @@ from evfem.solver.condensation import Singular
 from evfem.solver.linearisation import in_vain, steadied
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
-from evfem.tissue.laws import NeoHookean
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")
@@ -117,7 +116,6 @@ def test_the_compliance_is_the_motion_under_unit_forces_with_the_bone_held():
     linear, model, state = made()
     state = bent(model, state)
     linear.choose_candidates(state, 0.2)
-    linear.single = False
     linear.factorise(state)
     body = model.body
     K = body.pattern.full(body.tangent(state.u)).toarray()
@@ -136,7 +134,6 @@ def test_a_force_on_a_candidate_arrives_whole_at_the_bone():
     """
     linear, _, state = made()
     linear.choose_candidates(state, 0.2)
-    linear.single = False
     linear.factorise(state)
     rows = linear.tangent.bone_rows
     np.testing.assert_allclose(rows, np.tile(-np.eye(2), linear.candidates.size), atol=1e-10)
@@ -387,52 +384,6 @@ def test_an_attraction_that_does_not_change_has_no_part(how):
     np.testing.assert_allclose(linear.tangent.compliance, linear.tangent.compliance.T, atol=1e-9)
 
 
-# -- precision of the factors ----------------------------------------------------------------------------
-
-
-def renewals(linear, state, *residuals):
-    """Ask for a tangent with iterations that have stalled at each of these residuals."""
-    for residual in residuals:
-        linear.refactorise_if_needed(state, [residual, residual])
-    return linear.single
-
-
-def test_a_tangent_that_must_be_renewed_near_the_equilibrium_is_doubted():
-    linear, _, state = made(body=FINE)
-    linear.choose_candidates(state, 0.2)
-    assert renewals(linear, state, 0.5, 0.5, 1e-2, 1e-4)
-    candidates = linear.candidates
-    assert not renewals(linear, state, 1e-5)
-    assert linear.reusable is not None
-    assert linear.candidates is candidates
-
-
-def test_one_renewal_in_each_step_is_no_doubt():
-    linear, _, state = made(body=FINE)
-    linear.choose_candidates(state, 0.2)
-    for _ in range(3):
-        linear.begin(state, False)
-        assert renewals(linear, state, 1e-4)
-
-
-def test_nearly_incompressible_tissue_has_factors_of_double_precision():
-    stiff = replace(FINE, materials={name: NeoHookean(E=0.05, nu=0.499) for name in FINE.materials})
-    assert made(body=FINE)[0].single
-    assert not made(body=stiff)[0].single
-
-
-@pytest.mark.parametrize("doubted", [False, True])
-def test_a_resumed_run_keeps_to_the_precision(doubted):
-    linear, model, state = made(body=FINE)
-    linear.choose_candidates(state, 0.2)
-    renewals(linear, state, 1e-4, *([1e-5] if doubted else []))
-    _, again, _ = made(body=FINE)
-    again.equilibrium.resume(state, model.equilibrium.reusable())
-    resumed = again.equilibrium.body.linearisation
-    assert resumed.single is not doubted
-    np.testing.assert_array_equal(resumed.tangent.schur, linear.tangent.schur)
-
-
 def test_what_the_deepest_press_may_reach_is_chosen_at_once():
     """The outline is a parabola: what lies 0.8 mm above its lowest point is reached by that much."""
     steep, surface, chosen = finger(block(40, 2, sag=1.5)), Display(y=-0.1, insulator=INSULATOR), []
@@ -521,41 +472,3 @@ def test_the_same_nodes_in_contact_are_those_of_the_iterate_before(under_the_fie
         assert not linear.fringes
     linear.refactorise_if_needed(opened, [1e-3, 2e-3, 3e-3])
     assert linear.fringes
-
-
-def test_without_a_solution_the_tangent_is_a_fresh_one_then_the_fields_then_that_of_columns(under_the_field):
-    linear, _, state = under_the_field
-    moved = replace(state, u=state.u + 1e-3)
-    ways = []
-    while linear.another(moved) and len(ways) < 4:
-        assert linear.made_at(moved)
-        ways.append(linear.fringes)
-    assert ways == [False, True, False]
-    assert not linear.another(moved)
-    coupled(linear, moved)
-    assert not linear.fringes  # for the rest of the step
-    linear.begin(moved, False)
-    coupled(linear, moved)
-    assert linear.fringes
-
-
-@pytest.mark.parametrize("change", [{"voltage": 0.0}, {"frozen": True}])
-def test_without_a_field_there_is_a_fresh_tangent_alone(under_the_field, change):
-    linear, _, state = under_the_field
-    linear.begin(state, change.pop("frozen", False))
-    state = replace(state, u=state.u + 1e-3, **change)
-    assert linear.another(state)
-    assert not linear.another(state)
-    assert not linear.fringes
-
-
-def test_a_sharp_tangent_is_made_here_with_the_fields_own_stiffness(under_the_field):
-    linear, _, state = under_the_field
-    assert linear.sharpen(state)
-    assert linear.fringes
-    assert linear.made_at(state)
-    assert not linear.sharpen(state)
-    assert linear.sharpen(replace(state, u=state.u + 1e-3))
-    unloaded = replace(state, voltage=0.0)
-    assert linear.sharpen(unloaded)
-    assert not linear.fringes

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from tools.builders import SKIN, finger
 from tools.meshes import between, block, held
 
-from evfem.common.constants import NUDGE, RELEASED
+from evfem.common.constants import RELEASED
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
@@ -28,8 +28,8 @@ from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.hand import Hand
-from evfem.solver.relaxation import Pace, Patience, Relaxation, Rounds
-from evfem.solver.state import Circling, StepFailed
+from evfem.solver.relaxation import Relaxation
+from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
 from evfem.tissue.laws import LinearElastic
 
@@ -254,77 +254,6 @@ def test_a_viscous_finger_that_is_pressed_is_not_released_to_see_whether_it_flie
         simulate(scene)
 
 
-def test_a_rate_that_was_too_low_is_asked_again_later_and_later():
-    """Failures after a lowering let the rate stay for 1, 2, 4 ... steps; a lowering that succeeds starts
-    anew.
-    """
-    patience = Patience()
-    patience.failed()
-
-    def stays():
-        count = 1
-        while patience.least(0.5):
-            count += 1
-        patience.failed()
-        return count
-
-    assert [stays() for _ in range(7)] == [1, 2, 4, 8, 16, 16, 16]
-    while patience.least(0.5):
-        pass
-    patience.least(0.5)
-    assert stays() == 1
-    assert Patience().least(0.5) == 0.0
-
-
-@pytest.mark.parametrize(("left", "nudge"), [(True, NUDGE), (False, 0.0)])
-def test_only_a_body_that_would_leave_is_nudged(left, nudge):
-    """Once: the step after it goes on without."""
-    pace = Pace(rate=1e-3)
-    pace.went(0.2)
-    pace.choose()
-    assert pace.went(0.1)
-    pace.refused(left)
-    assert pace.nudge == nudge
-    assert not pace.went(0.05)  # asked again with a tenth of the drag
-    assert pace.nudge == 0.0
-    assert not pace.failed(left)
-    assert pace.nudge == nudge
-
-
-def test_steps_of_a_release_begin_ahead_on_the_last_ones_way():
-    """The bone too; but where cells would collapse there, and with nothing behind, from the state itself."""
-    model = make_model(scene())
-    release, rest = Relaxation(model.body, None), model.equilibrium.rest(np.zeros(2), 0.0)
-    moved = replace(rest, last_increment=np.full_like(rest.u, 0.2))
-    ahead = release._ahead(moved, 0.5)
-    np.testing.assert_allclose(ahead.u, 0.1)
-    np.testing.assert_allclose(ahead.bone, 0.1)
-    assert release._ahead(moved, 0.0) is None
-    height = model.body.space.mesh.points[:, 1]
-    squeezed = np.column_stack([np.zeros_like(height), -height])
-    assert release._ahead(replace(rest, last_increment=squeezed), 1.0) is None
-
-
-@pytest.mark.parametrize(("turns", "circles"), [(1.0, True), (0.02, False)])
-def test_a_body_that_comes_back_to_where_it_was_is_given_up(turns, circles):
-    """Led round a circle ten steps long, or along an arc of a fifth of it, in steps that fail at low drag."""
-    model = make_model(scene())
-    rest = model.equilibrium.rest(np.zeros(2), 0.0)
-    asked = []
-
-    def led(state, target, start):
-        if model.body.drag_rate < 0.5:
-            raise StepFailed("faster than the way is known", [])
-        asked.append(2.0 * np.pi * turns * len(asked) / 10)
-        place = 0.1 * np.array([np.cos(asked[-1]), np.sin(asked[-1])])
-        return replace(state, u=np.zeros_like(state.u) + place, bone=place)
-
-    release = Relaxation(model.body, led)
-    with pytest.raises(Circling if circles else StepFailed, match="circles" if circles else "come to rest"):
-        release.follow(rest, Target.held(rest.bone, 0.0), lambda old, new: None)
-    assert (len(asked) < 25) == circles
-
-
 @pytest.mark.parametrize(("charged", "seconds"), [(True, [0.1, 0.1, 0.0, 0.0]), (False, [0.0] * 4)])
 def test_charge_flows_in_the_first_step_of_a_release_and_is_kept_after_it(charged, seconds):
     """So what the body comes to rest with is what its end without drag has. The first one fails here."""
@@ -332,7 +261,7 @@ def test_charge_flows_in_the_first_step_of_a_release_and_is_kept_after_it(charge
     rest = model.equilibrium.rest(np.zeros(2), 0.0)
     passed, ends = [], []
 
-    def solve(state, target, start):
+    def solve(state, target):
         if model.body.drag_rate == 0.0:
             ends.append(target.duration)
             return state
@@ -352,7 +281,7 @@ def test_a_body_that_rests_with_the_least_drag_but_never_without_is_given_up():
     model = make_model(scene())
     rest, asked = model.equilibrium.rest(np.zeros(2), 0.0), []
 
-    def solve(state, target, start):
+    def solve(state, target):
         asked.append(model.body.drag_rate)
         if model.body.drag_rate == 0.0:
             raise StepFailed("not without drag", [])
@@ -362,13 +291,6 @@ def test_a_body_that_rests_with_the_least_drag_but_never_without_is_given_up():
         Relaxation(model.body, solve).follow(rest, Target.held(rest.bone, 0.0), lambda old, new: None)
     assert min(rate for rate in asked if rate > 0.0) < 1e-8
     assert asked.count(0.0) < 12
-
-
-def test_a_pad_that_sticks_goes_no_round_by_its_rounding():
-    """Its last digit goes to and fro; a pad that goes 1 um to and fro does go round."""
-    for far, round_trip in ((1e-17, False), (1e-3, True)):
-        rounds = Rounds()
-        assert any(rounds.closed(np.array([far * (step % 2)])) for step in range(20)) == round_trip
 
 
 def test_friction_on_the_way_is_counted(point):

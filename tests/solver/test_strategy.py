@@ -13,7 +13,7 @@ from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
-from evfem.solver.state import Circling, Record, StepFailed
+from evfem.solver.state import Record, StepFailed
 from evfem.solver.stepping import Stepper, Unbooked
 from evfem.solver.strategy import Strategy
 
@@ -214,49 +214,6 @@ def test_a_release_that_comes_to_no_rest_is_taken_back_and_smaller_parts_are_tri
     none = Stepper(Steps(Strategy(), 1 / 5000), body=object())
     with pytest.raises(StepFailed):
         none.follow(0.0, lambda _, share: share, Kept())
-
-
-@pytest.mark.parametrize(("end", "times"), [(Circling, 1), (StepFailed, 2)])
-def test_a_body_that_goes_round_in_circles_is_not_released_there_again(monkeypatch, end, times):
-    """One that only comes to no rest is, at the smallest part."""
-    released = []
-
-    class Restless(Applying):
-        def follow(self, state, target, accept):
-            released.append(target)
-            raise end("no rest", [])
-
-    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
-    stepper = Stepper(Steps(Strategy(), 1 / 5000), body=object())
-    with pytest.raises(StepFailed) as failed:
-        stepper.follow(0.0, lambda _, share: share, Unbooked())
-    assert len(released) == times
-    assert failed.value.released
-    assert failed.value.circles == (end is Circling)
-    assert failed.value.last == (0.0, 1 / 1024)
-
-
-def test_a_body_that_went_round_in_circles_is_released_again_elsewhere(monkeypatch):
-    """Parts of 1/100 work up to the middle of the step, none beyond."""
-    released = []
-
-    class Restless(Applying):
-        def follow(self, state, target, accept):
-            released.append(state)
-            raise Circling("no rest", [])
-
-    class Half(Steps):
-        def step(self, old, target, frozen=None, start=None):
-            if target > 0.5:
-                raise StepFailed("fails", [1.0])
-            return super().step(old, target, frozen, start)
-
-    monkeypatch.setattr("evfem.solver.stepping.Relaxation", Restless)
-    with pytest.raises(StepFailed):
-        Stepper(Half(Strategy(), 1 / 100), body=object()).follow(0.0, lambda _, share: share, Unbooked())
-    assert released[0] == 0.0
-    assert len(released) == 2
-    assert released[1] == pytest.approx(0.5, abs=1 / 100)
 
 
 @pytest.mark.parametrize("found", [False, True])
