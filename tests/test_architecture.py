@@ -19,8 +19,8 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl", "pandas"},
-        "arrays constants notices views checks digest storage listed tables",
+        {"numpy", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        "arrays constants notices views checks pools digest storage listed tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -64,8 +64,8 @@ ROOMS = {
     ),
     "fast": ({"numpy", "scipy", "threadpoolctl"}, "memory woodbury step training run error model"),
     "sweeps": (
-        {"numpy", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file units schema folder pools run",
+        {"numpy", "tomli_w", "tqdm", "pyarrow"},
+        "samples file units schema folder run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
