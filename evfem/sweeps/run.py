@@ -25,7 +25,8 @@ from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import frame
 from evfem.errors import InputError, NotConverged, readable, unknown
 from evfem.scene.file import loads
-from evfem.simulation.result import Result, origin
+from evfem.simulation.provenance import origin
+from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
