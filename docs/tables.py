@@ -9,7 +9,8 @@ from pathlib import Path
 from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry as Key
 from evfem.scene.schema import Section
-from evfem.simulation.result import COLUMNS, MEANINGS, UNITS
+from evfem.simulation.history import MEANINGS
+from evfem.simulation.result import COLUMNS, UNITS
 from evfem.sweeps import schema as sweeps
 
 DOCS = Path(__file__).parent

@@ -26,18 +26,16 @@ from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
-from evfem.simulation.history import UNITS, WHOLE_UNITS, columns_of, over_depth, read_rows
-from evfem.simulation.result import (
-    ANOTHER,
-    Checkpoint,
-    Frame,
-    Result,
-    Row,
-    Saved,
+from evfem.simulation.history import (
+    UNITS,
+    WHOLE_UNITS,
+    columns_of,
     csv_header,
     csv_line,
-    provenance,
+    over_depth,
+    read_rows,
 )
+from evfem.simulation.result import ANOTHER, Checkpoint, Frame, Result, Row, Saved, provenance
 
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000

@@ -18,7 +18,7 @@ from evfem.common.arrays import Floats
 from evfem.common.storage import disk, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.simulation.result import origin
+from evfem.simulation.provenance import origin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

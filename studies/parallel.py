@@ -5,12 +5,12 @@ possible.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from multiprocessing import get_context
-from typing import TypeVar
+from contextlib import suppress
+from typing import Any, TypeVar
 
 from evfem.common.notices import LOG
+from evfem.common.pools import processes
+from evfem.errors import InputError
 
 Argument = TypeVar("Argument")
 Answer = TypeVar("Answer")
@@ -26,14 +26,15 @@ def side_by_side(
     script that runs a study outside ``if __name__ == "__main__"``), everything happens in this
     process.
     """
-    if workers == 1 or len(arguments) == 1:
-        return [function(argument) for argument in arguments]
-    try:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            answers = []
-            for answer in pool.map(function, arguments):
-                answers.append(answer)
+    answers: dict[int, Any] = {}
+    if workers > 1 and len(arguments) > 1:
+        with suppress(InputError), processes(workers) as pool:
+            for place, answer in pool(function, dict(enumerate(arguments))):
+                answers[place] = answer
+                if isinstance(answer, Exception):
+                    break
                 LOG.debug("case %d of %d", len(answers), len(arguments))
-            return answers
-    except BrokenProcessPool:
-        return [function(argument) for argument in arguments]
+    for answer in answers.values():
+        if isinstance(answer, Exception):
+            raise answer
+    return [answers[i] if i in answers else function(one) for i, one in enumerate(arguments)]

@@ -19,7 +19,7 @@ from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
-from evfem.mesh.mesh import layer_thickness
+from evfem.mesh.faces import layer_thickness
 from evfem.scene.motion import Press, VoltageRamp
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Frame, Result, Saved

@@ -19,8 +19,8 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl", "pandas"},
-        "arrays constants notices views checks digest storage listed tables",
+        {"numpy", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        "arrays constants notices views checks pools digest storage listed tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -62,8 +62,8 @@ ROOMS = {
         "provenance history result spectrum model works ledger checkpoint failure run rendering",
     ),
     "sweeps": (
-        {"numpy", "tomli_w", "tqdm", "threadpoolctl", "distributed", "pyarrow"},
-        "samples file units schema folder pools run",
+        {"numpy", "tomli_w", "tqdm", "pyarrow"},
+        "samples file units schema folder run",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

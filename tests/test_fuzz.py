@@ -8,12 +8,15 @@ import tracemalloc
 import zipfile
 import zlib
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from evfem.studies.stability import fuzzing
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tools import hostile
+from tools.commands import called
 from tools.fakes import fake_result
 from tools.meshes import square_mesh
 
@@ -28,51 +31,50 @@ from evfem.simulation import result
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 
 
-@pytest.mark.parametrize("kind", fuzzing.FORMATS)
-def test_damaged_files_are_read_or_refused_with_one_sentence(kind):
+@pytest.mark.parametrize("count", [50, pytest.param(1000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", hostile.FORMATS)
+def test_damaged_files_are_read_or_refused_with_one_sentence(kind, count):
+    statuses = set()
+
     @settings(
-        max_examples=50, deadline=None, derandomize=True, database=None, suppress_health_check=HealthCheck
+        max_examples=count,
+        deadline=60_000,
+        derandomize=True,
+        database=None,
+        suppress_health_check=HealthCheck,
     )
     @given(st.randoms(use_true_random=False))
     def check(rng):
-        assert fuzzing.try_file(kind, rng).fault == ""
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            words = hostile.damaged(kind, folder, rng)
+            before = listing(folder)
+            status, error = loaded(folder) if words[0] == "load" else called(folder, *words)[::2]
+            statuses.add(status)
+            assert status in (0, 2, 3), error
+            assert not (folder / "owned").exists()  # a pickled object would have made it
+            assert "Traceback" not in error
+            assert "Warning" not in error
+            if status == 2:
+                assert error.count("\n") == 1
+                assert len(error) < 2000
+                assert listing(folder) == before
 
     check()
+    assert 2 in statuses
 
 
-def test_the_counts_of_a_fuzz_add_up(monkeypatch):
-    monkeypatch.setattr(fuzzing, "FORMATS", {"profile": fuzzing.FORMATS["profile"]})
-    numbers = fuzzing.fuzz(20, 1)["profile"]
-    assert numbers["inputs"] == 20
-    assert numbers["accepted"] + numbers["refused"] + numbers["not_converged"] == 20
-    assert min(numbers["accepted"], numbers["refused"]) > 0
+def listing(folder):
+    return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.mark.parametrize(
-    ("status", "error", "untouched", "words"),
-    [
-        (1, "", True, "exit status 1"),
-        (-1, "ValueError: x", True, "ValueError"),
-        (0, "Traceback (most recent call last):", True, "Traceback"),
-        (3, "x.py:1: RuntimeWarning: overflow\n", True, "overflow"),
-        (2, "one\ntwo\n", True, "not one sentence"),
-        (2, "evfem: one\n", False, "changed the folder"),
-        (2, "evfem: one\n", True, ""),
-        (0, "step 1 of 1\n", False, ""),
-    ],
-)
-def test_what_counts_as_a_failure(status, error, untouched, words):
-    fault = fuzzing._fault(status, error, untouched)
-    assert words in fault
-    assert bool(fault) == bool(words)
-
-
-def test_a_file_that_takes_too_long_or_runs_code_is_a_failure(monkeypatch, tmp_path):
-    monkeypatch.setattr(fuzzing, "LONGEST", 0.05)
-    monkeypatch.setattr(fuzzing.cli, "main", lambda words: [None for _ in iter(int, 1)])
-    assert fuzzing._called(tmp_path, ["plan"])[0] == -2
-    monkeypatch.setattr(fuzzing.cli, "main", lambda words: (tmp_path / "owned").write_text("") and 0)
-    assert fuzzing._called(tmp_path, ["plan"])[0] == -3
+def loaded(folder):
+    """Exit status and message that loading the result would give."""
+    try:
+        result.load(folder / "run.npz")
+    except InputError as error:
+        return 2, f"{error}\n"
+    return 0, ""
 
 
 @contextmanager

@@ -6,19 +6,23 @@ import errno
 import json
 import os
 import shutil
+import subprocess
+import time
 from pathlib import Path
+from random import Random
 
 import numpy as np
 import pytest
-from evfem.studies.stability import killing
-from tools.commands import called
+from tools import kills
+from tools.commands import called, process_of, run_process
 
 import evfem
 from evfem import export, runfolder
 from evfem.common import storage
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
-from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS, Saved, csv_header
+from evfem.simulation.history import csv_header
+from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS, Saved
 from evfem.simulation.run import simulate
 
 pytestmark = pytest.mark.solver
@@ -28,16 +32,40 @@ def contents(folder):
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-def test_kills_at_random_moments_lose_nothing(tmp_path):
-    numbers = killing.kills(3, 20, tmp_path)
-    assert numbers["kills"] == 3
-    assert (numbers["broken"], numbers["fields_lost"]) == (0, 0)
-    assert numbers["largest_difference"] <= 1e-9
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("force", 3), *(pytest.param(name, 17, marks=pytest.mark.slow) for name in kills.SCENES)],
+)
+def test_kills_at_random_moments_lose_nothing(name, count, tmp_path):
+    kills.prepare(tmp_path, name)
+    words, rng, hits, number = ["run", f"{name}.toml", "--no-plots", "--out"], Random(20), 0, 0
+    begin = time.time()
+    assert run_process(tmp_path, *words, "whole")[0] == 0
+    length, end = time.time() - begin, kills.written(tmp_path / "whole" / "summary.json")
+    computing = end - kills.written(tmp_path / "whole" / "fields_00001.vtu")
+    while hits < count:
+        out, number = tmp_path / f"killed-{number}", number + 1
+        hit = True
+        while hit and hits < min(count, 5 * number):  # then the run is left to finish
+            resume = ["--resume"] if (out / ".evfem-files").exists() else []
+            if rng.random() < 0.25:  # at any moment, else once it computes
+                hit = kills.kill(tmp_path, [*words, out, *resume], rng.uniform(0.0, length))
+            else:
+                wait = rng.uniform(0.0, 0.6 * computing)
+                hit = kills.kill(tmp_path, [*words, out, *resume], wait, out / "history.csv")
+            hits += hit
+            assert kills.broken(out) == []
+        resume = ["--resume"] if (out / ".evfem-files").exists() else []
+        assert run_process(tmp_path, *words, out, *resume)[0] == 0
+        assert kills.broken(out) == []
+        assert len(list(out.glob("fields_*.vtu"))) == 20
+        assert not list(out.glob("*.tmp"))
+        assert kills.difference(out, tmp_path / "whole") < 1e-9
 
 
-@pytest.mark.parametrize("name", killing.SCENES)
+@pytest.mark.parametrize("name", kills.SCENES)
 def test_a_run_resumed_after_any_step_repeats_the_uninterrupted_one_to_the_last_bit(name, tmp_path):
-    killing.prepare(tmp_path, name)
+    kills.prepare(tmp_path, name)
     scene, kept = load(tmp_path / f"{name}.toml"), {}
 
     class Keep:
@@ -58,7 +86,7 @@ def test_a_run_resumed_after_any_step_repeats_the_uninterrupted_one_to_the_last_
 def interrupted(tmp_path_factory):
     """A folder with the scene `force`, and its run as it was after seven steps, in `stopped`."""
     folder = tmp_path_factory.mktemp("interrupted")
-    killing.prepare(folder, "force")
+    kills.prepare(folder, "force")
     number = 0
 
     class Stop(runfolder.RunFolder):
@@ -158,8 +186,8 @@ def test_a_checkpoint_that_cannot_be_used_is_one_sentence_and_nothing_is_touched
 def test_a_whole_checkpoint_is_used(place):
     status, error = run(place, "--resume")
     assert status == 0, error
-    assert killing.broken(place / "stopped") == []
-    assert len(killing.history(place / "stopped" / "history.csv")["step"]) == 20
+    assert kills.broken(place / "stopped") == []
+    assert len(kills.history(place / "stopped")["step"]) == 20
     assert len(list((place / "stopped").glob("fields_*.vtu"))) == 20
 
 
@@ -257,20 +285,20 @@ class Full:
 def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_later(
     place, whole, monkeypatch, room
 ):
-    before = killing.history(place / "stopped" / "history.csv")
+    before = kills.history(place / "stopped")
     Full(room, monkeypatch)
     status, error = run(place, "--resume")
     monkeypatch.undo()
     assert status == 4
     assert "No space left" in error.splitlines()[-1]
     assert "Traceback" not in error
-    assert killing.broken(place / "stopped") == []
+    assert kills.broken(place / "stopped") == []
     assert not list((place / "stopped").glob(".*.tmp"))
-    now = killing.history(place / "stopped" / "history.csv")
+    now = kills.history(place / "stopped")
     assert {name: column[:7] for name, column in now.items()} == before
     assert run(place, "--resume")[0] == 0
     # the last digits may differ: PARDISO's depend on where its memory lies
-    assert killing.difference(place / "stopped", whole)[0] < 1e-12
+    assert kills.difference(place / "stopped", whole) < 1e-12
 
 
 def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
@@ -292,12 +320,12 @@ def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
 
 
 def test_output_that_cannot_be_printed_is_exit_status_4(tmp_path):
-    killing.prepare(tmp_path, "force")
-    words = "plan force.toml > /dev/full" if os.path.exists("/dev/full") else "plan force.toml; exit 4"
-    command = f"{killing.sys.executable} -m evfem.cli {words}"
-    done = killing.subprocess.run(
-        command, shell=True, cwd=tmp_path, env=killing.environment(), capture_output=True, text=True
-    )
+    kills.prepare(tmp_path, "force")
+    command, environment = process_of("plan", "force.toml")
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, cwd=tmp_path, env=environment, text=True
+        )
     assert done.returncode == 4
     assert done.stderr.count("\n") <= 1
 

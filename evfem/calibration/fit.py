@@ -25,19 +25,19 @@ from evfem.calibration.confidence import confidence
 from evfem.calibration.measured import Measured, MeasuredCurve, MeasuredValues, Question
 from evfem.calibration.parameters import Given, Parameters
 from evfem.calibration.result import FitResult
-from evfem.calibration.runs import OpenPool, Runs, grouped
+from evfem.calibration.runs import Runs, grouped
 from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
+from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, quoted
 from evfem.scene.file import loads, read_text, tables_of
 from evfem.scene.scene import Scene
 from evfem.scene.written import VERSION
-from evfem.simulation.result import origin
+from evfem.simulation.provenance import origin
 from evfem.sweeps.file import scene_tables
 from evfem.sweeps.folder import SweepFolder
-from evfem.sweeps.pools import open_pool
 
 #: step of a difference, in unknowns; relative changes of an unknown, and of the sum of squares, that end
 #: the fit; most steps of it
@@ -79,15 +79,15 @@ def fit(
       electrostatics.insulator_thickness = 0.09818 (0.0833 to 0.116 with 95 % confidence)
     """
     problem = _Problem(scene, data, parameters)
-    pool = open_pool(workers, None)
     with ExitStack() as stack:
+        pool = stack.enter_context(open_pool(workers, None))
         folder = None
         if out is not None:
             folder = SweepFolder(Path(out))
             stack.enter_context(alone_in(folder.path))
             _open(folder, problem.digest)
             folder.write_provenance({"digest": problem.digest, **problem.provenance})
-        runs = Runs(OpenPool(pool, stack), problem.paths, folder)
+        runs = Runs(pool, problem.paths, folder)
         result = _solve(problem, runs, progress)
     if folder is not None:
         result.save(folder.path / "fit.json")

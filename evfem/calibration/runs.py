@@ -7,9 +7,7 @@ its steps follow from the numbers alone.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import BrokenExecutor
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,10 +15,10 @@ from typing import Any
 import evfem
 from evfem.calibration.measured import Question
 from evfem.common.digest import digest
+from evfem.common.pools import Pool
 from evfem.errors import InputError
 from evfem.scene.file import loads
 from evfem.sweeps.folder import Answer, SweepFolder
-from evfem.sweeps.pools import Open, Pool
 from evfem.sweeps.run import answered, compute
 
 Job = tuple[str, str, tuple[Question, ...]]  # scene as text, folder of its paths, what is asked
@@ -34,26 +32,6 @@ def work(job: Job) -> Answer:
     )
 
 
-class OpenPool:
-    """A pool that stays open from one batch of runs to the next; where it broke, a new one."""
-
-    def __init__(self, opener: Open, stack: ExitStack) -> None:
-        self.opener, self.stack = opener, stack
-        self.pool: Pool | None = None
-
-    @contextmanager
-    def __call__(self) -> Iterator[Pool]:
-        """The pool, opened if need be."""
-        if self.pool is not None:
-            try:
-                self.pool.executor.submit(bool, None).result()
-            except BrokenExecutor:
-                self.pool = None
-        if self.pool is None:
-            self.pool = self.stack.enter_context(self.opener())
-        yield self.pool
-
-
 @dataclass
 class Runs:
     """Answers to questions about scenes, computed by a pool, and kept in `folder` if there is one.
@@ -61,7 +39,7 @@ class Runs:
     `paths`: where relative paths in the scenes start.
     """
 
-    pool: Open
+    pool: Pool
     paths: Path
     folder: SweepFolder | None
     answers: dict[str, Answer] = field(default_factory=dict)

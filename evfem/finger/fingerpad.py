@@ -8,7 +8,7 @@ parameters with the defaults given there; every length is in mm.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Integral
@@ -35,6 +35,7 @@ from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.finger.sizes import (
+    STEEPEST,
     BoneHeight,
     BoneOffset,
     BoneWidth,
@@ -52,6 +53,10 @@ from evfem.finger.sizes import (
     StratumCorneum,
     Viscosity,
     Width,
+    check_at_most,
+    check_bone,
+    check_profile,
+    check_skin,
 )
 from evfem.mesh import file as meshfile
 from evfem.mesh.formats import LARGEST
@@ -66,10 +71,8 @@ Materials = Annotated[
     "laws of regions that are not to have Table 2's",
 ]
 Skin = Annotated["Electrical", {"allowed": "a table [finger.electrical]"}, "the dielectric skin"]
-#: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, the
-#: smallest distance between bone and dermis (mm), and the largest ratio of height and width and its
-#: inverse.
-STEEPEST, STEEPEST_FLAT, CLEARANCE, SLIMMEST = 4.88, 3.5, 0.3, (0.5, 1.2)
+#: The smallest and the largest ratio of height and width.
+SLIMMEST = 0.5, 1.2
 
 #: What grows with the width of the finger from participant to participant.
 WITH_WIDTH = (
@@ -231,7 +234,7 @@ class FingerPad:
 
     def __repr__(self) -> str:
         """What differs from Table 2."""
-        return called("FingerPad", self._changed())
+        return called("FingerPad", own_parameters(self, (*LAYERS, NAIL)))
 
     def _repr_html_(self) -> str:
         """For notebooks: sizes, and what differs from Table 2."""
@@ -240,27 +243,9 @@ class FingerPad:
         rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
         rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
         rows.append(("resolution", self.resolution))
-        told = {
-            "width",
-            "height",
-            "ridges",
-            "ridge_scan",
-            "ridge_height",
-            "ridge_width",
-            "stratum_corneum_thickness",
-        }
-        own = {name: v for name, v in self._changed().items() if name not in told | {"resolution"}}
+        told = {"width", "height", "ridges", "ridge_scan", "ridge_height", "ridge_width", "resolution"}
+        own = own_parameters(self, (*LAYERS, NAIL), told | {"stratum_corneum_thickness"})
         return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
-
-    def _changed(self) -> dict[str, Any]:
-        laws = {
-            name: law
-            for name, law in self.materials.items()
-            if law != all_materials({}, (*LAYERS, NAIL)).get(name)
-        }
-        return {k: v for k, v in changed(self).items() if k != "materials"} | (
-            {"materials": laws} if laws else {}
-        )
 
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order
@@ -321,6 +306,14 @@ def all_materials(own: object, layers: Sequence[TissueLayer]) -> dict[str, Any]:
     return laws
 
 
+def own_parameters(finger: Any, layers: Sequence[TissueLayer], told: Collection[str] = ()) -> dict[str, Any]:
+    """Parameters of a finger that are not the usual ones, without those that are `told`."""
+    usual = all_materials({}, layers)
+    own = {"materials": {name: law for name, law in finger.materials.items() if law != usual[name]}}
+    own = {name: value for name, value in (changed(finger) | own).items() if name not in told}
+    return own if own["materials"] else {name: value for name, value in own.items() if name != "materials"}
+
+
 def _check_alone(pad: FingerPad) -> None:
     """Refuse a formula of ridges, or none, beside scanned ones."""
     for name in PROFILE:
@@ -337,64 +330,33 @@ def _check_section(pad: FingerPad, section: Section) -> None:
     if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
-        _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
+        check_at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
         height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
-        _at_most(height, ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness")
-        _at_most(
-            "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
-        )
-        _check_walls(pad, ridges, outer)
-    _at_most(
-        "nail_thickness",
-        pad.nail_thickness,
-        thickness + 0.7 * below,
-        f"{outermost.spoken} + 0.7 {second.spoken}",
-    )
-    _at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
+        meaning = f"0.7 times the {outermost.spoken}'s thickness"
+        check_at_most(height, ridges.height, 0.7 * thickness, meaning)
+        steeper = 1.0 / (1.0 - ridges.height * outer.b / outer.a**2)
+        if isinstance(ridges, ScannedRidges):
+            spacing = 0.5 * ridges.pitch / RESOLUTIONS[pad.resolution].per_ridge
+            _check_scan(ridges, ridges.steepest * steeper, spacing)
+        else:
+            check_profile(ridges, steeper)
+    meaning = f"{outermost.spoken} + 0.7 {second.spoken}"
+    check_at_most("nail_thickness", pad.nail_thickness, thickness + 0.7 * below, meaning)
+    check_at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
     skin = sum(section.thickness)
-    *others, deepest = [layer for layer in section.layers if layer.thickness]
-    _at_most(
-        deepest.parameter,
-        skin,
-        0.6 * outer.smallest_radius,
-        "0.6 times the outline's smallest radius, together with "
-        + " and ".join(layer.spoken for layer in others),
-    )
+    check_skin(skin, outer.smallest_radius, 0.6)
     theta = np.linspace(-np.pi, np.pi, 361)
     inside = outer.point(theta) - skin * outer.normal(theta)
-    away = (inside - [0.0, section.bone.centre]) / [section.bone.a, section.bone.b]
-    clear = (1.0 - 1.0 / np.hypot(*away.T)) * np.hypot(*(inside - [0.0, section.bone.centre]).T)
-    if not clear.min() >= CLEARANCE:
-        raise InputError(
-            "finger.bone_height",
-            f"a bone that leaves {clear.min():.3g} mm to the dermis",
-            f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers",
-        )
+    bone = section.bone
+    check_bone("bone_height", inside - [0.0, bone.centre], (bone.a, bone.b))
 
 
-def _check_walls(pad: FingerPad, ridges: Ridges | ScannedRidges, outer: Ellipse) -> None:
-    slope = ridges.steepest / (1.0 - ridges.height * outer.b / outer.a**2)
-    limit = STEEPEST_FLAT if pad.ridge_crest > 0.0 else STEEPEST
-    if isinstance(ridges, ScannedRidges):
-        spacing = 0.5 * ridges.pitch / RESOLUTIONS[pad.resolution].per_ridge
-        missed = ridges.missed(spacing)
-        if slope > limit or missed > MISSED * ridges.height:
-            given = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
-            allowed = (
-                f"slopes up to {limit:g}, and at most {MISSED * ridges.height:.3g} mm: a smoother scan, "
-            )
-            raise InputError("finger.ridge_scan", given, allowed + "or a finer finger.resolution")
-    elif slope > limit:
-        raise InputError(
-            "finger.ridge_height",
-            f"walls with a slope of {slope:.3g}",
-            f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest",
-        )
-
-
-def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
-    if value > limit * (1.0 + 1e-12):
-        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} mm ({meaning})")
+def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
+    missed, most = ridges.missed(spacing), MISSED * ridges.height
+    if slope > STEEPEST or missed > most:
+        given = f"slopes up to {slope:.3g}, and {missed:.3g} mm of depth between two nodes"
+        allowed = f"slopes up to {STEEPEST:g}, and at most {most:.3g} mm: a smoother scan, "
+        raise InputError("finger.ridge_scan", given, allowed + "or a finer finger.resolution")
 
 
 @dataclass(frozen=True)

@@ -18,18 +18,10 @@ import numpy as np
 
 from evfem import data
 from evfem.common.checks import between, check_fields, keys_of, one_of, set_frozen
-from evfem.common.views import called, changed, short, table
+from evfem.common.views import called, short, table
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
-from evfem.finger.fingerpad import (
-    CLEARANCE,
-    STEEPEST,
-    STEEPEST_FLAT,
-    Electrical,
-    Materials,
-    Skin,
-    all_materials,
-)
+from evfem.finger.fingerpad import Electrical, Materials, Skin, all_materials, own_parameters
 from evfem.finger.fingerpad import participant_sizes as sizes_in_section
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
 from evfem.finger.layers import LAYERS, thickness_of
@@ -50,6 +42,10 @@ from evfem.finger.sizes import (
     StratumCorneum,
     Viscosity,
     Width,
+    check_at_most,
+    check_bone,
+    check_profile,
+    check_skin,
 )
 from evfem.finger.solid import RECTANGLE, Ellipsoid, Grid, Solid, rows_that_merge
 from evfem.mesh.mesh import Mesh
@@ -192,21 +188,15 @@ class Fingertip:
 
     def __repr__(self) -> str:
         """What differs from the default."""
-        return called("Fingertip", self._changed())
+        return called("Fingertip", own_parameters(self, LAYERS))
 
     def _repr_html_(self) -> str:
         """For notebooks: sizes, and what differs from the default."""
         rows = [("ellipsoid", f"{self.width:g} x {self.height:g} x {self.length:g} mm")]
         rows += [("ridges", short(self.ridges)), ("rim", self.rim), ("resolution", self.resolution)]
         told = {"width", "height", "length", "ridges", "rim", "resolution"}
-        own = {name: value for name, value in self._changed().items() if name not in told}
+        own = own_parameters(self, LAYERS, told)
         return table("Fingertip", rows + [(name, short(value)) for name, value in own.items()])
-
-    def _changed(self) -> dict[str, Any]:
-        usual = all_materials({}, LAYERS)
-        laws = {name: law for name, law in self.materials.items() if law != usual[name]}
-        own = {name: value for name, value in changed(self).items() if name != "materials"}
-        return own | ({"materials": laws} if laws else {})
 
     def mesh(self, order: int = 2) -> Mesh:
         """The mesh: `hexahedron` cells of order 1, or half as many divisions of `hexahedron27`
@@ -306,45 +296,19 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
 
 def _check_shape(tip: Fingertip, solid: Solid) -> None:
     """Refuse geometry whose parts do not fit into each other."""
-    skin, radius = sum(solid.thickness), solid.outer.smallest_radius
-    deepest = [layer for layer in LAYERS if layer.thickness][-1]
-    meaning = "times the surface's smallest radius, together with the layers above it"
-    _at_most(deepest.parameter, skin, THICKEST * radius, f"{THICKEST:g} {meaning}")
-    if tip.ridges != "none":
-        axis = tip.length if tip.ridges == "across" else tip.width
-        _at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")
-        _check_profile(tip, solid.thickness[0])
+    skin = sum(solid.thickness)
+    check_skin(skin, solid.outer.smallest_radius, THICKEST)
+    if (relief := tip.ridges) != "none":
+        axis = tip.length if relief == "across" else tip.width
+        check_at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")
+        height = float(np.ptp(relief.height)) if isinstance(relief, HeightMap) else tip.ridge_height
+        meaning = "0.7 times the stratum corneum's thickness"
+        check_at_most("ridge_height", height, 0.7 * solid.thickness[0], meaning)
+        if not isinstance(relief, HeightMap):
+            check_profile(tip._profile)
     angle = np.linspace(0.0, 0.5 * np.pi, 46)
     theta, phi = (grid.ravel() for grid in np.meshgrid(angle, angle))
     unit = np.column_stack([np.sin(theta) * np.cos(phi), -np.cos(theta), np.sin(theta) * np.sin(phi)])
     inside = solid.outer.point(unit) - skin * solid.outer.normal(unit)
     bone = solid.bone
-    away = (inside - [0.0, bone.centre, 0.0]) / [bone.a, bone.b, bone.c]
-    clear = (1.0 - 1.0 / np.linalg.norm(away, axis=1)) * np.linalg.norm(
-        inside - [0.0, bone.centre, 0.0], axis=1
-    )
-    if not clear.min() >= CLEARANCE:
-        raise InputError(
-            "finger.bone_length",
-            f"a bone that leaves {clear.min():.3g} mm to the dermis",
-            f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers",
-        )
-
-
-def _check_profile(tip: Fingertip, thickness: float) -> None:
-    relief = tip.ridges
-    height = float(np.ptp(relief.height)) if isinstance(relief, HeightMap) else tip.ridge_height
-    _at_most("ridge_height", height, 0.7 * thickness, "0.7 times the stratum corneum's thickness")
-    if isinstance(relief, HeightMap):
-        return
-    flat = tip.ridge_crest + tip.ridge_groove
-    _at_most("ridge_crest", flat, 0.9, "0.9 together with finger.ridge_groove")
-    slope, limit = tip._profile.steepest, STEEPEST_FLAT if tip.ridge_crest > 0.0 else STEEPEST
-    if slope > limit:
-        allowed = f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest"
-        raise InputError("finger.ridge_height", f"walls with a slope of {slope:.3g}", allowed)
-
-
-def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
-    if value > limit * (1.0 + 1e-12):
-        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} ({meaning})")
+    check_bone("bone_length", inside - [0.0, bone.centre, 0.0], (bone.a, bone.b, bone.c))

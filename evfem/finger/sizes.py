@@ -1,11 +1,20 @@
-"""The sizes of a finger with their ranges and meanings, of a cross-section and of a whole pad."""
+"""The sizes of a finger, of a cross-section and of a whole pad: ranges, meanings, what fits together."""
 
 from __future__ import annotations
 
 from typing import Annotated, Any
 
+import numpy as np
+
+from evfem.common.arrays import Floats
 from evfem.common.checks import between
+from evfem.errors import InputError
 from evfem.finger.layers import LAYERS, NAIL
+from evfem.finger.outline import Ridges
+
+#: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, and the
+#: smallest distance between bone and dermis (mm).
+STEEPEST, STEEPEST_FLAT, CLEARANCE = 4.88, 3.5, 0.3
 
 _PART = {"of": "of the pitch"}
 
@@ -38,3 +47,38 @@ BoneOffset = Annotated[float, between(-1.0, 3.0, "mm"), "centre of the bone abov
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
 NailThickness = Annotated[float, _thickness("nail"), "of the nail"]
 NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
+
+
+def check_at_most(name: str, value: float, limit: float, meaning: str, unit: str = " mm") -> None:
+    """Refuse a size beyond a limit that follows from others."""
+    if value > limit * (1.0 + 1e-12):
+        raise InputError(f"finger.{name}", value, f"at most {limit:.4g}{unit} ({meaning})")
+
+
+def check_skin(skin: float, radius: float, factor: float) -> None:
+    """Refuse layers that are together thicker than so many times the surface's smallest radius."""
+    deepest = [layer for layer in LAYERS if layer.thickness][-1]
+    meaning = f"{factor:g} times the surface's smallest radius, together with the layers above it"
+    check_at_most(deepest.parameter, skin, factor * radius, meaning)
+
+
+def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:
+    """Refuse ridges whose flat parts leave no walls, or whose walls are too steep on an outline that
+    makes them so many times steeper.
+    """
+    check_at_most("ridge_crest", ridges.crest + ridges.groove, 0.9, "together with finger.ridge_groove", "")
+    slope, limit = ridges.steepest * steeper, STEEPEST_FLAT if ridges.crest > 0.0 else STEEPEST
+    if slope > limit:
+        allowed = f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest"
+        raise InputError("finger.ridge_height", f"walls with a slope of {slope:.3g}", allowed)
+
+
+def check_bone(name: str, from_bone: Floats, axes: tuple[float, ...]) -> None:
+    """Refuse a bone that the dermis has no room around: points (N, d) of its inner side from the
+    bone's centre, the bone's half axes (d,).
+    """
+    clear = (1.0 - 1.0 / np.linalg.norm(from_bone / axes, axis=1)) * np.linalg.norm(from_bone, axis=1)
+    if not clear.min() >= CLEARANCE:
+        given = f"a bone that leaves {clear.min():.3g} mm to the dermis"
+        allowed = f"at least {CLEARANCE:g} mm all around: a smaller or lower bone, or thinner layers"
+        raise InputError(f"finger.{name}", given, allowed)

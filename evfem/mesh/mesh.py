@@ -266,50 +266,6 @@ def interface_of(mesh: Mesh, region: str) -> Ints:
     return interface
 
 
-def layer_thickness(mesh: Mesh, region: str, nodes: Ints) -> Floats:
-    """Distance (mm) of each of `nodes` from the inner interface of a region: the thickness of that
-    layer there.
-
-    The interface is every edge that a cell of `region` shares with a cell of another region; on
-    quadratic cells it is the parabola through the edge's nodes. Raises `InputError` if there is no
-    such region or interface.
-    """
-    curves = _parabolas(mesh.points[interface_of(mesh, region)])
-    points = mesh.points[nodes]
-    chunks = np.array_split(np.arange(len(points)), len(points) // 256 + 1)
-    return np.concatenate([_distance(points[chunk], curves) for chunk in chunks])
-
-
-def _parabolas(ends: Floats) -> Floats:
-    """Coefficients (3, K, dim) of c0 + c1 s + c2 s^2, s from -1 to 1, through start, end[,
-    middle], which are (K, 2 or 3, dim).
-    """
-    middle = 0.5 * (ends[:, 0] + ends[:, 1])
-    centre = ends[:, 2] if ends.shape[1] == 3 else middle
-    return np.array([centre, 0.5 * (ends[:, 1] - ends[:, 0]), middle - centre])
-
-
-def _distance(points: Floats, curves: Floats) -> Floats:
-    """Smallest distance of points (P, dim) from the curves: Newton's method on the six nearest of
-    each.
-    """
-    places = np.array([-1.0, 0.0, 1.0])
-    samples = curves[0] + places[:, None, None] * curves[1] + (places**2)[:, None, None] * curves[2]
-    away = np.linalg.norm(points[:, None, None] - samples, axis=-1)
-    nearest = away.min(axis=1)
-    near = np.argpartition(nearest, min(6, nearest.shape[1]) - 1, axis=1)[:, :6]
-    s = places[np.take_along_axis(away.argmin(axis=1), near, axis=1)]
-    c0, c1, c2 = curves[0][near] - points[:, None], curves[1][near], curves[2][near]
-    for _ in range(12):
-        t = s[..., None]
-        place, slope = c0 + t * c1 + t * t * c2, c1 + 2.0 * t * c2
-        speed = (slope**2).sum(-1)
-        bend = speed + 2.0 * (place * c2).sum(-1)
-        s = np.clip(s - (place * slope).sum(-1) / np.where(bend > 0.1 * speed, bend, speed), -1.0, 1.0)
-    t = s[..., None]
-    return np.linalg.norm(c0 + t * c1 + t * t * c2, axis=-1).min(axis=1)
-
-
 def _cell_around(point: Floats, edges: Floats, low: Floats, high: Floats) -> int:
     """The cell whose edges (E, n, 2 ends, 2) go round a point, -1 for none; `low` and `high` (E, 2)
     are the corners of a box around each.

@@ -19,6 +19,7 @@ from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
+from evfem.mesh.faces import layer_thickness
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import VoltageRamp
 
@@ -63,11 +64,7 @@ class Electrics:
                     "stratum_corneum_thickness and stratum_corneum_eps_r, or a region called stratum_corneum"
                 )
                 raise InputError("finger.electrical", "no thickness of the skin's insulating layer", allowed)
-            from evfem.mesh import faces
-            from evfem.mesh import mesh as edges
-
-            kind = faces if mesh.dim == 3 else edges
-            thickness = kind.layer_thickness(mesh, "stratum_corneum", nodes)
+            thickness = layer_thickness(mesh, "stratum_corneum", nodes)
         return self.of_skin(np.broadcast_to(thickness, nodes.shape).astype(float))
 
     def of_skin(self, thickness: Values) -> Electrics:

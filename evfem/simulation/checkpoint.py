@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from evfem.errors import InputError
+from evfem.simulation.history import SUMS
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Saved
-from evfem.simulation.works import SUMS, Books
+from evfem.simulation.works import Books
 from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
 
 #: statuses of a pad node are 0 to this

@@ -27,7 +27,6 @@ DRIFT = 0.05
 WHOLE = {"N/mm": "N", "N": "mJ"}
 #: columns from which a run goes on
 RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-INTEGERS = ("step", "motion_index", "substeps", "newton_iterations", "relaxations")
 #: columns without which a saved result is none; where an older version did not write another one yet, it is
 #: NaN, or 0 if it counts something
 NEEDED = ("motion", "step", "motion_index", "substeps", "newton_iterations", *RESUMED)
@@ -43,8 +42,8 @@ class History:
     """Every column of the history as an array over the steps.
 
     A field is a column: of `COLUMNS`, of rows and `history.csv`, of saved results and checkpoints.
-    `Ledger.row` computes its value; a whole number also stands in `INTEGERS`. Its unit and meaning
-    are in `UNITS` and `MEANINGS`. `result["normal_force"]` is `result.normal_force`.
+    `Ledger.row` computes its value. Its unit and meaning are in `UNITS` and `MEANINGS`.
+    `result["normal_force"]` is `result.normal_force`.
     """
 
     step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
@@ -117,6 +116,9 @@ class History:
 
 
 COLUMNS = tuple(spec.name for spec in fields(History))
+INTEGERS = tuple(spec.name for spec in fields(History) if spec.type == "Ints")
+#: columns to which every part of a step adds
+SUMS = tuple(name for name in COLUMNS if name.endswith(("_work", "_dissipation")))
 #: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
 UNITS: Mapping[str, str] = {spec.name: spec.metadata["unit"] for spec in fields(History)}
 WHOLE_UNITS: Mapping[str, str] = {spec.name: spec.metadata["whole"] for spec in fields(History)}
@@ -129,7 +131,7 @@ SPATIAL: Mapping[str, tuple[str, str]] = {
     "real_contact_area": ("mm2", "sum of the touching nodes' shares"),
 }
 #: columns that it leaves empty
-WIDTHS = ("contact_width", "real_contact_width")
+WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")
 SPATIAL_UNITS: Mapping[str, str] = {
     **WHOLE_UNITS,
     **dict.fromkeys(WIDTHS, "mm"),

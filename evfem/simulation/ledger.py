@@ -13,10 +13,10 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.pad import Pad, surface_state
 from evfem.contact.signorini import FORWARD, OPEN
-from evfem.simulation.history import WIDTHS
+from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
-from evfem.simulation.works import SUMS, Books, Part, tells_source, unloaded
+from evfem.simulation.works import Books, Part, tells_source, unloaded
 from evfem.solver.state import State
 
 

@@ -24,24 +24,24 @@ from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
 from evfem.mesh.mesh import Mesh
-
-# public in `ev.result`, where they were before
-from evfem.simulation.history import COLUMNS as COLUMNS
-from evfem.simulation.history import DRIFT, History, column_of, columns_of, load_drift, over_depth
-from evfem.simulation.history import INTEGERS as INTEGERS
-from evfem.simulation.history import MEANINGS as MEANINGS
-from evfem.simulation.history import NEEDED as NEEDED
-from evfem.simulation.history import RESUMED as RESUMED
-from evfem.simulation.history import SPATIAL as SPATIAL
-from evfem.simulation.history import SPATIAL_UNITS as SPATIAL_UNITS
-from evfem.simulation.history import UNITS as UNITS
-from evfem.simulation.history import WHOLE_UNITS as WHOLE_UNITS
-from evfem.simulation.history import Row as Row
-from evfem.simulation.history import csv_header as csv_header
-from evfem.simulation.history import csv_line as csv_line
-from evfem.simulation.provenance import origin as origin
+from evfem.simulation.history import (
+    COLUMNS,
+    DRIFT,
+    INTEGERS,
+    NEEDED,
+    RESUMED,
+    SPATIAL,
+    SPATIAL_UNITS,
+    UNITS,
+    WHOLE_UNITS,
+    History,
+    Row,
+    column_of,
+    columns_of,
+    load_drift,
+    over_depth,
+)
 from evfem.simulation.provenance import provenance as provenance
-from evfem.simulation.provenance import versions as versions
 
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"

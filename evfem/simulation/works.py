@@ -85,21 +85,11 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
+from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
 from evfem.solver.spatial import SkinInterface, slipped
 from evfem.solver.state import State
 
-SUMS = (
-    "external_work",
-    "electrostatic_work",
-    "friction_dissipation",
-    "viscous_dissipation",
-    "integrator_dissipation",
-    "snap_dissipation",
-    "source_work",
-    "leakage_dissipation",
-    "stretch_work",
-)
 #: share of the work of the change of the internal forces that no small smooth part sets free
 SNAP = 0.5
 #: share of the work of the internal forces, all counted positive, that is the solver's tolerance

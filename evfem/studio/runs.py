@@ -15,11 +15,11 @@ import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from multiprocessing import Pipe, get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
+from evfem.common.pools import Worker
 from evfem.errors import EvfemError, InputError
 from evfem.protocols import Observer
 from evfem.studio.state import State, parse
@@ -37,23 +37,17 @@ def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
     """
     parse(text)
     with _place():
-        context = get_context("spawn")
-        reader, writer = Pipe(duplex=False)
-        process = context.Process(target=_work, args=(writer, text, exact), daemon=True)
-        process.start()
-        writer.close()
+        worker = Worker(_work, text, exact)
         try:
             line: dict[str, Any] = {}
             with suppress(EOFError):
                 while True:
-                    line = reader.recv() if reader.poll(EVERY) else {"alive": True}
+                    line = worker.line.recv() if worker.line.poll(EVERY) else {"alive": True}
                     send(line)
             if LAST.isdisjoint(line):
                 send({"error": "the run ended without a result; perhaps the memory was not enough"})
         finally:
-            process.kill()
-            process.join()
-            reader.close()
+            worker.end()
 
 
 @contextmanager
@@ -82,17 +76,13 @@ class _Steps:
         self.send({"step": int(row["step"]), "of": self.total})
 
 
-def _work(writer: Connection, text: str, exact: bool) -> None:
+def _work(line: Connection, text: str, exact: bool) -> None:
     """In the process: run, and send what is found."""
     os.environ["MPLBACKEND"] = "agg"
     try:
-        (_send_exact if exact else _sent)(writer.send, parse(text))
+        (_send_exact if exact else _sent)(line.send, parse(text))
     except EvfemError as error:
-        writer.send({"error": str(error)})
-    except (BrokenPipeError, KeyboardInterrupt):
-        pass
-    finally:
-        writer.close()
+        line.send({"error": str(error)})
 
 
 def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:

@@ -7,10 +7,9 @@ from __future__ import annotations
 import math
 import sys
 import time as clock
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -21,15 +20,16 @@ import evfem
 from evfem.common import notices
 from evfem.common.digest import digest
 from evfem.common.notices import LOG
+from evfem.common.pools import Died, Pool, open_pool
 from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import frame
 from evfem.errors import InputError, NotConverged, readable, unknown
 from evfem.scene.file import loads
-from evfem.simulation.result import Result, origin
+from evfem.simulation.provenance import origin
+from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.sweeps.file import FIRST, LAST, Sweep, load
 from evfem.sweeps.folder import STATUS, Answer, SweepFolder, sweep_csv
-from evfem.sweeps.pools import Open, Pool, open_pool, processes
 from evfem.sweeps.units import Units, table_units, units_of
 
 #: the table is written anew after so many seconds
@@ -114,9 +114,11 @@ def sweep(
     'motion[0].gap: given -1.0; allowed: a gap in mm from 0 to 200'
     """
     plan = plan if isinstance(plan, Sweep) else load(plan)
-    pool = open_pool(workers, scheduler)
-    folder = None if out is None else SweepFolder(Path(out), resume, overwrite)
-    with nullcontext() if folder is None else alone_in(folder.path):
+    with ExitStack() as stack:
+        pool = stack.enter_context(open_pool(workers, scheduler))
+        folder = None if out is None else SweepFolder(Path(out), resume, overwrite)
+        if folder is not None:
+            stack.enter_context(alone_in(folder.path))
         run = _Run(plan, folder, progress)
         try:
             compute(evaluate, run.waiting(), pool, run.keep)
@@ -292,60 +294,29 @@ def output(result: Result, name: str) -> float | None:
 def compute(
     function: Callable[[Any], Answer],
     waiting: Mapping[str, Any],
-    pool: Open,
+    pool: Pool,
     keep: Callable[[str, Answer], None],
 ) -> None:
     """Give `function` and every job to a pool, and every answer to `keep` as soon as it is there.
 
-    When a process dies, the jobs it may have died of are tried once more, each alone.
+    A job whose process died is tried once more at the end, alone.
     """
-    jobs = deque(waiting.items())
-    while jobs:
-        with pool() as opened:
-            suspects = _drain(function, opened, jobs, keep)
-        for key, job in suspects:
-            keep(key, _alone(function, job))
+    again = []
+    for key, found in pool(function, waiting):
+        if isinstance(found, Died):
+            again.append(key)
+        else:
+            keep(key, _answer(found))
+    for one in again:
+        for key, found in pool(function, {one: waiting[one]}):
+            keep(key, _answer(found))
 
 
-def _drain(
-    function: Callable[[Any], Answer],
-    pool: Pool,
-    jobs: deque[tuple[str, Any]],
-    keep: Callable[[str, Answer], None],
-) -> list[tuple[str, Any]]:
-    """Work until nothing is left; returns the jobs in hand if the pool broke."""
-    flying: dict[Future[Answer], tuple[str, Any]] = {}
-    try:
-        while jobs or flying:
-            while jobs and len(flying) < pool.window:
-                future = pool.executor.submit(function, jobs[0][1])
-                flying[future] = jobs.popleft()
-            done, _ = wait(flying, return_when=FIRST_COMPLETED)
-            for future in done:
-                answer = _answer(future)
-                keep(flying.pop(future)[0], answer)
-    except BrokenExecutor:
-        return list(flying.values())
-    return []
-
-
-def _answer(future: Future[Answer]) -> Answer:
-    try:
-        return future.result()
-    except (BrokenExecutor, KeyboardInterrupt):
-        raise
-    except CancelledError as error:
-        raise InputError("scheduler", "a cluster that went away", "resume on another") from error
-    except Exception as error:  # the cluster's own kind, if a worker died again and again
-        return Answer("failed", 0.0, f"{type(error).__name__}: {error}", {})
-
-
-def _alone(function: Callable[[Any], Answer], job: Any) -> Answer:
-    try:
-        with processes(1) as pool:
-            return pool.executor.submit(function, job).result()
-    except BrokenExecutor:
-        return Answer("failed", 0.0, "its process died; perhaps the memory was not enough", {})
+def _answer(found: Answer | Exception) -> Answer:
+    if isinstance(found, Answer):
+        return found
+    message = str(found) if isinstance(found, Died) else f"{type(found).__name__}: {found}"
+    return Answer("failed", 0.0, message, {})
 
 
 class _Progress:

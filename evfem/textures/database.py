@@ -26,6 +26,7 @@ import evfem
 from evfem.common.arrays import Floats
 from evfem.common.digest import digest
 from evfem.common.notices import milestone
+from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import csv_text, read_columns, read_table
 from evfem.errors import InputError
@@ -33,7 +34,6 @@ from evfem.scene.file import dump
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
-from evfem.sweeps.pools import open_pool
 from evfem.sweeps.run import answered, compute
 from evfem.textures.correction import corrected, corrections, importance
 from evfem.textures.estimators import METHODS, Estimator, best_kernel, best_width, left_out
@@ -208,7 +208,7 @@ def compute_database(
     scenes: list[tuple[Parametric | tuple[str, bool], Scene]] = [(one, scene(one)) for one in textures()]
     texts = {one: dump(of) for one, of in [*scenes, *references().items()]}
     jobs = {digest((text, evfem.__version__)): one for one, text in texts.items()}
-    with alone_in(folder):
+    with open_pool(workers, scheduler) as pool, alone_in(folder):
         kept = SweepFolder(folder, resume=True)
         kept.open(set(jobs), digest(sorted(jobs)))
         answers = {key: answer for key in jobs if (answer := kept.read(key)) is not None}
@@ -219,7 +219,7 @@ def compute_database(
             answers[key] = answer
             milestone("point", len(answers), len(jobs))
 
-        compute(_evaluate, waiting, open_pool(workers, scheduler), keep)
+        compute(_evaluate, waiting, pool, keep)
         done = {one: answers[key] for key, one in jobs.items() if answers[key].status == "done"}
         write(folder / PADS, {ridged: remember(ridged) for ridged in (False, True)})
         _write(folder, {one: answer for one, answer in done.items() if isinstance(one, Parametric)})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import time
 import warnings
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -54,22 +54,6 @@ class Ending:
         """Whether a scene may end so."""
         return self.outcome in GOOD
 
-    def same_as(self, other: Ending) -> bool:
-        """Whether both are of one class, and for the same reason."""
-        return (self.outcome, self.kind) == (other.outcome, other.kind)
-
-
-@dataclass
-class Clock:
-    """CPU seconds of this process since it was made."""
-
-    begin: float = field(default_factory=time.process_time)
-
-    @property
-    def spent(self) -> float:
-        """Seconds so far."""
-        return time.process_time() - self.begin
-
 
 def judge(tables: Tables, with_twins: bool) -> Ending:
     """Run a scene, and with its twins the mirrored one and half the steps where they must agree."""
@@ -85,11 +69,11 @@ def _judged(tables: Tables, folder: Path, with_twins: bool) -> Ending:
         scene = loads(text_of(with_files(tables, folder)), folder)
     except InputError as error:
         return Ending("refused", str(error), error.key)
-    clock, requested = Clock(), scene.total_steps
+    begin, requested = time.process_time(), scene.total_steps
     try:
         result = simulate(scene)
     except NotConverged as error:
-        spent, partial = clock.spent, error.result
+        spent, partial = time.process_time() - begin, error.result
         found = broken(scene, partial) if isinstance(partial, Result) else []
         costs = _costs(partial, requested, spent)
         if found:  # what was accepted is worse than what was not
@@ -101,8 +85,8 @@ def _judged(tables: Tables, folder: Path, with_twins: bool) -> Ending:
         return Ending("refused", str(error), error.key, requested)
     except Exception as error:  # an end like others: the table names it, the campaign goes on
         said = f"{type(error).__name__}: {error}"
-        return Ending("error", said, type(error).__name__, requested, cpu_s=clock.spent)
-    costs = _costs(result, requested, clock.spent)
+        return Ending("error", said, type(error).__name__, requested, cpu_s=time.process_time() - begin)
+    costs = _costs(result, requested, time.process_time() - begin)
     found = broken(scene, result)
     if with_twins and not found:
         found = _twins(tables, folder, result)

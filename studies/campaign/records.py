@@ -1,8 +1,7 @@
 """What a campaign leaves on disk while it goes: a table of ends, and the scenes that ended badly.
 
-`campaign/ends.csv` has a row per scene; `campaign/failures/` has each failed scene as it was
-drawn, `campaign/minimal/` its shrunk one, both complete in themselves. Rows of the same scene and
-the same code count as done.
+`campaign/ends.csv` has a row per scene; `campaign/failures/` has each failed scene as it was drawn,
+complete in itself. Rows of the same scene and the same code count as done.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from threading import Lock
 
 import evfem
 from evfem.common.digest import digest
@@ -24,7 +22,7 @@ from ..common import make_folder
 from .ending import Ending
 from .tables import Tables, put_mesh, text_of
 
-TABLE, FAILURES, MINIMAL = "ends.csv", "failures", "minimal"
+TABLE, FAILURES = "ends.csv", "failures"
 COLUMNS = ("seed", "scene", *(spec.name for spec in fields(Ending)), "digest")
 WHOLE, REAL = ("requested", "steps", "unknowns", "iterations", "substeps", "cuts"), ("cpu_s", "remainder")
 
@@ -52,11 +50,9 @@ class Records:
     code: str = field(default_factory=code_digest)
 
     def __post_init__(self) -> None:
-        self._lock = Lock()
         if self.folder is None:
             return
-        for name in (FAILURES, MINIMAL):
-            make_folder(self.folder / name)
+        make_folder(self.folder / FAILURES)
         if (self.folder / TABLE).exists():
             with disk(f"read {self.folder / TABLE}"):
                 text = (self.folder / TABLE).read_text(encoding="utf-8")
@@ -69,33 +65,15 @@ class Records:
 
     def add(self, key: Key, tables: Tables, ending: Ending) -> None:
         """Keep the end of a scene, and the scene if it failed."""
-        with self._lock:
-            self.ends[key], self.digests[key] = ending, self._digest(tables)
-            if self.folder is None:
-                return
-            for name in (FAILURES, MINIMAL):
-                self._file(name, key).unlink(missing_ok=True)
-            if not ending.good:
-                put_mesh(tables, self.folder / FAILURES)
-                write_text(self._file(FAILURES, key), _told(key, ending, tables))
-            write_text(self.folder / TABLE, self._text())
-
-    def add_minimal(self, key: Key, tables: Tables, ending: Ending) -> None:
-        """Keep what is left of a failed scene, with its own end."""
-        if self.folder is not None:
-            put_mesh(tables, self.folder / MINIMAL)
-            write_text(self._file(MINIMAL, key), _told(key, ending, tables))
-
-    def shrinks(self, key: Key) -> bool:
-        """Whether a scene failed and has not been shrunk; one that takes too long stays as it is."""
-        ending = self.ends[key]
-        if self.folder is None or ending.good or ending.outcome in ("timeout", "refused"):
-            return False
-        return not self._file(MINIMAL, key).exists()
-
-    def _file(self, name: str, key: Key) -> Path:
-        assert self.folder is not None
-        return self.folder / name / f"seed{key[0]}-scene{key[1]:04d}.toml"
+        self.ends[key], self.digests[key] = ending, self._digest(tables)
+        if self.folder is None:
+            return
+        file = self.folder / FAILURES / f"seed{key[0]}-scene{key[1]:04d}.toml"
+        file.unlink(missing_ok=True)
+        if not ending.good:
+            put_mesh(tables, file.parent)
+            write_text(file, _told(key, ending, tables))
+        write_text(self.folder / TABLE, self._text())
 
     def _digest(self, tables: Tables) -> str:
         return digest((tables, self.code))

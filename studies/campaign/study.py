@@ -5,7 +5,7 @@ Each scene is drawn from its seed and number, run in a process of its own with a
 and its invariants are checked in every row. Ends: equilibrium; explained, a step without any
 equilibrium that says so; not_converged; invariants_broken; timeout; refused, a mistake of the
 generator; error. Beside json, csv and picture the folder `campaign` has the table of all ends and
-every failure, whole and shrunk.
+every scene that failed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.sweeps.pools import cores
+from evfem.common.pools import cores
 
 from .. import Sample
 from ..common import Series, Study, make_folder
@@ -44,9 +44,7 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None, sample: Sample | None = None) -> dict[str, Any]:
-    """Run the scenes that have no end yet, in processes; numbers, table, minimal scenes and
-    figure.
-    """
+    """Run the scenes that have no end yet, in processes; numbers, table, failed scenes and figure."""
     sample = sample or Sample()
     count = sample.scenes or (QUICK if quick else SCENES)
     keys = [(sample.seed, number) for number in range(count)]

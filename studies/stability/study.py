@@ -15,11 +15,11 @@ from evfem.common.storage import write_text
 
 from ..common import Series, Study, make_folder
 from ..parallel import side_by_side
-from . import contact, electric, lost, same, tissue
+from . import contact, electric, same, tissue
 from .case import PASSED, Case, Found, judge
 from .figure import draw
 
-GROUPS = tuple(group for module in (tissue, electric, contact, same, lost) for group in module.GROUPS)
+GROUPS = tuple(group for module in (tissue, electric, contact, same) for group in module.GROUPS)
 CASES: Mapping[str, Case] = {case.key: case for group in GROUPS for case in group.cases}
 HEAD = (
     "group",

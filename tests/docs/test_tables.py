@@ -4,7 +4,8 @@ import runpy
 from pathlib import Path
 
 from evfem.scene import schema
-from evfem.simulation.result import COLUMNS, MEANINGS, UNITS
+from evfem.simulation.history import MEANINGS
+from evfem.simulation.result import COLUMNS, UNITS
 
 DOCS = Path(__file__).parents[2] / "docs"
 TABLES = runpy.run_path(str(DOCS / "tables.py"))

@@ -14,7 +14,7 @@ from evfem.errors import InputError, readable
 from evfem.finger import fingerpad
 from evfem.finger.fingerpad import RESOLUTIONS, Electrical, FingerPad, MeshedFinger
 from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
-from evfem.mesh.mesh import layer_thickness
+from evfem.mesh.faces import layer_thickness
 from evfem.mesh.quality import check, scaled_jacobian
 from evfem.tissue.laws import NeoHookean
 

@@ -7,7 +7,8 @@ import pytest
 
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
-from evfem.mesh.mesh import CELLS, Mesh, layer_thickness, raised
+from evfem.mesh.faces import layer_thickness
+from evfem.mesh.mesh import CELLS, Mesh, raised
 from evfem.mesh.quality import scaled_jacobian
 
 

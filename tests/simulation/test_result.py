@@ -13,20 +13,9 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
-from evfem.simulation.result import (
-    COLUMNS,
-    INTEGERS,
-    MEANINGS,
-    NEEDED,
-    UNITS,
-    WHOLE_UNITS,
-    Checkpoint,
-    Result,
-    csv_header,
-    csv_line,
-    load,
-    versions,
-)
+from evfem.simulation.history import MEANINGS, csv_header, csv_line
+from evfem.simulation.provenance import versions
+from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, WHOLE_UNITS, Checkpoint, Result, load
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from evfem.common.pools import open_pool, processes
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 from evfem.electrostatics.timesignals import ChargeControl
@@ -23,8 +24,8 @@ from evfem.tissue.elements import elements_on
 from evfem.tissue.laws import LAWS
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-NAMES = "apart bodies drawing ending invariants records run shrinking study tables twins"
-apart, bodies, drawing, ending, invariants, records, run, shrinking, study, tables, twins = (
+NAMES = "bodies drawing ending invariants records run study tables twins"
+bodies, drawing, ending, invariants, records, run, study, tables, twins = (
     importlib.import_module(f"{studies.__name__}.campaign.{name}") for name in NAMES.split(" ")
 )
 Ending = ending.Ending
@@ -399,73 +400,23 @@ def test_a_scene_is_judged_with_its_twins():
     assert found.cpu_s > 0.0
 
 
-# -- shrinking
-
-
-def test_a_failure_is_shrunk_to_what_makes_it():
-    asked = []
-
-    def judge(one, limit_s):
-        asked.append(one)
-        slides = any(motion["kind"] == "slide" for motion in one["motion"])
-        bad = slides and one["surface"]["friction"] != 0.0 and one.get("solver", {}).get("element") == "q1"
-        return Ending("not_converged" if bad else "equilibrium", kind="why", cpu_s=0.01)
-
-    start = drawing.draw(5, 3) | {"solver": {"element": "q1", "tolerance": 1e-9}}
-    start = start | {"surface": {"kind": "flat", "friction": [[0.0, 0.5], [1.0, 0.7]]}}
-    start = start | {"motion": [*SCENE["motion"], {"kind": "slide", "distance": 1.0, "steps": 9}]}
-    found, end = shrinking.shrunk(start, judge(start, 1.0), judge)
-    assert end.outcome == "not_converged"
-    assert [motion["kind"] for motion in found["motion"]] == ["slide"]
-    assert found["motion"][0]["steps"] == 1
-    assert found["solver"]["element"] == "q1"
-    assert "electrostatics" not in found
-    assert found["finger"] == {"resolution": "coarse", "ridges": False}
-    assert isinstance(found["surface"]["friction"], float)
-    assert all(one != start for one in asked[1:])
-
-
-def test_shrinking_stops_when_its_time_is_used_up():
-    asked = []
-
-    def judge(one, limit_s):
-        asked.append(one)
-        return Ending("not_converged", cpu_s=0.6 * shrinking.BUDGET_S)
-
-    shrinking.shrunk(SCENE, Ending("not_converged"), judge)
-    assert len(asked) == 2
-
-
-def test_another_reason_is_another_end():
-    one = Ending("not_converged", kind="cells would collapse")
-    assert not one.same_as(replace(one, kind="the residual grows"))
-    assert one.same_as(replace(one, cpu_s=3.0))
-
-
 # -- the campaign
-
-
-class Fake:
-    """Judges in no time: every fifth scene fails."""
-
-    asked = ()
-
-    def judge(self, one, with_twins, limit_s):
-        number = next((n for n in range(30) if drawing.draw(0, n) == one), None)
-        Fake.asked = (*Fake.asked, number)
-        bad = number is not None and number % 5 == 0
-        outcome = "not_converged" if bad else "equilibrium"
-        return Ending(outcome, "said", "why", 8, 4, 6000, 20, 8, 0, 0.5 + (number == 1) * 49.5, 0.1)
-
-    def stop(self):
-        pass
 
 
 @pytest.fixture
 def fake(monkeypatch):
-    Fake.asked = ()
-    monkeypatch.setattr(run, "Apart", Fake)
-    return Fake
+    """Judges in this process and in no time: every fifth scene fails. The numbers of the scenes."""
+    asked = []
+
+    def judged(task):
+        (_, number), _ = task
+        asked.append(number)
+        outcome = "equilibrium" if number % 5 else "not_converged"
+        return Ending(outcome, "said", "why", 8, 4, 6000, 20, 8, 0, 0.5 + (number == 1) * 49.5, 0.1)
+
+    monkeypatch.setattr(run, "processes", lambda workers: open_pool(1, None))
+    monkeypatch.setattr(run, "judged", judged)
+    return asked
 
 
 def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
@@ -483,9 +434,8 @@ def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
     assert [row["scene"] for row in rows] == [str(n) for n in range(10)]
     drawn = [tables.scene_of(drawing.draw(0, n)).total_steps for n in range(10)]
     assert [int(row["requested"]) for row in rows] == drawn
-    for folder in ("failures", "minimal"):
-        names = sorted(p.name for p in (tmp_path / "campaign" / folder).glob("*.toml"))
-        assert names == ["seed0-scene0000.toml", "seed0-scene0005.toml"]
+    names = sorted(p.name for p in (tmp_path / "campaign" / "failures").glob("*.toml"))
+    assert names == ["seed0-scene0000.toml", "seed0-scene0005.toml"]
     failure = tmp_path / "campaign" / "failures" / "seed0-scene0005.toml"
     assert failure.read_text().startswith("# seed 0, scene 5: not_converged; said\n")
     again = tables.loads(failure.read_text(), failure.parent)
@@ -494,9 +444,9 @@ def test_a_campaign_leaves_numbers_table_failures_and_picture(fake, tmp_path):
 
 def test_finished_scenes_are_not_run_again_unless_the_code_is_another(fake, tmp_path, monkeypatch):
     def asked(scenes):
-        fake.asked = ()
+        fake.clear()
         studies.run("campaign", out=tmp_path, sample=studies.Sample(scenes=scenes, workers=1))
-        return [number for number in fake.asked if number is not None]
+        return list(fake)
 
     assert asked(6) == [0, 1, 2, 3, 4, 5]
     assert asked(6) == []
@@ -509,12 +459,13 @@ def test_finished_scenes_are_not_run_again_unless_the_code_is_another(fake, tmp_
 def test_a_scene_that_was_given_up_is_run_again_with_a_longer_limit_alone(fake, tmp_path, monkeypatch):
     limits = []
 
-    def judge(self, one, with_twins, limit_s):
+    def judged(task):
+        (_, number), limit_s = task
         limits.append(limit_s)
-        late = one == drawing.draw(0, 1) and limit_s < 100.0
+        late = number == 1 and limit_s < 100.0
         return Ending("timeout", cpu_s=limit_s) if late else Ending("equilibrium", cpu_s=0.1)
 
-    monkeypatch.setattr(Fake, "judge", judge)
+    monkeypatch.setattr(run, "judged", judged)
 
     def found(limit):
         limits.clear()
@@ -528,12 +479,12 @@ def test_a_scene_that_was_given_up_is_run_again_with_a_longer_limit_alone(fake, 
 
 
 def test_what_is_done_is_kept_when_a_campaign_is_interrupted(fake, tmp_path, monkeypatch):
-    def judge(self, one, with_twins, limit_s):
-        if one == drawing.draw(0, 3):
+    def judged(task):
+        if task[0] == (0, 3):
             raise KeyboardInterrupt
         return Ending("equilibrium", cpu_s=0.1)
 
-    monkeypatch.setattr(Fake, "judge", judge)
+    monkeypatch.setattr(run, "judged", judged)
     with pytest.raises(KeyboardInterrupt):
         studies.run("campaign", out=tmp_path, sample=studies.Sample(scenes=6, workers=1))
     kept = records.Records(tmp_path / "campaign")
@@ -547,15 +498,11 @@ def test_slowness_compares_with_scenes_of_the_same_size():
     assert study.slowness([*small, *large]).max() == 1.0
 
 
-@pytest.mark.slow
-def test_a_process_of_its_own_ends_at_its_limit_and_another_takes_its_place():
-    one = apart.Apart()
-    try:
-        long = SCENE | {"motion": [{"kind": "press", "indentation": 0.6, "steps": 4000}]}
-        assert one.judge(long, False, 1.0).outcome == "timeout"
-        assert one.judge(SCENE, False, 60.0).outcome == "equilibrium"
-    finally:
-        one.stop()
+def test_a_process_ends_at_its_limit_and_another_takes_its_place():
+    with processes(1) as pool:
+        found = dict(pool(run.judged, {limit: ((0, FEW[0]), limit) for limit in (0.05, 60.0)}))
+    assert run._lost(found[0.05], 0.05).outcome == "timeout"
+    assert found[60.0].outcome == "equilibrium"
 
 
 # -- the property

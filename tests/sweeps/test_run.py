@@ -19,12 +19,12 @@ from tools.workers import work_or_die
 
 import evfem as ev
 from evfem import cli
+from evfem.common import pools
 from evfem.errors import InputError, StorageError
 from evfem.mesh import file as meshfile
 from evfem.scene import file as scenefile
 from evfem.sweeps import file as sweepfile
 from evfem.sweeps import folder as sweepfolder
-from evfem.sweeps import pools
 from evfem.sweeps.run import compute
 from evfem.sweeps.units import table_units, units_of
 
@@ -275,7 +275,8 @@ def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
     words = {"a": "1", "b": "die", "c": "333", "d": "4444", "e": "55555", "f": "666666"}
     jobs = {key: (str(tmp_path / "died"), word) for key, word in words.items()}
     kept = {}
-    compute(work_or_die, jobs, pools.open_pool(2, None), kept.__setitem__)
+    with pools.open_pool(2, None) as pool:
+        compute(work_or_die, jobs, pool, kept.__setitem__)
     assert {key: answer.outputs.get("length") for key, answer in kept.items()} == {
         "a": 1.0, "b": None, "c": 3.0, "d": 4.0, "e": 5.0, "f": 6.0
     }  # fmt: skip
@@ -283,7 +284,9 @@ def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
 
 
 def test_a_script_without_guard_is_told_so(tmp_path):
-    script = "from evfem.sweeps import pools\nwith pools.open_pool(2, None)(): pass\n"
+    script = (
+        "from evfem.common import pools\nwith pools.open_pool(2, None) as pool: list(pool(abs, {0: 1}))\n"
+    )
     (tmp_path / "script.py").write_text(script)
     done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 1
