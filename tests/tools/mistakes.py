@@ -1,16 +1,21 @@
-"""Mistakes that the tests must see: each is made in a copy of the package, one at a time.
+"""Mistakes in the physics that the tests must see: each is made in a copy of the package, one at a
+time.
 
     python tests/tools/mistakes.py [--only WORD]
 
-The table is `mistakes.toml` beside this file. A mistake is one edit of one file: `old` text, which
-the file has exactly once, becomes `new`. `breaks` says what is wrong then, `tests` which tests
-must see it. They run in a temporary folder with a copy of the package, first as it is, then with
-each mistake, one process at a time. Exit status 1 if a mistake survives.
+The table is `mistakes.toml` beside this file. A mistake is one edit within one function or method:
+of the package's functions called `where`, one has the expression `old` once, and there it becomes
+`new`. Expressions are compared as Python reads them, so that lines may be broken otherwise and
+functions may move; `where` of a C header is its name, and blanks do not count. `breaks` says what is
+wrong then, `tests` which tests must see it. They run in a temporary folder with a copy of the
+package, first as it is, then with each mistake, one process at a time. Exit status 1 if a mistake
+survives.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import os
 import re
 import shutil
@@ -19,7 +24,9 @@ import sys
 import sysconfig
 import time
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -31,36 +38,76 @@ LONGEST = 300.0
 
 @dataclass(frozen=True)
 class Mistake:
-    """One edit of a `file` below `evfem/`, what it breaks, and the tests in `tests/` that must see
-    it.
-    """
+    """One edit of a function, what it breaks, and the tests in `tests/` that must see it."""
 
-    file: str
+    where: str
     old: str
     new: str
     breaks: str
     tests: tuple[str, ...]
 
-    def made_in(self, text: str) -> str:
-        """The text of the file with the mistake; raises ValueError if the table does not fit it."""
-        if (count := text.count(self.old)) != 1:
-            raise ValueError(f"{self.file} has {count} times what becomes: {self.breaks}")
-        return text.replace(self.old, self.new)
+    def made(self, package: Path) -> tuple[Path, str]:
+        """The file of the package that has the mistake, and its text with it; raises ValueError if the
+        table does not fit the package.
+        """
+        made = self._made_in_header if self.where.endswith(".h") else self._made_in_python
+        found = list(made(package))
+        if len(found) != 1:
+            raise ValueError(f"{self.where} has {len(found)} times what becomes: {self.breaks}")
+        return found[0]
+
+    def _made_in_header(self, package: Path) -> Iterator[tuple[Path, str]]:
+        pattern = r"\s*".join(re.escape(word) for word in re.findall(r"\w+|\S", self.old))
+        for path in package.rglob(self.where):
+            text = path.read_text(encoding="utf-8")
+            for found in re.finditer(pattern, text):
+                yield path, text[: found.start()] + self.new + text[found.end() :]
+
+    def _made_in_python(self, package: Path) -> Iterator[tuple[Path, str]]:
+        old, new = ast.dump(_expression(self.old)), self.new
+        for path, function in functions(package).get(self.where, ()):
+            for node in ast.walk(function):
+                if isinstance(node, ast.expr) and ast.dump(node) == old:
+                    yield path, _replaced(path.read_text(encoding="utf-8"), node, f"({new})")
 
     @property
     def possible(self) -> bool:
         """Loops can be compiled only by a compiler."""
-        return not self.file.endswith(".h") or shutil.which("cc") is not None
+        return not self.where.endswith(".h") or shutil.which("cc") is not None
+
+
+def _expression(text: str) -> ast.expr:
+    return ast.parse(text, mode="eval").body
+
+
+def _replaced(text: str, node: ast.expr, new: str) -> str:
+    """A text with another expression in place of a node of its tree."""
+    lines = text.encode().splitlines(keepends=True)
+    assert node.end_lineno is not None
+    begin = sum(map(len, lines[: node.lineno - 1])) + node.col_offset
+    end = sum(map(len, lines[: node.end_lineno - 1])) + (node.end_col_offset or 0)
+    whole = b"".join(lines)
+    return (whole[:begin] + new.encode() + whole[end:]).decode()
+
+
+@cache
+def functions(package: Path) -> dict[str, list[tuple[Path, ast.AST]]]:
+    """The functions and methods of the package by their names, as `function` or `Class.method`."""
+    found: dict[str, list[tuple[Path, ast.AST]]] = {}
+    for path in sorted(package.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+        for prefix, body in [("", tree.body), *((f"{one.name}.", one.body) for one in classes)]:
+            for node in body:
+                if isinstance(node, ast.FunctionDef):
+                    found.setdefault(prefix + node.name, []).append((path, node))
+    return found
 
 
 def mistakes() -> list[Mistake]:
     """The table."""
-    tables = tomllib.loads(TABLE.read_text(encoding="utf-8"))
-    return [
-        Mistake(file, one["old"], one["new"], one["breaks"], tuple(one["tests"]))
-        for file, several in tables.items()
-        for one in several
-    ]
+    tables = tomllib.loads(TABLE.read_text(encoding="utf-8"))["mistake"]
+    return [Mistake(**{**one, "tests": tuple(one["tests"])}) for one in tables]
 
 
 class Copy:
@@ -79,7 +126,7 @@ class Copy:
 
     def run(self, *arguments: str, seconds: float = LONGEST) -> subprocess.CompletedProcess[str]:
         """Python with these arguments in the copy."""
-        words = [sys.executable, *arguments]
+        words = [sys.executable, "-P", *arguments]
         return subprocess.run(
             words,
             cwd=self.folder,
@@ -106,9 +153,9 @@ class Copy:
 
     def test_with(self, mistake: Mistake) -> str | None:
         """The test that sees the mistake, or None."""
-        file = self.package / mistake.file
+        file, damaged = mistake.made(self.package)
         text = file.read_text(encoding="utf-8")
-        self.write(file, mistake.made_in(text))
+        self.write(file, damaged)
         try:
             return self.test(mistake.tests)
         finally:
@@ -118,11 +165,11 @@ class Copy:
         """New text, and nothing left of what was compiled from the old one."""
         file.write_text(text, encoding="utf-8")
         if file.suffix == ".h":
-            name = "solids.c" if file.name.startswith("solid") else "loops.c"
-            source, include = file.with_name(name), sysconfig.get_paths()["include"]
-            compiled = source.with_suffix(".abi3.so")
-            words = ["cc", "-O1", "-shared", "-fPIC", f"-I{include}", str(source), "-o", str(compiled)]
-            subprocess.run(words, check=True, capture_output=True)
+            include = sysconfig.get_paths()["include"]
+            for source in file.parent.glob("*.c"):
+                compiled = source.with_suffix(".abi3.so")
+                words = ["cc", "-O1", "-shared", "-fPIC", f"-I{include}", str(source), "-o", str(compiled)]
+                subprocess.run(words, check=True, capture_output=True)
         shutil.rmtree(file.parent / "__pycache__", ignore_errors=True)
 
 
@@ -140,7 +187,7 @@ def survivors(chosen: list[Mistake]) -> int:
             seen = copy.test_with(mistake)
             survived += seen is None
             seconds = time.perf_counter() - began
-            print(f"{number:3d} {seconds:5.1f} s  {mistake.file}: {mistake.breaks}", flush=True)
+            print(f"{number:3d} {seconds:5.1f} s  {mistake.where}: {mistake.breaks}", flush=True)
             print(f"              {seen or 'SURVIVES'}", flush=True)
     print(f"{len(chosen)} mistakes, {survived} survived")
     return survived
@@ -149,9 +196,9 @@ def survivors(chosen: list[Mistake]) -> int:
 def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description="Mistakes that the tests must see.")
-    parser.add_argument("--only", default="", metavar="WORD", help="those whose file or text has the word")
+    parser.add_argument("--only", default="", metavar="WORD", help="those whose place or text has the word")
     word = parser.parse_args().only
-    chosen = [one for one in mistakes() if one.possible and word in f"{one.file} {one.breaks}"]
+    chosen = [one for one in mistakes() if one.possible and word in f"{one.where} {one.breaks}"]
     if not chosen:
         parser.error(f"no mistake with {word!r} in it")
     return int(survivors(chosen) > 0)
