@@ -103,6 +103,20 @@ LATE = {
 #: compiled from C, without imports
 BUILT = {"evfem.tissue.kernels.loops", "evfem.tissue.kernels.solids"}
 LONGEST_FUNCTION, LONGEST_FILE = 60, 450
+#: files of a folder beside its `__init__`, and lines
+MOST_FILES, MOST_LINES = 12, 3600
+#: folders that are still larger, with their own limits in files and lines: the list only shrinks
+LARGER = {
+    "contact": (24, 4630),
+    "electrostatics": (25, 5260),
+    "plotting": (17, MOST_LINES),
+    "scene": (21, MOST_LINES),
+    "solver": (19, MOST_LINES),
+    "textures": (16, MOST_LINES),
+    "tissue": (15, MOST_LINES),
+}
+#: lines by which a folder may be below its own limit before that must follow
+SLACK = 150
 
 
 def order():
@@ -216,6 +230,31 @@ def test_files_and_functions_stay_short():
                 first = node.body[1] if ast.get_docstring(node) and len(node.body) > 1 else node.body[0]
                 length = node.body[-1].end_lineno - first.lineno + 1
                 assert length <= LONGEST_FUNCTION, f"{name}: {node.name} has {length} lines"
+
+
+def folder_sizes():
+    """Files and lines of every folder with code, by its name below the package."""
+    sizes = {}
+    for path in PACKAGE.rglob("*"):
+        folder = path.parent.relative_to(PACKAGE).as_posix()
+        if path.suffix in (".py", ".pyi", ".c", ".h") and folder.split("/")[0] not in NO_ROOMS:
+            files, lines = sizes.get(folder, (0, 0))
+            counted = path.suffix != ".pyi" and path.name != "__init__.py"
+            sizes[folder] = files + counted, lines + len(path.read_text(encoding="utf-8").splitlines())
+    return sizes
+
+
+def test_folders_stay_small():
+    sizes = folder_sizes()
+    for folder, (files, lines) in sizes.items():
+        most_files, most_lines = LARGER.get(folder, (MOST_FILES, MOST_LINES))
+        assert files <= most_files, f"{folder} has {files} files"
+        assert lines <= most_lines, f"{folder} has {lines} lines"
+    for folder, (most_files, most_lines) in LARGER.items():
+        files, lines = sizes[folder]
+        assert files > MOST_FILES or lines > MOST_LINES, f"{folder} is small: take it off the list"
+        assert files == max(most_files, MOST_FILES), f"{folder} has {files} files: lower its limit"
+        assert lines > most_lines - SLACK or most_lines == MOST_LINES, f"{folder} has {lines} lines: lower it"
 
 
 def called(node):
