@@ -5,7 +5,7 @@ import pytest
 
 import evfem as ev
 from evfem import fieldfiles
-from evfem.mesh import vtu
+from evfem.mesh import formats
 from evfem.simulation.model import make_model
 
 SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
@@ -13,7 +13,7 @@ SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
 
 def written(path):
     """Points (n, 2), cells (m, 4), potential (n,), field (m, 2), layer (m,)."""
-    parts = vtu.read(path.read_bytes())
+    parts = formats.read(path)
     (kind, cells), data = parts.blocks[0], parts.cell_data
     assert kind == "quad"
     field = np.asarray(data["electric_field"][0])

@@ -20,7 +20,7 @@ import numpy as np
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
-from evfem.mesh import formats, msh, vtu
+from evfem.mesh import formats, msh
 from evfem.mesh.formats import LARGEST, Parts, Unreadable
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
 from evfem.mesh.msh import PHYSICAL
@@ -73,11 +73,10 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
 def _parts(path: Path) -> Parts:
     if not path.is_file():
         raise InputError("finger.mesh", str(path), "a mesh file that exists")
-    reader = READERS.get(path.suffix.lower())
     try:
         if path.stat().st_size > LARGEST:
             raise Unreadable(f"more than {LARGEST // 2**20} MB")
-        return formats.read(path) if reader is None else reader(path.read_bytes())
+        return msh.read(path.read_bytes()) if path.suffix.lower() == ".msh" else formats.read(path)
     except (Unreadable, MemoryError) as error:
         reason = " ".join(str(error).split())[:200] or "not enough memory"
         allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
@@ -304,5 +303,4 @@ def _all_facets(mesh: Mesh, name: str) -> Ints:
     return facets
 
 
-READERS: Mapping[str, Callable[[bytes], Parts]] = {".vtu": vtu.read, ".msh": msh.read}
 WRITERS: Mapping[str, Callable[[Mesh, Path], None]] = {".vtu": _write_vtu, ".msh": _write_msh}

@@ -1,15 +1,16 @@
-"""What the readers of mesh files share: the parts of a file, the kinds of cells, and limits.
+"""What the readers of mesh files share: the parts of a file, and limits; and the files that meshio reads.
 
-The readers are strict and small, for files may come from anywhere: no entities, no array longer
-than the file, no loop longer than the file, and no more memory than about fifteen times `LARGEST`.
-Every other format that meshio knows (VTK legacy, Abaqus, MED and so on) is left to meshio, whose
-readers know no limits of memory and time: such files should come from people one trusts.
+meshio reads every format but Gmsh's, for which there is a reader of our own (`evfem.mesh.msh`):
+meshio's takes the last node for one that does not exist, keeps one physical group of two with the
+same name, and refuses entities without a group. meshio knows no limits of memory: a compressed file
+may inflate to far more than `LARGEST`, and should come from people one trusts.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import re
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,10 +20,12 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 
-#: largest mesh file, and largest content of a compressed one, in bytes
+#: largest mesh file in bytes
 LARGEST = 128 * 2**20
-#: most elements and attributes of an XML file, and most physical names
-MOST_ELEMENTS, MOST_NAMES = 100_000, 1_000
+#: most physical names
+MOST_NAMES = 1_000
+#: a document type, and with it entities, in UTF-8 or UTF-16
+DOCUMENT_TYPE = re.compile(rb"<\0?!\0?D")
 
 
 class Unreadable(ValueError):
@@ -78,12 +81,15 @@ def read(path: Path) -> Parts:
 
     if path.suffix.lower() not in meshio.extension_to_filetypes:
         raise Unreadable(f"meshio knows no format {path.suffix or 'without an ending'}")
+    if path.suffix.lower() == ".vtu" and DOCUMENT_TYPE.search(path.read_bytes()):
+        raise Unreadable("a document type")
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             mesh = meshio.read(path)
     except (Exception, SystemExit) as error:  # its readers raise anything, and leave where the file is wrong
-        raise Unreadable(str(error) if isinstance(error, Exception) else said.getvalue()) from error
+        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        raise Unreadable(f"meshio misses {reason}" if isinstance(error, KeyError) else reason) from error
     return Parts(
         points=np.asarray(mesh.points, dtype=float),
         blocks=[(block.type, np.asarray(block.data)) for block in mesh.cells],
