@@ -206,8 +206,8 @@ MSH_4 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n{}\n$EndNodes\n$Elements\
 BOMBS = {
     "entities.vtu": (vtu(head=LAUGHS), "document type"),
     "utf-16.vtu": (vtu(head=LAUGHS).decode().encode("utf-16"), "document type"),
-    "polyhedra.vtu": (vtu(POLYHEDRON), ""),
-    "points.vtu": (vtu().replace(b'Points="1"', b'Points="9999999999"'), ""),
+    "polyhedra.vtu": (vtu(POLYHEDRON), "readable mesh file"),
+    "points.vtu": (vtu().replace(b'Points="1"', b'Points="9999999999"'), "readable mesh file"),
     "nodes.msh": (MSH.format(10**12, VERTEX), "number of nodes"),
     "most.msh": (MSH.format("1e308", VERTEX), "number of nodes"),
     "elements.msh": (MSH.format(1, f"{10**12}\n1 15 2 1 1 1"), "number of elements"),

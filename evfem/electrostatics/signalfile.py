@@ -8,9 +8,8 @@ comment. Units: V, mm, mm/s, Hz.
 
 from __future__ import annotations
 
+import io
 import json
-import struct
-import zlib
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -244,7 +243,7 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
     start = float(profile.position[0])
     middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
     share = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
-    row = b"\0" + np.rint(255.0 * share).astype(np.uint8).tobytes()  # 0: the row is not filtered
+    grey = np.rint(255.0 * share).astype(np.uint8)
     natural, largest = playback.friction or (None, None)
     scale = {
         "format": MAP_FORM,
@@ -255,14 +254,14 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
         "natural_friction": natural,
         "largest_friction": largest,
     }
-    per_metre = max(min(round(1000.0 / playback.pixel), 2**31 - 1), 1)
-    chunks = [
-        (b"IHDR", struct.pack(">IIBBBBB", columns, ROWS, 8, 0, 0, 0, 0)),
-        (b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1)),
-        (b"tEXt", b"Software\0evfem"),
-        (b"tEXt", b"Comment\0" + json.dumps(scale).encode("ascii")),
-        (b"IDAT", zlib.compress(row * ROWS, 9)),
-        (b"IEND", b""),
-    ]
-    framed = (struct.pack(">I", len(c)) + n + c + struct.pack(">I", zlib.crc32(n + c)) for n, c in chunks)
-    return b"\x89PNG\r\n\x1a\n" + b"".join(framed)
+    from PIL import Image, PngImagePlugin
+
+    comments = PngImagePlugin.PngInfo()
+    comments.add_text("Software", "evfem")
+    comments.add_text("Comment", json.dumps(scale))
+    picture = Image.fromarray(np.tile(grey, (ROWS, 1)))
+    # a PNG counts whole pixels per metre in 31 bits, Pillow takes them per inch
+    dpi = 0.0254 * max(min(round(1000.0 / playback.pixel), 2**31 - 1), 1)
+    file = io.BytesIO()
+    picture.save(file, "PNG", dpi=(dpi, dpi), pnginfo=comments, optimize=True)
+    return file.getvalue()
