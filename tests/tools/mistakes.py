@@ -136,14 +136,14 @@ class Copy:
             timeout=seconds,
         )
 
-    def test(self, tests: tuple[str, ...]) -> str | None:
+    def test(self, tests: tuple[str, ...], seconds: float = LONGEST) -> str | None:
         """The first test that fails, or None if all pass."""
         options = ("-x", "-q", "-n", "0", "-m", "not types", "-p", "no:cacheprovider")
         places = [f"tests/{test}" for test in tests]
         try:
-            done = self.run("-m", "pytest", *options, *places)
+            done = self.run("-m", "pytest", *options, *places, seconds=seconds)
         except subprocess.TimeoutExpired:
-            return f"no end within {LONGEST:g} s"
+            return f"no end within {seconds:g} s"
         if done.returncode == 0:
             return None
         failed = re.search(r"^(?:FAILED|ERROR) tests/(.*?)(?: - .*)?$", done.stdout, re.MULTILINE)
@@ -180,7 +180,8 @@ def survivors(chosen: list[Mistake]) -> int:
     survived = 0
     with TemporaryDirectory() as folder:
         copy = Copy(Path(folder))
-        if failed := copy.test(tuple(dict.fromkeys(test for one in chosen for test in one.tests))):
+        tests = tuple(dict.fromkeys(test for one in chosen for test in one.tests))
+        if failed := copy.test(tests, LONGEST * len(tests)):
             raise SystemExit(f"without any mistake {failed} fails")
         for number, mistake in enumerate(chosen, 1):
             began = time.perf_counter()
