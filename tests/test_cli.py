@@ -513,7 +513,7 @@ def uninterrupted(tmp_path_factory):
     return history(folder / "square-out")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_an_interrupted_run_keeps_what_has_converged_and_goes_on_to_the_same_end(
     place, uninterrupted, number
 ):

@@ -217,6 +217,7 @@ def test_an_interrupted_fit_goes_on_where_it_was(path, tmp_path, monkeypatch):
         ev.fit(path, data, {E: (0.02, 0.4)}, out=out, workers=1)
 
 
+@pytest.mark.slow
 def test_processes_find_the_same(path):
     alone, together = (ev.fit(path, measured(path), BOUNDS, workers=n) for n in (1, 2))
     assert together.values == alone.values

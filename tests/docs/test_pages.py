@@ -43,7 +43,7 @@ BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS = "docs/howto/form.md"
 #: pages with so much to compute that `.ci/run` alone runs them
-LONG = {"gallery.md", "howto/fit.md"}
+LONG = {"gallery.md", "howto/element.md", "howto/field.md", "howto/fit.md", "howto/texture.md"}
 #: pages that are still to be filled to the width of the others
 UNFILLED = {"docs/theory.md", FORMS}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`

@@ -94,6 +94,7 @@ def test_the_balance_of_a_soft_hovering_pad_closes_with_the_source():
     assert np.abs(found.electrostatic_work).max() > 0.0
 
 
+@pytest.mark.slow
 def test_a_skin_with_debye_poles_closes_its_balance_and_has_the_mean_of_the_phasor():
     """The balance of a soft pad, the mean of one that is far enough off to be rigid."""
     wet = ev.electrostatics.SKINS["gabriel_wet"].debye(1.0, 1e5)

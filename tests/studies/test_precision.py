@@ -31,6 +31,7 @@ def quick(tmp_path_factory):
     return studies.run("work_precision", quick=True, out=folder), folder
 
 
+@pytest.mark.slow
 def test_errors_of_the_quick_runs(quick):
     numbers = quick[0]["numbers"]
     q1, q2p1 = (numbers[f"A.L0.{element}.error_percent"] for element in ("q1", "q2p1"))
@@ -42,6 +43,7 @@ def test_errors_of_the_quick_runs(quick):
         assert numbers[f"reference.A.Fn_at_{key}"] == pytest.approx(value, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_penalty_error_falls_with_its_stiffness(quick):
     numbers = quick[0]["numbers"]
     soft, stiff = (numbers[f"A.L0.q2p1_penalty_{p:g}.change_percent"] for p in runs_of.PENALTIES)
@@ -49,6 +51,7 @@ def test_penalty_error_falls_with_its_stiffness(quick):
     assert stiff == pytest.approx(soft / 100.0, rel=0.2)  # inversely to the penalty, which grows by 100
 
 
+@pytest.mark.slow
 def test_staggered_coupling_and_plain_packages_change_nothing(quick):
     numbers = quick[0]["numbers"]
     assert numbers["C.L0.q2p1_staggered.change_percent"] < 1e-3
@@ -56,6 +59,7 @@ def test_staggered_coupling_and_plain_packages_change_nothing(quick):
     assert numbers["hover.L0.q2p1_plain.change_percent"] < 1e-6
 
 
+@pytest.mark.slow
 def test_iterations_do_not_grow_with_the_mesh(quick):
     numbers = quick[0]["numbers"]
     assert numbers["A.L1.q2p1.nodes"] > 3.5 * numbers["A.L0.q2p1.nodes"]
@@ -64,6 +68,7 @@ def test_iterations_do_not_grow_with_the_mesh(quick):
     assert numbers["A.L1.q2p1.factorisations"] < 15 * 2
 
 
+@pytest.mark.slow
 def test_models_of_the_hovering_finger(quick):
     numbers = quick[0]["numbers"]
     # 0.40356 mN/mm for the rigid outline (closed form); more, by one or two per cent, for a pad that deforms
@@ -73,6 +78,7 @@ def test_models_of_the_hovering_finger(quick):
     assert numbers["hover.closed_form_plate.error_percent"] > 100.0
 
 
+@pytest.mark.slow
 def test_leaving_out_changes_nothing(quick):
     numbers = quick[0]["numbers"]
     changes = {key: value for key, value in numbers.items() if key.endswith(".change")}
@@ -80,6 +86,7 @@ def test_leaving_out_changes_nothing(quick):
     assert max(changes.values()) < 1e-7
 
 
+@pytest.mark.slow
 def test_shares_of_a_step_add_up(quick):
     numbers = quick[0]["numbers"]
     for phase in shares.PHASES:
@@ -90,6 +97,7 @@ def test_shares_of_a_step_add_up(quick):
     assert numbers["shares.press.share.factorisation"] > 0.0
 
 
+@pytest.mark.slow
 def test_study_leaves_tables_numbers_and_picture(quick):
     result, folder = quick
     names = [f"work_precision.{end}" for end in ("csv", "json", "md", "png")]

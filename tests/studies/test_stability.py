@@ -26,6 +26,7 @@ def quick(tmp_path_factory):
     return studies.run("stability", quick=True, out=folder), folder
 
 
+@pytest.mark.slow
 def test_every_quick_case_ends_as_it_should(quick):
     result, _ = quick
     bad = {
@@ -35,6 +36,7 @@ def test_every_quick_case_ends_as_it_should(quick):
     assert result["numbers"]["good"] == result["numbers"]["cases"] >= 15
 
 
+@pytest.mark.slow
 def test_forces_balance_in_every_step_of_the_quick_cases(quick):
     numbers = quick[0]["numbers"]
     errors = {key: value for key, value in numbers.items() if key.endswith("force_error")}
@@ -42,6 +44,7 @@ def test_forces_balance_in_every_step_of_the_quick_cases(quick):
     assert max(errors.values()) < 1e-6  # of forces down to 1e-6 N/mm
 
 
+@pytest.mark.slow
 def test_study_leaves_table_numbers_and_picture(quick):
     result, folder = quick
     assert sorted(p.name for p in folder.iterdir()) == [
@@ -140,6 +143,7 @@ def area_of(mesh):
     return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
 
 
+@pytest.mark.slow
 def test_picture_splits_groups_between_columns_and_marks_what_failed(quick):
     def found(group, n, outcome="passed"):
         return [

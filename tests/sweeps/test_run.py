@@ -325,7 +325,7 @@ def children(pid):
     return found
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGKILL, pytest.param(signal.SIGINT, marks=pytest.mark.slow)])
 def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
     plan.write_text(LONG)
     out = tmp_path / "out"

@@ -108,7 +108,7 @@ def test_half_of_the_points_left_out_are_met_within_a_twentieth_of_their_range(r
         assert np.nanmedian(error) < 0.05, method
 
 
-@pytest.mark.parametrize("ridged", [False, True])
+@pytest.mark.parametrize("ridged", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_reference_texture_that_is_estimated_badly_has_a_note(ridged):
     bad = [name for name in ("eq-25", "paper", "grating-1mm", "stone") if known_error(name, ridged) > 0.15]
     assert {"eq-25", "paper"} <= set(bad)
@@ -125,7 +125,7 @@ def test_corrections_are_worth_having(ridged):
         assert np.median(error[known] / alone[known]) < 1.0, method
 
 
-@pytest.mark.parametrize("ridged", [False, True])
+@pytest.mark.parametrize("ridged", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_reference_textures_are_estimated_as_well_as_points_left_out(ridged):
     errors = {name: known_error(name, ridged) for name in list(REFERENCES)[::2]}
     assert np.median(list(errors.values())) < 0.1
