@@ -171,7 +171,7 @@ def _texture_options(texture: argparse.ArgumentParser) -> None:
         ("make", "make a texture by a generator", _make_options),
         ("import", "make a texture from a csv file, a WAV, an image or a scan", _import_options),
         ("simulate", "slide a finger over a texture by the full model", _simulate_options),
-        ("estimate", "estimate a friction curve from the database", _estimate_options),
+        ("estimate", "estimate a friction curve from the database", _touch_options),
         ("database", "compute the database of the estimators", _database_options),
     ):
         options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
@@ -270,13 +270,6 @@ def _device_options(command: argparse.ArgumentParser) -> None:
 def _simulate_options(command: argparse.ArgumentParser) -> None:
     _touch_options(command)
     command.add_argument("--exact", action="store_true", help="the voltage by the coupled model itself")
-
-
-def _estimate_options(command: argparse.ArgumentParser) -> None:
-    _touch_options(command)
-    methods = ("best", "average", "linear", "rbf")
-    said = "default: the best one for this finger"
-    command.add_argument("--method", choices=methods, default="best", help=said)
 
 
 def _database_options(command: argparse.ArgumentParser) -> None:

@@ -73,7 +73,7 @@ def answer(state: State) -> dict[str, Any]:
 def _curve(state: State) -> tuple[FrictionCurve, tuple[str, ...]]:
     if state.model is not None:
         return state.model, ()
-    found = estimate(state.texture, state.touch, state.method)
+    found = estimate(state.texture, state.touch)
     return found.curve, found.notes
 
 

@@ -14,9 +14,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
-from evfem.textures.estimate import BEST, CHOICES
 from evfem.textures.feeling import Device, ExactCurve
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import reference
@@ -25,7 +23,7 @@ from evfem.textures.touch import FrictionCurve, Touch
 
 #: most rows of a texture, and of a friction curve, that a page sends
 MOST_ROWS = 2000
-KEYS = ("texture", "touch", "device", "method")
+KEYS = ("texture", "touch", "device")
 ROWS = ("name", "kind", "x", "values", "licence", "quantity", "period", "provenance")
 
 
@@ -35,14 +33,13 @@ class State:
     page has one for this texture and touch, `exact` its voltage for this display as well.
 
     >>> state = parse('{"texture": {"reference": "weave"}, "touch": {"load": 0.04}}')
-    >>> state.texture.name, state.touch.load, state.device.law, state.method
-    ('weave', 0.04, 'kaczmarek', 'best')
+    >>> state.texture.name, state.touch.load, state.device.law
+    ('weave', 0.04, 'kaczmarek')
     """
 
     texture: Texture
     touch: Touch
     device: Device
-    method: str = BEST
     model: FrictionCurve | None = None
     exact: ExactCurve | None = None
 
@@ -58,7 +55,6 @@ def parse(text: str | bytes) -> State:
         _texture(table.get("texture", {"reference": "weave"})),
         _build(Touch, "touch", table.get("touch", {})),
         _build(Device, "device", table.get("device", {})),
-        choice("method", table.get("method", BEST), CHOICES),
         _model(table.get("model")),
         _exact(table.get("exact")),
     )

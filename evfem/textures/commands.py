@@ -155,11 +155,11 @@ def _simulate(given: argparse.Namespace) -> None:
 def _estimate(given: argparse.Namespace) -> None:
     touch, device = touch_of(given), device_of(given)
     _check_outputs(given)
-    found = estimate(find(given.name), touch, given.method)
+    found = estimate(find(given.name), touch)
     _curve(found.curve, given.out)
     if given.name in REFERENCES:
         finger = "ridged" if touch.ridged else "smooth"
-        error = known_error(given.name, touch.ridged, given.method)
+        error = known_error(given.name, touch.ridged)
         print(f"at the usual touch of a {finger} finger it is off the model by {error:.1%} of the range")
     for note in found.notes:
         tell(f"note: {note}")

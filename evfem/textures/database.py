@@ -5,7 +5,7 @@ doi:10.1016/0041-5553(67)90144-9) and the corners of the box, without the 16 at 
 wave is the steepest: sliding snaps from crest to crest there, and takes fifty times longer.
 `compute_database` runs `parametric.scene` of every point; what is finished lies in its folder and
 is not computed again. Beside each curve stand that of the pad that yields linearly (`sliding`), and
-how wrong each estimator is there when it does not know the point: the root mean square of what is
+how wrong the estimator is there when it does not know the point: the root mean square of what is
 left of the friction, over the slope.
 
 The reference textures are slid over too, by both fingers at the usual touch: what an estimate of
@@ -36,7 +36,7 @@ from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.run import answered, compute
 from evfem.textures.correction import corrected, corrections, importance
-from evfem.textures.estimators import METHODS, Estimator, best_kernel, best_width, left_out
+from evfem.textures.estimators import Estimator, best_kernel
 from evfem.textures.library import REFERENCES, reference
 from evfem.textures.parametric import RANGES, SAMPLES, SPEED, Parametric, at, scene
 from evfem.textures.pressed import FILE as PADS
@@ -49,7 +49,7 @@ from evfem.textures.touch import Touch, steps_over, touch_scene
 INNER = 192
 FILE, KERNELS, CURVES = "textures-database.csv", "textures-kernels.csv", "textures-references.csv"
 CURVE, LINEAR = (tuple(f"{name}{i:02d}" for i in range(SAMPLES)) for name in ("mu", "linear"))
-ERRORS = {method: f"error_{method}" for method in METHODS}
+ERROR = "error"
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +58,13 @@ class Database:
     as `linear`, that of a pad that yields linearly.
 
     Sample i is F_t / F_n at x = (i + 1) / SAMPLES wavelengths behind a place where the first sine
-    rises through zero. `errors`: of each method, (N,), NaN where the point is a corner of the hull.
+    rises through zero. `errors` (N,) are those of the estimator that does not know the point.
     """
 
     textures: tuple[Parametric, ...]
     friction: Floats
     linear: Floats
-    errors: Mapping[str, Floats]
+    errors: Floats
     scale: Floats
     smoothing: float
 
@@ -81,22 +81,13 @@ class Database:
     @cached_property
     def estimator(self) -> Estimator:
         """The estimator of corrections at places in the box."""
-        points, responses, weights = self.responses
-        width = best_width(points * self.scale, responses, weights)
-        return Estimator(points, responses, width, self.scale, self.smoothing)
+        points, responses, _ = self.responses
+        return Estimator(points, responses, self.scale, self.smoothing)
 
     @property
-    def relative_errors(self) -> dict[str, Floats]:
-        """Each method's errors (N,) as shares of the range of each curve."""
-        ranges = np.ptp(self.friction, axis=1)
-        return {name: error * self.slope / ranges for name, error in self.errors.items()}
-
-    @property
-    def best(self) -> str:
-        """The method with the smallest mean of these errors, at most 1 each, where all have one."""
-        found = self.relative_errors
-        known = np.all([np.isfinite(error) for error in found.values()], axis=0)
-        return min(found, key=lambda name: float(np.mean(np.minimum(found[name][known], 1.0))))
+    def relative_errors(self) -> Floats:
+        """The errors (N,) as shares of the range of each curve."""
+        return np.asarray(self.errors * self.slope / np.ptp(self.friction, axis=1))
 
     def errors_of(self, responses: Floats) -> Floats:
         """Root mean square error (N,) of the curves with these corrections (N, 3), over the slope."""
@@ -133,16 +124,15 @@ def _samples(texture: Parametric) -> Floats:
 def read(path: Path, ridged: bool) -> Database:
     """The database of one finger in a file that `compute_database` wrote."""
     table = read_table(path, "database")
-    if list(table) != [*RANGES, "ridged", *CURVE, *LINEAR, *ERRORS.values()]:
+    if list(table) != [*RANGES, "ridged", *CURVE, *LINEAR, ERROR]:
         raise InputError("database", f"{path}, with other columns", f"a file called {FILE}")
     of = table["ridged"] == float(ridged)
     rows = np.column_stack([table[name][of] for name in RANGES]).tolist()
     textures = tuple(Parametric(**dict(zip(RANGES, row, strict=True)), ridged=ridged) for row in rows)
     friction, linear = (np.column_stack([table[name][of] for name in names]) for names in (CURVE, LINEAR))
-    errors = {method: table[name][of] for method, name in ERRORS.items()}
     kernels = read_columns(path.with_name(KERNELS), ["ridged", *RANGES, "smoothing"], "database")
     _, *scale, smoothing = np.column_stack(kernels)[int(ridged)].tolist()
-    return Database(textures, friction, linear, errors, np.array(scale), smoothing)
+    return Database(textures, friction, linear, table[ERROR][of], np.array(scale), smoothing)
 
 
 #: where the files are that come with evfem
@@ -241,23 +231,25 @@ def _write(folder: Path, done: Mapping[Parametric, Answer]) -> None:
         words = [f"{value:.4g}" for value in (*scale, smoothing)]
         kernels.append([str(int(ridged)), *words])
         written = np.array([float(word) for word in words])
-        rows += _rows(Database(textures, friction, linear, {}, written[:-1], float(written[-1])), ridged)
+        rows += _rows(
+            Database(textures, friction, linear, np.zeros(0), written[:-1], float(written[-1])), ridged
+        )
     write_text(folder / KERNELS, csv_text([["ridged", *RANGES, "smoothing"], *kernels]))
-    write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, *ERRORS.values()], *rows]))
+    write_text(folder / FILE, csv_text([[*RANGES, "ridged", *CURVE, *LINEAR, ERROR], *rows]))
 
 
 def _rows(database: Database, ridged: bool) -> list[list[str]]:
     """The rows of one finger, with the errors of points that are left out."""
-    found = [database.errors_of(left_out(database.estimator, method)) for method in METHODS]
+    found = database.errors_of(database.estimator.left_out())
     return [
         [
             *(f"{getattr(one, name):.6g}" for name in RANGES),
             str(int(ridged)),
             *(f"{mu:.6f}" for mu in (*curve, *linear)),
-            *(f"{error:.5g}" for error in beside),
+            f"{error:.5g}",
         ]
-        for one, curve, linear, beside in zip(
-            database.textures, database.friction, database.linear, np.transpose(found), strict=True
+        for one, curve, linear, error in zip(
+            database.textures, database.friction, database.linear, found, strict=True
         )
     ]
 

@@ -8,8 +8,8 @@ to the two harmonics of the database that explain most of its heights::
 
 For a texture that repeats, 2 pi / q is a whole fraction of its period; else the best one of
 `TRIED` wavelengths. That what they leave out is not corrected is said. A place outside the database
-is moved to its nearest edge, and said too, as is one outside the hull of its points, where linear
-interpolation does not reach and the average stands in; the model has no such limits. A friction
+is moved to its nearest edge, and said too, as is one outside the hull of its points; the model has
+no such limits. A friction
 profile is taken as it is.
 """
 
@@ -25,7 +25,6 @@ from evfem.common.checks import choice
 from evfem.errors import InputError
 from evfem.textures.correction import corrected
 from evfem.textures.database import Database, reference_curves, shipped
-from evfem.textures.estimators import METHODS, NEAR, hull_weights
 from evfem.textures.library import REFERENCES, reference
 from evfem.textures.parametric import SPEED, Parametric, at
 from evfem.textures.pressed import shipped_pad
@@ -40,9 +39,6 @@ TRIED, ENOUGH, BESIDE = 300, 0.9, 0.125
 MUCH = 0.5
 #: relative distance from the speed of the database that is said
 OTHER_SPEED = 0.05
-#: methods to choose from: by name, or whatever is best
-BEST = "best"
-CHOICES = (BEST, *METHODS)
 MODEL = "the model has no such limit"
 
 
@@ -129,7 +125,6 @@ class Estimate:
     """
 
     curve: FrictionCurve
-    method: str
     notes: tuple[str, ...]
     reduced: Reduced | None = None
 
@@ -139,14 +134,11 @@ class Estimate:
         return not self.notes
 
 
-def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
-    """The apparent friction over `touch.length` by a method of `estimators.METHODS`, or by the one
-    that is best for this finger.
-    """
-    choice("method", method, CHOICES)
+def estimate(texture: Texture, touch: Touch) -> Estimate:
+    """The apparent friction over `touch.length`."""
     if texture.quantity == "friction":
         x, values = _sampled(texture, touch)
-        return Estimate(FrictionCurve(x, values, "as measured"), "as measured", ())
+        return Estimate(FrictionCurve(x, values, "as measured"), ())
     found = reduced(texture)
     steep = 2.0 * np.pi * found.amplitude / found.wavelength
     c, d = (float(np.clip(share, -10.0, 10.0)) for share in (found.in_phase, found.in_quadrature))
@@ -154,31 +146,22 @@ def estimate(texture: Texture, touch: Touch, method: str = BEST) -> Estimate:
     place = np.clip(wanted.point(), 0.0, 1.0)
     near = at(place, touch.ridged)
     database = shipped(touch.ridged)
-    method = database.best if method == BEST else method
-    response, error, inside = _asked(database, place, method)
+    response, error = _asked(database, place)
     x, mu, missing = _friction(texture, touch, near, response)
     notes = _notes(wanted, found, touch)
     if near.slope * error > MUCH * np.ptp(mu):
         notes = (*notes, f"the error of the estimate is more than half of the range that it shows: {MODEL}")
     if missing:
         notes = (*notes, f"no equilibrium was found on {missing:.0%} of the slide: {MODEL}")
-    if not inside:
+    if not database.estimator.holds(place):
         notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
-    curve = FrictionCurve(x, mu, f"estimate ({method})", near.slope * error)
-    return Estimate(curve, method, notes, found)
+    return Estimate(FrictionCurve(x, mu, "estimate", near.slope * error), notes, found)
 
 
-def _asked(database: Database, place: Floats, method: str) -> tuple[Floats, float, bool]:
-    """The correction (3,) at a place (6,), the error of the points near it over the slope, and
-    whether it is inside their hull.
-    """
+def _asked(database: Database, place: Floats) -> tuple[Floats, float]:
+    """The correction (3,) at a place (6,), and the error of the points near it over the slope."""
     estimator = database.estimator
-    inside = hull_weights(estimator.points * estimator.scale, place * estimator.scale) is not None
-    response = estimator(place, method if inside or method != "linear" else "average")
-    errors = database.errors[method]
-    known = np.isfinite(errors)
-    weight = estimator.near(place, NEAR)[known]
-    return response, float(np.sqrt(weight @ errors[known] ** 2 / weight.sum())), inside
+    return estimator(place), float(np.sqrt(estimator.near(place) @ database.errors**2))
 
 
 def _friction(
@@ -196,12 +179,12 @@ def _friction(
     return along, np.interp(along, x, mu, period=period), 1.0 - float(found.mean())
 
 
-def known_error(name: str, ridged: bool, method: str = BEST) -> float:
+def known_error(name: str, ridged: bool) -> float:
     """What an estimate of a reference texture of heights is off by at the usual touch: root mean
     square, as a share of the range of the model's curve.
     """
     x, friction = reference_curves(ridged)[choice("texture", name, tuple(REFERENCES))]
-    curve = estimate(reference(name), Touch(ridged=ridged), method).curve
+    curve = estimate(reference(name), Touch(ridged=ridged)).curve
     wrong = np.interp(x, curve.x, curve.friction) - friction
     return float(np.sqrt(np.mean(wrong**2)) / np.ptp(friction))
 

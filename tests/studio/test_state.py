@@ -36,7 +36,6 @@ DRAWN = {"x": [0.0, 0.5, 1.0, 1.5], "values": [0.0, 0.01, 0.0, -0.01], "licence"
         ({"touch": {"load": "1"}}, "load: given"),
         ({"touch": {"mass": 1.0}}, 'touch: given "mass"'),
         ({"device": {"law": "ohm"}}, "law: given"),
-        ({"method": "guess"}, "method: given"),
         ({"model": {"x": [1.0], "friction": [1.0]}}, "model: given"),
         ({"model": {"x": list(range(20)), "friction": ["a"] * 20}}, "model: given"),
         ({"model": {"x": [0.0] * 20, "friction": [0.3] * 20}}, "model: given"),

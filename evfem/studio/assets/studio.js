@@ -39,7 +39,6 @@ function state() {
       speed: number("speed"), length: number("length")},
     device: {friction: number("display"), law: get("law").value, insulator: get("insulator").value,
       voltage_max: most >= Number(get("voltage_max").max) ? null : most},
-    method: get("method").value,
   };
 }
 
@@ -223,7 +222,7 @@ async function send() {
 }
 
 const FORM = ["reference", "generator", "frequency", "amplitude", "irregularity", "second", "phase", "period", "height",
-  "ridged", "friction", "load", "speed", "length", "display", "law", "insulator", "voltage_max", "method"];
+  "ridged", "friction", "load", "speed", "length", "display", "law", "insulator", "voltage_max"];
 
 function link() {
   const from = chosen(), all = {from};
