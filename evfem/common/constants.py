@@ -41,8 +41,6 @@ STALLED, SLOW           a residual above the first, or above the second times th
                         asks for a new factorisation
 SHORTER, LONGER         and so does a time step outside these multiples of the one it was         texture
                         made for
-ALIKE                   below this residual iterations with a new tangent each are combined too   thin
-                                                                                                  insulators
 STUCK                   a step is given up, after twice as many iterations, if so many of them,   texture
                         the last ones, have no residual below
 FALLING                 this fraction of those before
@@ -102,6 +100,8 @@ DRAG_REST               drag of a rate below this is nearly none: a body that sl
 DRAG_CALMER             what was not at rest is asked again at so much less drag
 DRAG_LEAST              what rests with drag of such a rate, but not without, is given up         snaps
 DRAG_MOST               what fails although drag of such a rate holds the body is no snap
+IMPERFECTION            a release begins so far aside, mm: far above what iterations leave, far   crests
+                        below what is seen
 DRAG_STEPS              steps of a release, failed ones included, before it is given up             snaps
 VERGE, VERGE_LOST       a step that failed where what takes stability away grows so fast,         snaps
                         relative to what holds it, has no equilibrium near; the second, where
@@ -129,7 +129,6 @@ FAINT = 0.01
 WEAK = 1e-4
 STALLED, SLOW = 0.1, 0.5
 SHORTER, LONGER = 0.67, 1.5
-ALIKE = 1e-3
 STUCK = 8
 FALLING = 0.9
 ANDERSON_DEPTH = 3
@@ -159,6 +158,7 @@ COARSER = 4.0
 DRAG_CHANGE, DRAG_GROWTH = 2.0, (1.25, 2.0)
 DRAG_REST, DRAG_CALMER = 0.01, 0.1
 DRAG_LEAST, DRAG_MOST, DRAG_STEPS = 1e-9, 1e6, 400
+IMPERFECTION = 1e-5
 VERGE, VERGE_LOST = 0.9, 0.5
 STAGGERED_LIMIT = 60
 NAMED = 3

@@ -1,1 +1,100 @@
-"""Equilibrium steps: state, factorisation, linearisation, iteration, adaptive parts."""
+r"""Equilibrium steps of a body in contact: the algorithm from the outside in, on one page.
+
+**Problem.** A body with nodal displacements u, its bone translated by b, touches a rigid profile.
+A step goes from an accepted state to a target: a place of the bone or a force on it, a voltage or a
+friction force (`control`). With the gap g of a pad node, its slip s since the accepted state, and
+contact forces :math:`\lambda` along the profile's normal and tangent, the state sought obeys
+
+.. math:: R = f_{int}(u) - f_{el}(u) - \lambda = 0, \qquad
+          g \ge 0,\; \lambda_n \ge 0,\; g\lambda_n = 0, \qquad
+          |\lambda_t| \le \mu\lambda_n,\; \lambda_t = -\mu\lambda_n\,s/|s| \text{ if } s \ne 0 .
+
+With viscosity or inertia :math:`f_{int}` has their forces by backward Euler; another law of friction
+takes the place of :math:`\mu\lambda_n`. A step that fails leaves the accepted state as it was.
+
+**1. A step is cut into parts** (`stepping`; the user's numbers: `strategy`)::
+
+    part <- the length that worked last
+    repeat until the step's end is reached
+        find the equilibrium at the end of the part (2)
+        found: accept it; after few iterations the next part is longer
+        not found: halve the part; from 1/32 of the step on, release the body (5); where it does not
+            come to rest, halve on, and fail at the smallest part
+
+With `steps = "auto"` the length follows the difference of one part and two halves (`path`). A given
+charge of the electrode is brought about by the voltage, in a search around (2) (`voltage`).
+
+**2. One equilibrium** (`equilibrium`)::
+
+    u <- extrapolated along the increment of the last part
+    repeat
+        R <- balance; its residual is the largest free force over the largest reaction
+        residual <= tolerance: accept if the state passes (4)
+        fail if the residual is not finite or stagnates, or after the strategy's iterations
+        u, lambda <- the linear contact step (3)
+
+**3. A linear contact step** (`factorised`). The tangent K of the tissue, often that of an earlier
+iterate, is condensed onto the nodes c that may touch and the bone (`linearisation`,
+`condensation`; PARDISO or SuperLU), and :math:`C = S_{cc}^{-1}`:
+
+.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta b = g_c + \lambda^+ - \lambda + \Delta f_{el}, \qquad
+          S_{bc}\,\Delta u_c + S_{bb}\,\Delta b = g_b + F_b .
+
+Gaps and slips are then linear in the new forces :math:`\lambda^+`, and the laws of contact are
+solved exactly: an active set in the plane, projections and Newton's method in space [1]_ [2]_
+(`evfem.contact.condensed`). Unknown travel of the bone and unknown voltage are solved along::
+
+    factorise K at u if there is no factorisation, it was made for other candidates or another time
+        step, or more than `patience` iterations would be left with it
+    lambda, statuses, travel <- contact on C; without a solution once more with K at u, then fail
+    shorten the bone's travel where it is too long for a linear step (`travel`)
+    u <- u + du; du is halved while a cell's volume ratio falls below 0.05
+    u <- combination with the last iterates (`anderson`) [3]_
+
+Nearly incompressible tissue has its pressure as an unknown beside u (`pressure`).
+
+**4. Acceptance** (`equilibrium`, `interface`). No open node has penetrated, closed gaps, stick, the
+directions of slip and the bounds of friction hold at the present positions, and the controls agree.
+A state is refused whose outline crosses itself, or whose slipping nodes on crests are pushed aside
+harder than the tissue holds them (`evfem.contact.stability`).
+
+**5. Release** (`relaxation`). Where a quasi-static path loses stability, the body goes on under drag
+of a rate s in pseudo-time steps (pseudo-transient continuation [4]_): each is an equilibrium (2) of
+
+.. math:: R(u, \lambda) + f_{drag}(u - u_k;\, s) = 0 .
+
+s falls while the body slows down, and rises after failures. The end is an equilibrium without drag.
+What the drag dissipates is `snap_dissipation`.
+
+**Safeguards**, and what 211 drawn scenes lost without each (version 0.2; factors are those of the sum
+over the scenes in which it acts):
+
+=====================================  ======  =======================================================
+safeguard                              scenes  without it
+=====================================  ======  =======================================================
+friction's growth in the compliance    8       iterations x12.6, factorisations x51
+turning contact forces (`follower`)    23      iterations x2.2, factorisations x4.6
+attraction scaled to what is held      8       iterations x1.9, factorisations x3.8
+gain between rough faces limited       49      4 scenes do not end (`linearisation.steadied`)
+bracketed friction (`slipping`)        12      iterations x1.2, factorisations x1.5
+pins at jumps of friction              1       1 scene does not end (`interface.Pins`)
+release (`relaxation`)                 2       1 scene does not end
+longer parts after a release           4       iterations x2.2 (`stepping`)
+bone's travel limited (`travel`)       9       factorisations x1.3; of bodies in the air x1.3
+factorisations kept (`linearisation`)  173     factorisations x5.2, CPU time x1.65
+worst node first (active set)          73      iterations x1.27
+extrapolated start (`factorised`)      22      iterations x1.13
+stagnation (`strategy.stuck`)          24      iterations x1.08, factorisations x1.2
+combined iterates (`anderson`)         22      factorisations x1.23
+volume ratio kept above 0.05           4       the same ends; 5 tests fail (Poisson's ratio near 1/2)
+stability of what is accepted          5       the same ends; 3 tests find unstable equilibria
+=====================================  ======  =======================================================
+
+Every constant is in `evfem.common.constants`; none decides what is accepted.
+
+.. [1] P. Alart, A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
+   doi:10.1016/0045-7825(91)90022-X.
+.. [2] S. Hueeber, G. Stadler, B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
+.. [3] D. G. Anderson, J. ACM 12 (1965) 547, doi:10.1145/321296.321305.
+.. [4] C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.
+"""

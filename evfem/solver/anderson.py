@@ -1,4 +1,4 @@
-r"""Anderson's acceleration of iterations that use one factorisation for several steps.
+r"""Anderson's acceleration of iterations with an older tangent.
 
 An iteration with an older tangent is a fixed-point map, x -> g(x), that contracts slowly along the
 few directions in which the tangent has changed. With the steps :math:`r_k = g(x_k) - x_k` of the
@@ -7,9 +7,10 @@ last iterations, the next iterate is the affine combination
 .. math:: x_{k+1} = g_k - \sum_j \theta_j\,(g_{k-j+1} - g_{k-j}), \qquad
           \theta = \arg\min \| r_k - \sum_j \theta_j\,(r_{k-j+1} - r_{k-j}) \| .
 
-Closed gaps, stick and slipping shear forces are linear relations between displacements and forces,
-so a combination obeys them too as long as no status has changed. Source: D. G. Anderson, J. ACM 12
-(1965) 547, doi:10.1145/321296.321305.
+New tangents in iterations one after the other give maps that differ little: their iterates are combined
+too. Closed gaps, stick and slipping shear forces are linear relations between displacements and forces,
+so a combination obeys them as long as no status has changed. Source: D. G. Anderson, J. ACM 12 (1965)
+547, doi:10.1145/321296.321305.
 """
 
 from __future__ import annotations

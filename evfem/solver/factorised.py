@@ -15,8 +15,9 @@ The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the
     forces, statuses, extra unknowns <- contact of the linearised body, the voltage solved along if unknown
     if the bone would move too far for a linear step: shorten its travel and solve contact again
     du <- back-substitution; halve it while a sampled volume would shrink below J = 0.05
-    next iterate <- Anderson's combination of the last ones (`evfem.solver.anderson`), unless it goes
-        too far, or the attraction's negative stiffness had to be scaled down
+    next iterate <- Anderson's combination with those before (`evfem.solver.anderson`), unless it goes
+        too far, or the attraction's negative stiffness had to be scaled down; a new tangent after an
+        older one begins anew
 
 If contact has no solution with an older tangent, the iteration is done again with a new one.
 """
@@ -29,7 +30,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import (
-    ALIKE,
     GROWING,
     GROWN,
     KILOVOLT,
@@ -37,7 +37,6 @@ from evfem.common.constants import (
     LOST,
     REACH,
     SHORTEST_FRACTION,
-    SLOW,
     SMALLEST_FORCE,
     SMALLEST_J,
     TURNED,
@@ -68,11 +67,6 @@ class Update:
     u: Floats
     squared: float
     fraction: float
-
-
-def to_and_fro(residuals: list[float]) -> bool:
-    """Whether the last iterations have gained little on those two and more before."""
-    return len(residuals) > 4 and min(residuals[-2:]) > SLOW * min(residuals[-4:-2])
 
 
 class FactorisedBody:
@@ -185,12 +179,9 @@ class FactorisedBody:
 
     def advance(self, old: State, state: State, target: Target, balance: Balance) -> State:
         """The next iterate, with the factorisation at hand if that does and a new one if not."""
-        again, residuals = self._renewed, self.record.residuals
-        columns = not self.linearisation.fringes
-        self._renewed = self.linearisation.refactorise_if_needed(state, residuals)
-        # where new tangents one after the other gain little, their maps are nearly one
-        alike = again and (residuals[-1] < ALIKE or to_and_fro(residuals))
-        if self._renewed and not (alike and columns != self.linearisation.fringes):
+        again = self._renewed
+        self._renewed = self.linearisation.refactorise_if_needed(state, self.record.residuals)
+        if self._renewed and not again:
             self._anderson.reset()
         try:
             after = self._linear_step(old, state, target, balance)

@@ -218,8 +218,8 @@ class Linearisation:
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
-        """Take what weakens the attraction of open nodes that are no candidates off the tangent, as
-        far as it certainly stays positive: a body bears more than its shear modulus over its height.
+        """Subtract the negative attraction stiffness of open nodes that are no candidates, limited so
+        that the matrix stays positive definite: a body bears more than its shear modulus over its height.
         """
         most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
         weakening = np.minimum(self.negative_stiffness(state), most)

@@ -1,10 +1,10 @@
-r"""From a lost equilibrium to the next one: the body is let go from where it is, and held back only
+r"""From a lost equilibrium to the next one: the body is released from where it is, and held back only
 by drag.
 
-Where a quasi-static way loses its stability, the equilibrium ends there however small the part:
-an attraction that grows faster than the tissue's force pulls the finger over the gap, friction
-that falls along the way lets a node go, a ridge jumps from one slope of a texture to the next. The
-equilibrium after the snap may be far away, and iterations of a static problem seldom find it.
+Where a quasi-static path loses stability, the equilibrium ends there however small the part: by
+pull-in, where the attraction grows faster than the tissue's force, by friction that falls along the
+path, or by a ridge that jumps from one slope of a texture to the next. The equilibrium after the snap
+may be far away, and iterations of a static problem seldom find it.
 Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of the part held::
 
     rate <- 1
@@ -16,28 +16,29 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
                 found, it is the end
             lower the rate, or raise it if the speed grows; give up below `DRAG_LEAST`
 
-Why so. *Drag, not inertia*: a release ends at rest only if something takes the energy away, and a
-finger that swings may jump over the equilibrium next to it, so the way would depend on a density
-and a time step; with drag the stored energy, less the work of the loads, can only fall. *Both
-kinds of drag*: a viscous stress holds single nodes, but not a finger that moves as a whole; a mass
-that stands still at the beginning of each step does. *No parameter*: only the ratio s of
-relaxation time and pseudo-time step enters, which is chosen as steps succeed; the way is that of a
-tissue with one relaxation time everywhere and low speed. The steps are equilibria of contact,
+*Drag, not inertia*: a release ends at rest only if something dissipates the energy, and a finger that
+swings may jump over the next equilibrium, so the path would depend on a density and a time step; with
+drag the stored energy, less the work of the loads, can only fall. *Both kinds of drag*: viscosity damps
+relative motion only; a mass that is at rest at the beginning of each step damps rigid motion. *No
+parameter*: only the ratio s of relaxation time and pseudo-time step enters, which is chosen as steps
+succeed; the path is that of a tissue with one relaxation time everywhere at low speed. The steps are
+equilibria of contact,
 friction and attraction like any other, in the scene's own coupling and to its tolerance; friction
 counts from step to step, and what is dissipated is counted by its definitions
 (`evfem.simulation.works`). What comes out at the end is an equilibrium without drag, or nothing.
 
-A hand with a mass or a damper goes on in its own time, and charge flows in its own: in the first step
-of a release. Then the bone stays at that x, and each node keeps its charge, while the tissue, which has no
-time of its own, comes to rest below.
+In the first step of a release a hand with a mass or a damper moves on in its time, and charge flows in
+its own. Then the bone stays at that x, and each node keeps its charge, while the tissue comes to rest.
 
-With a traction that is the derivative of an energy, that energy can only fall on the way, and the
-body comes to rest. The vertical attraction of the paper is none: a node that moves changes what its
-neighbours carry without work (`evfem.contact.attraction`), and a finger without friction on slopes may go
-round for ever, until the steps are used up.
+A symmetric finger on the middle of a crest has an equilibrium there which the least push makes it leave.
+The first step of a release therefore begins `IMPERFECTION` aside.
 
-A wished friction force is not followed on the way, where drag would be part of it: the voltage
-stays as it is until the end.
+An attraction with an energy lets the body come to rest. The vertical attraction of the paper has none: a
+node that moves changes what its neighbours carry without work (`evfem.contact.attraction`), and a finger
+without friction on slopes may go round in circles until the steps are used up.
+
+A prescribed friction force is not followed during a release, where drag would be part of it: the
+voltage stays as it is until the end.
 
 Source: C. T. Kelley and D. E. Keyes, SIAM J. Numer. Anal. 35 (1998) 508,
 doi:10.1137/S0036142996304796 (pseudo-transient continuation).
@@ -59,11 +60,14 @@ from evfem.common.constants import (
     DRAG_MOST,
     DRAG_REST,
     DRAG_STEPS,
+    IMPERFECTION,
 )
 from evfem.solver.control import GivenVoltage, Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.tissue.body import Body
 
+#: a speed (mm) that is none
+TINY = 1e-300
 #: why a release ends in the air
 LIFTED = (
     "there is no equilibrium near here: the finger is pulled with {:.3g} N/mm and lifts off, where the "
@@ -99,37 +103,61 @@ class Relaxation:
             self.body.release(state.u, 0.0)
 
     def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
-        passing = self.charged or (target.hand is not None and target.hand.hand.timed)
-        end, held = target, target if passing else replace(target, duration=0.0)  # a snap takes no time
-        if target.drive.follows:
-            held = replace(held, drive=GivenVoltage(state.voltage))
-        pace = Pace()
+        end, held = target, self._held(state, target)
+        pace, begin = Pace(), state.u + self._imperfection
         for _ in range(DRAG_STEPS):
-            self.body.release(state.u, pace.rate)
-            try:
-                new = self.solve(state, held)
-            except Folded:
-                raise
-            except StepFailed:
-                if pace.failed():
-                    raise
+            new = self._dragged(state, held, begin, pace)
+            if new is None:
                 continue
             accept(state, new)
             if held.duration > 0.0:
                 held, end = (_at_once(new.bone, each) for each in (held, end))
             _refuse_flight(new, held)
-            slows = pace.went(float(np.abs(new.u - state.u).max()))
-            state = new
-            if slows and pace.rate < pace.quiet:
+            pace.went(float(np.abs(new.u - state.u).max()))
+            state, begin = new, new.u
+            if pace.calm:
                 rest = self._rest(state, end)
                 if rest is not None:
                     accept(state, rest)
                     return rest
-                pace.quiet = DRAG_CALMER * pace.rate
+                pace.not_at_rest()
             pace.choose()
             if pace.rate < DRAG_LEAST:
                 break
         raise StepFailed("the released finger does not come to rest", [])
+
+    def _held(self, state: State, target: Target) -> Target:
+        """The loads of the steps with drag: a snap takes no time, but where hand or charge have their own."""
+        if target.drive.follows:
+            target = replace(target, drive=GivenVoltage(state.voltage))
+        timed = self.charged or (target.hand is not None and target.hand.hand.timed)
+        return target if timed else replace(target, duration=0.0)
+
+    def _dragged(self, state: State, target: Target, begin: Floats, pace: Pace) -> State | None:
+        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and a slower pace, where
+        it failed.
+        """
+        self.body.release(begin, pace.rate)
+        try:
+            return self.solve(state, target)
+        except Folded:
+            raise
+        except StepFailed:
+            pace.failed()
+            if pace.rate > DRAG_MOST:
+                raise
+            return None
+
+    @property
+    def _imperfection(self) -> Floats:
+        """A shear (N, dim) by `IMPERFECTION` along x that leaves the top where it is, larger on the right, so
+        that it has a part of symmetric motions and of antisymmetric ones.
+        """
+        points = self.body.space.mesh.points
+        height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
+        depth = (points[:, 1].max() - points[:, 1]) / height
+        shear[:, 0] = IMPERFECTION * depth * (1.0 + points[:, 0] / height)
+        return shear
 
     def _rest(self, state: State, target: Target) -> State | None:
         """The equilibrium without drag, if it is found from here."""
@@ -148,9 +176,7 @@ def _at_once(bone: Floats, target: Target) -> Target:
 
 
 def _refuse_flight(state: State, target: Target) -> None:
-    """Raise `LiftedOff` where nothing touches, the bone is pulled, and the attraction, which only
-    falls on the way up, holds less than that.
-    """
+    """Raise `LiftedOff` if contact is lost and the attraction is smaller than the pull."""
     held, force = -float(state.attraction[:, 1].sum()), pull(state, target)
     if force > max(held, 0.0) and not state.touching.any():
         raise LiftedOff(LIFTED.format(force, held), [])
@@ -163,36 +189,42 @@ def pull(state: State, target: Target) -> float:
 
 @dataclass
 class Pace:
-    """The `rate` of drag of the next step of a release, and below which rate the body may be at rest
-    without, `quiet`.
+    """How a release goes on: the `rate` of drag of the next step, the factor by which it rises if that
+    fails, the last step's `speed` (mm) and its `growth` over the step before. At rates below `quiet` the
+    body may be at rest without drag.
 
     >>> pace = Pace()
-    >>> pace.went(0.4), pace.choose(), pace.rate
-    (False, None, 0.5)
-    >>> pace.went(0.3), pace.failed(), pace.rate
-    (True, False, 1.0)
+    >>> pace.went(0.5), pace.choose(), pace.went(0.25), pace.rate, pace.growth
+    (None, None, None, 0.5, 0.25)
+    >>> pace.failed(), pace.rate, pace.failed(), pace.rate
+    (None, 1.0, None, 4.0)
     """
 
     rate: float = 1.0
-    quiet: float = DRAG_REST
     slower: float = DRAG_CHANGE
-    speed: float = 0.0
+    speed: float = np.inf
     growth: float = 0.0
+    quiet: float = DRAG_REST
 
-    def failed(self) -> bool:
-        """A step failed: the next one is slower. Whether drag holds the body by so much that this is no
-        snap.
-        """
+    def failed(self) -> None:
+        """A step failed: the next one is slower."""
         self.rate, self.slower = self.slower * self.rate, DRAG_CHANGE * self.slower
-        return self.rate > DRAG_MOST
 
-    def went(self, way: float) -> bool:
-        """A step went so far (mm); whether that was not faster than the step before."""
+    def went(self, way: float) -> None:
+        """A step went so far (mm)."""
         before, self.speed, self.slower = self.speed, self.rate * way, DRAG_CHANGE
-        self.growth = self.speed / before if before > 0.0 else 0.0
-        if self.speed > before:
+        self.growth = self.speed / max(before, TINY)
+        if self.growth > 1.0:
             self.quiet = DRAG_REST
-        return self.speed <= before
+
+    @property
+    def calm(self) -> bool:
+        """Whether the body slows down with hardly any drag: it may be at rest."""
+        return self.growth <= 1.0 and self.rate < self.quiet
+
+    def not_at_rest(self) -> None:
+        """Without drag no equilibrium was found: ask again at a lower rate."""
+        self.quiet = DRAG_CALMER * self.rate
 
     def choose(self) -> None:
         """The rate after a step that succeeded: while an instability grows, drag stays above its rate."""

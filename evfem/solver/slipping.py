@@ -24,14 +24,13 @@ HALVINGS = 60
 class Returned:
     """Nodes that have slipped and stick again, or whose speed goes to and fro: `nodes` (P,) bool.
 
-    Friction that rises steeply from rest and levels off has a tangent that, extrapolated back, holds
-    a node at rest which the friction of rest does not: the iterations would let it slip and stick by
-    turns. Where it has a kink, the tangent of either side may lead to the other one. Such a node is
-    seen where the law says its present force, by the tangent there; where it sticks under more than
-    the friction of rest, by the chord from rest to there. If the law says that force of no speed up to
-    the highest that the node has had, it slips along the steepest of the chord of the law from rest,
-    the tangent and the slope that it had last, once near along the tangent; where it sticks,
-    friction rises with its slip as it did last.
+    Extrapolated to zero speed, the tangent of a law that rises steeply from rest and levels off
+    overestimates static friction: the node would slip and stick by turns. At a kink the tangent of
+    either side may lead to the other one. Such a node is placed at the speed at which the law gives its
+    present force, with the tangent there; if it sticks under more than static friction, with the chord
+    from rest to there. If no speed up to the highest that the node has had gives that force, a slipping
+    node takes the steepest of the law's chord from rest, its tangent and the slope of the last
+    iteration, once near the end the tangent; a sticking one the slope of the last iteration.
     """
 
     def __init__(self, size: int) -> None:

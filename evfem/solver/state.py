@@ -109,9 +109,7 @@ class Reusable:
 
 @dataclass(frozen=True)
 class Limits:
-    """When a step counts as solved, how hard it is tried, by how many threads, and the deepest
-    indentation (mm) that will be asked for, 0 where that is not known.
-    """
+    """Tolerance, strategy, threads, and the largest planned indentation in mm (0: unknown)."""
 
     tolerance: float
     strategy: Strategy = field(default_factory=Strategy)
@@ -134,9 +132,9 @@ class Record:
 
 @dataclass(frozen=True)
 class MixedBalance:
-    """The same of displacements and pressure as two unknowns (`evfem.solver.pressure`): the forces
-    (n,) as the older tangent takes them, the largest of them, and how far the pressure of the laws
-    is from the iterate's (E, Q) in MPa.
+    """Residual of the mixed displacement-pressure problem (`evfem.solver.pressure`): the forces (n,)
+    as the older tangent takes them, the largest of them relative to the reaction, and the pressure of
+    the laws less the iterate's (E, Q) in MPa.
     """
 
     forces: Floats

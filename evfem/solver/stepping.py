@@ -5,22 +5,21 @@ Algorithm (`Stepper.follow`)::
     substep <- the one that worked last
     repeat until the end of the path
         solve one equilibrium at `done + substep`
-        if it failed: halve the substep; below `RELEASED` of a step, release the body, which comes to
-            rest at another equilibrium (`evfem.solver.relaxation`); where it does not, halve on, and
-            give up at the strategy's smallest
-        else: accept; if it took few iterations, let the next substep grow
+        if it failed: halve the substep; from `RELEASED` of a step on, release the body, which comes to
+            rest at another equilibrium (`evfem.solver.relaxation`); if it does not, halve on, and fail
+            at the strategy's smallest
+        else: accept; if it took few iterations, the next substep is longer
 
-Where the error of the path is limited, a part is solved as two halves and accepted where one whole
-part ends close enough to them; its length follows that error (`evfem.solver.path`).
+Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
+ends close enough to them; its length follows that error (`evfem.solver.path`).
 
-Nothing that has not converged is kept. After a release the way goes on with the substep that worked
-before; within the same step the next release comes at a part `COARSER` times as long, so that a
-step in which the finger snaps again and again comes to its end.
+Nothing that has not converged is kept. After a release the step goes on with the substep that worked
+before; its next release comes at a part `COARSER` times as long, so that a step in which the finger
+snaps again and again comes to its end.
 
-Staggered rounds have the same equilibria as the monolithic coupling, but may not come to them: the
-attraction of one round, frozen, can pull a node down the slope of a texture. Where they do not
-settle, the part is solved all at once, and so are the rest of the step and every step of a release:
-a body on its way needs many rounds for each of them.
+Staggered rounds have the same equilibria as the monolithic coupling, but may not converge to them: the
+attraction of one round, held, can pull a node down the slope of a texture. If they do not settle, the
+part is solved monolithically, and so are the rest of the step and every step of a release.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ Parts = list[tuple[Target, State]]
 
 
 class Accounts(Protocol):
-    """Who keeps account of the parts that were accepted."""
+    """Receives every accepted part: the bookkeeping of works and energies."""
 
     def accept(self, old: State, new: State) -> None:
         """A part was accepted, from `old` to `new`."""
@@ -100,9 +99,9 @@ class Release:
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
     that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `unsettled` counts the parts that were solved all at once because staggered rounds
-    did not settle, `together` says that those of this step do not. Where the error of the path of a
-    part is limited it is at most `allowed`, and `path_error` the largest accepted.
+    step fails. `unsettled`: parts solved monolithically because staggered rounds did not settle;
+    `together`: whether the rest of this step is. Where the error of the path of a part is limited it
+    is at most `allowed`, and `path_error` the largest accepted.
     """
 
     equilibrium: StepSolver
@@ -196,8 +195,8 @@ class Stepper:
         return False
 
     def _set_length(self, error: float, part: float) -> None:
-        """The next part's length after an accepted one; a rest that was shorter than it could have
-        been says nothing against longer ones.
+        """The next part's length after an accepted one; a part shortened to hit the end of a step does
+        not shorten the next.
         """
         assert self.allowed is not None
         cut = part < (1.0 - 1e-9) * self.substep

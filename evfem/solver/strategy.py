@@ -1,13 +1,9 @@
-"""How hard steps are tried: the numbers behind globalisation and adaptive parts, all in one place.
+"""How hard steps are tried: the numbers of adaptive parts and of their iterations.
 
-A step is one equilibrium from one accepted state to the next. It is tried whole first. Where it
-fails, it is cut into parts: half as long after each failure, longer again after easy ones. What
-makes the iterations of one part hold is not a choice: contact is solved exactly in each of them,
-cells cannot collapse, an attraction that the body cannot hold is followed in small moves or snaps,
-and under a force the bone moves by limited strides. Where short parts fail too, stability is lost:
-the finger is released and comes to rest at another equilibrium (`evfem.solver.relaxation`); if it
-does not, still shorter parts are tried. What happens on the way needs physics instead: `dynamics`
-"viscous" or "inertial" with a speed.
+A step goes from one accepted state to the next. It is tried whole first; a part that fails is halved,
+and after easy ones parts grow again. If short parts fail too, the finger is released and comes to rest
+at another equilibrium (`evfem.solver.relaxation`); if it does not, still shorter parts are tried. What
+happens on the way needs physics instead: `dynamics` "viscous" or "inertial" with a speed.
 
 With steps "auto" the parts are as long as the error of the path allows (`evfem.solver.path`).
 """
@@ -33,17 +29,14 @@ _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 class Strategy:
     """The defaults need no tuning in any scene of `evfem study stability`.
 
-    `iterations`: most of one part; `patience`: renew
-    the factorisation when more iterations than this would be left with the old one;
-    `smallest_part`: of what is left of a requested step, before it counts as not converged, and its
-    square where the step takes time, for tissue with viscosity or inertia is the stiffer the shorter a
-    part;
-    `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`: a
-    part begins at most so many times the last one's displacements ahead (0: at the last state); `relaxation`:
-    where short parts fail, and take no time, the finger is released and comes to rest at another
-    equilibrium; `steps`: "given", each requested step is one part unless that fails,
-    or "auto", where friction or time remember the way each is cut into parts whose error of the
-    path is at most `path_error` of the force.
+    `iterations`: most of one part; `patience`: the factorisation is renewed if more iterations than
+    this would be left with the old one; `smallest_part`: as a share of what is left of a requested step,
+    its square where the step takes time, for tissue with viscosity or inertia is the stiffer the shorter
+    a part; `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`:
+    a part begins at most so many times the last one's displacements ahead (0: at the last state);
+    `relaxation`: whether the finger is released where short parts fail and take no time; `steps`:
+    "given", each requested step is one part unless that fails, or "auto", where friction or time
+    remember the path each is cut into parts whose error of the path is at most `path_error` of the force.
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)
