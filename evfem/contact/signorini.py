@@ -56,6 +56,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -162,7 +163,7 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     not end within `ACTIVE_SET_LIMIT` solves and one per node.
     """
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    met, violated = set[bytes](), np.zeros(0, dtype=np.int64)
+    met, violated = Counter[bytes](), np.zeros(0, dtype=np.int64)
     for solves in range(1, ACTIVE_SET_LIMIT + problem.size + 1):
         force, attraction_drop, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
@@ -174,8 +175,10 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
         violated = np.flatnonzero(wanted != status)
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        one = solves > ACTIVE_SET_LIMIT // 3 or status.tobytes() in met
-        met.add(status.tobytes())
+        met[status.tobytes()] += 1
+        if met[status.tobytes()] > 2:
+            break
+        one = solves > ACTIVE_SET_LIMIT // 3 or met[status.tobytes()] > 1
         changed = violation.argmax() if one else violated
         status = status.copy()
         status[changed] = wanted[changed]
