@@ -178,7 +178,7 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
         met[status.tobytes()] += 1
         if met[status.tobytes()] > 2:
             break
-        one = solves > ACTIVE_SET_LIMIT // 3 or met[status.tobytes()] > 1
+        one = met[status.tobytes()] > 1
         changed = violation.argmax() if one else violated
         status = status.copy()
         status[changed] = wanted[changed]
