@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from evfem.common.arrays import Floats, Ints
 
 
@@ -41,3 +43,20 @@ class AttractionStiffness:
     reference_gap: Floats
     gain_on_closing: Floats
     roughness: Roughness | None = None
+
+
+def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
+    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
+
+    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
+    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
+    """
+    if not gaps.size:
+        return 0.0
+    free = compliance[np.ix_(gaps, gaps)]
+    if held.size:
+        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
+        free = free - compliance[np.ix_(gaps, held)] @ back
+    root = np.sqrt(stiffness)
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])

@@ -66,7 +66,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
-from evfem.contact.attracted import AttractionStiffness
+from evfem.contact.attracted import AttractionStiffness, feedback
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
@@ -220,19 +220,11 @@ def solve_with_attraction(
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
-    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes held."""
-    k, C, stiffness = problem.size, problem.compliance, attraction.negative_stiffness
-    free, closed = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), np.flatnonzero(status != OPEN)
-    if not free.size:
-        return 0.0
-    held = C[np.ix_(free, free)]
-    if closed.size:
-        rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
-        own = problem.under_forces[np.ix_(rows, rows)]
-        held = held - C[np.ix_(free, rows)] @ np.linalg.solve(own, C[np.ix_(rows, free)])
-    root = np.sqrt(stiffness[free])
-    gain = root[:, None] * held * root
-    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
+    """`feedback` where the nodes have these statuses (k,)."""
+    stiffness, open_nodes = attraction.negative_stiffness, status == OPEN
+    gaps = np.flatnonzero(open_nodes & (stiffness > 0.0))
+    held = np.concatenate([np.flatnonzero(~open_nodes), problem.size + np.flatnonzero(status == STICK)])
+    return feedback(problem.compliance, problem.under_forces, gaps, held, stiffness[gaps])
 
 
 def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:
