@@ -43,8 +43,8 @@ ROOMS = {
     ),
     "contact": (
         {"numpy", "scipy"},
-        "friction surfaces textures own pad edge skin charging attraction sight fullfield drivenfield "
-        "changes attracted elimination updated signorini follower condensed coulomb sweeps disc spatial "
+        "friction surfaces textures own pad edge skin charging attraction fullfield drivenfield "
+        "attracted signorini follower condensed coulomb sweeps disc spatial "
         "stability",
     ),
     "solver": (

@@ -46,8 +46,6 @@ STUCK                   a step is given up, after twice as many iterations, if s
 FALLING                 this fraction of those before
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
-HOPELESS                where the body gives way, and between rough faces, an active set with       attraction
-                        more violated nodes after a third of its solves is given up
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
@@ -57,15 +55,10 @@ DISC_OWN                a node's own compliance counts as no less than this frac
 DIVERGED                forces grown by this factor in sweeps are those of no body                attraction
 DISC_ROUNDS             so often before the contact problem is given up                           discs
 DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
-FEW_SOLVES              solves of an active set after which the drops of the attraction are       attraction
-                        eliminated from it
-UPDATED                 share of the closed nodes' unknowns that may be exchanged before they      attraction
-                        are factorised again
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
 LEFT_OVER               least share of a contact force that the tangent leaves where the          attraction
                         attraction between rough faces grows as fast as it
-LOST                    so many such iterations in a row show that nodes are being lost           attraction
 ROUNDING                violations below this fraction of the largest force are rounding
 FIELD_ROUNDING          forces of the full field are known to this fraction of the largest nodal    full field
                         one: changes of 1e-15 mm change them by 4e-13 to 1.4e-10 of it
@@ -133,15 +126,11 @@ STUCK = 8
 FALLING = 0.9
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
-FEW_SOLVES = 2
-UPDATED = 0.1
 DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
 DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
 DISC_OWN, DIVERGED = 0.1, 1e6
-HOPELESS = 12
 STABLE = 0.9
 LEFT_OVER = 0.01
-LOST = 3
 ROUNDING = 1e-12
 FIELD_ROUNDING = 2e-10
 UNHELD = 1e-10

@@ -3,21 +3,17 @@ sees it (`evfem.contact.signorini`).
 
 The attraction p of a node between rough faces grows with what presses it, the contact force
 :math:`\lambda`. The problem knows p at no force, :math:`p_0`, and the tangent at the present force,
-:math:`p + \kappa\,(\lambda' - \lambda)`. The tangent of a concave law is above p_0 at no force, and
-a node that it lifts off stays off. Where p grows faster and faster instead, the tangent is below p_0
-there: a node between the two is lifted off while it is closed and pulled in while it is open, and there
-is no solution. The chord :math:`(p - p_0) / \lambda` instead of the tangent has one, for there it is
-p_0.
+:math:`p + \kappa\,(\lambda' - \lambda)`. The tangent of a concave law is above p_0 at no force: a
+node that it lifts off stays off.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -35,18 +31,6 @@ class Roughness:
         gain, loss = (each.reshape(2, -1)[:, nodes].ravel() for each in (self.gain, self.loss_on_opening))
         return Roughness(gain, loss, self.present[nodes])
 
-    def by_chords(self) -> Roughness:
-        """The same with no node's `gain` above that of the chord from no contact force to the present one;
-        itself, where none is.
-        """
-        k = self.present.size
-        linear, lost = self.gain[:k] * self.present, self.loss_on_opening[:k]
-        convex = linear > (1.0 + ROUNDING) * lost
-        if not convex.any():
-            return self
-        share = np.where(convex, lost / np.where(convex, linear, 1.0), 1.0)
-        return replace(self, gain=np.tile(share, 2) * self.gain)
-
 
 @dataclass(frozen=True)
 class AttractionStiffness:
@@ -59,3 +43,20 @@ class AttractionStiffness:
     reference_gap: Floats
     gain_on_closing: Floats
     roughness: Roughness | None = None
+
+
+def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
+    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
+
+    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
+    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
+    """
+    if not gaps.size:
+        return 0.0
+    free = compliance[np.ix_(gaps, gaps)]
+    if held.size:
+        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
+        free = free - compliance[np.ix_(gaps, held)] @ back
+    root = np.sqrt(stiffness)
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])

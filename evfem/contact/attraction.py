@@ -109,15 +109,6 @@ class Attraction:
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 
-    def begin(self) -> None:
-        """A step begins."""
-
-    def watch(self, position: Floats) -> bool:
-        """See an iterate at `position` (P, dim); whether the forces are those of a fixed choice from now
-        on, which was free before: columns have none.
-        """
-        return False
-
     #: whether `work` is known from an energy
     has_energy = False
     #: whether the forces are more than those of columns

@@ -18,8 +18,7 @@ Algorithm (`LinearContactStep.solve`)::
     free <- candidates' displacements without contact forces, and per unit of each extra unknown
     near <- nodes that touch, would penetrate under the present forces, or are strongly attracted
     repeat
-        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included;
-            where that has no solution, with as much of it as the body holds
+        solve Signorini-Coulomb on `near` (`evfem.contact.signorini`), follower stiffness included
         displacements <- free + C (forces on `near`)
         hit <- other candidates that have penetrated; stop if there are none
         near <- near and hit
@@ -27,8 +26,7 @@ Algorithm (`LinearContactStep.solve`)::
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -45,7 +43,6 @@ from evfem.contact.signorini import (
     OPEN,
     ContactNotSolved,
     ContactProblem,
-    ContactSolution,
     ExtraUnknowns,
     Unstable,
     solve_with_attraction,
@@ -107,28 +104,6 @@ class Candidates:
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         return turned + self.friction_growth(own)[:, None] * axes[:, 1]
 
-    def by_chords(self) -> Candidates:
-        """The same with chords from zero to the present load instead of tangents; itself, where there are
-        none to take.
-
-        Friction: the tangent of a concave law has friction at zero load (`cohesion`), an open node has
-        none. Where that friction lifts a node off, and without it the node sinks in, the problem has no
-        solution. The law itself vanishes with the load, and so does its chord.
-
-        Rough faces: where the attraction grows faster and faster with the load, its tangent puts it too
-        low at zero load. Where that lifts a node off, and the attraction of the open node pulls it in
-        again, there is no solution either.
-        """
-        known, cohesion = self, np.zeros_like(self.friction) if self.cohesion is None else self.cohesion
-        pressed = (self.force[:, 0] > 0.0) & (cohesion > 0.0)
-        if pressed.any():
-            chord = cohesion / np.where(pressed, self.force[:, 0], 1.0)
-            friction = np.where(pressed, self.friction + chord, self.friction)
-            known = replace(known, friction=friction, cohesion=np.where(pressed, 0.0, cohesion))
-        if self.roughness is not None and (chords := self.roughness.by_chords()) is not self.roughness:
-            known = replace(known, roughness=chords)
-        return known
-
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force per x displacement, (c,)."""
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
@@ -142,7 +117,7 @@ class Candidates:
 class StepSolution:
     """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses
     (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
-    had to be scaled down, or what turns with the profile.
+    had to be scaled down.
     """
 
     moved: Floats
@@ -151,7 +126,6 @@ class StepSolution:
     extra: Floats
     solves: int
     reduced: bool
-    weakened: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +188,7 @@ class LinearContactStep:
     displacement comes back.
 
     `residual` g (m,) of the forward solve; `bone` (dim,) the bone's known increment; `unknowns` what
-    else moves the body; `snap`: nodes that the attraction pulls over the gap close at once;
-    `timed`: time passes, or drag slows a release, and a shorter step is held by viscosity or inertia,
-    a slower one by drag, where one without them must go the way it is pushed.
+    else moves the body.
     """
 
     body: CondensedTangent
@@ -224,8 +196,6 @@ class LinearContactStep:
     residual: Floats
     bone: Floats
     unknowns: tuple[ExtraUnknown, ...] = ()
-    snap: bool = False
-    timed: bool = False
 
     def solve(self) -> StepSolution:
         """Contact among the candidates, their motion, and the extra unknowns."""
@@ -256,7 +226,7 @@ class LinearContactStep:
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
         grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim]
         force[:, 1] += np.where(status != OPEN, grown, 0.0)
-        return StepSolution(moved, force, status, found.extra, solves, found.reduced, found.weakened)
+        return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
         """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step
@@ -305,32 +275,12 @@ class LinearContactStep:
     def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[Any, Floats]:
         """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y
         before x, that move the body, those of the follower stiffness included.
-        """
-        own = np.diagonal(self.body.compliance)[0::2]
-        follower = FollowerStiffness.of(self.candidates.follower_rate(own)[near])
-        try:
-            return self._solve_following(near, free, status, follower)
-        except ContactNotSolved as failed:
-            if (by_chords := self.candidates.by_chords()) is not self.candidates:
-                with suppress(ContactNotSolved):
-                    return replace(self, candidates=by_chords)._solve_following(near, free, status, follower)
-            if self.timed:
-                raise
-            held = self.candidates.axes[near], status, self.candidates.friction[near]
-            for weaker in follower.weaker(self.body.among(near), *held):
-                with suppress(ContactNotSolved):
-                    found, pushed = self._solve_following(near, free, status, weaker)
-                    return replace(found, weakened=True), pushed
-            raise failed
-
-    def _solve_following(
-        self, near: Ints, free: Floats, status: Ints, follower: FollowerStiffness
-    ) -> tuple[ContactSolution, Floats]:
-        """The same with this follower stiffness.
 
         What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
         friction that rises with the speed for example, multiplies that and not the whole free motion.
         """
+        own_x = np.diagonal(self.body.compliance)[0::2]
+        follower = FollowerStiffness.of(self.candidates.follower_rate(own_x)[near])
         known, rows = self.candidates, y_before_x(near)
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
@@ -354,7 +304,7 @@ class LinearContactStep:
             None if known.roughness is None else known.roughness.of(near),
         )
         try:
-            found = solve_with_attraction(problem, attraction, status, self.snap)
+            found = solve_with_attraction(problem, attraction, status)
         except ContactNotSolved as error:
             if follower.loaded.size and problem.gives_way:
                 raise Unstable(LOST_STABILITY) from error

@@ -101,7 +101,7 @@ class Forces:
 class DiscSolution:
     """Contact forces and drops of the attraction (3 k,), statuses (k,), the extra unknowns (p,),
     new gaps and slips (3 k,), the number of dense solves, and whether the negative stiffness had
-    to be scaled down, or what turns with the surface.
+    to be scaled down.
     """
 
     force: Floats
@@ -111,7 +111,6 @@ class DiscSolution:
     state: Floats
     solves: int
     reduced: bool = False
-    weakened: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,7 @@ from evfem.common.constants import (
     ROUNDING,
     STABLE,
 )
-from evfem.contact.attracted import AttractionStiffness
+from evfem.contact.attracted import AttractionStiffness, feedback
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution, Forces, Projected, projected
 from evfem.contact.signorini import OPEN, STICK, ContactNotSolved
 from evfem.contact.sweeps import sweeps
@@ -285,34 +285,21 @@ def solve_attracted_disc(
     gain = root[:, None] * problem.compliance[::3, ::3] * root
     if np.abs(gain).sum(axis=1).max() < STABLE:
         return solve_disc(attracted, force)
-    if feedback(problem, stiffness, status) < STABLE:
+    if _feedback(problem, stiffness, status) < STABLE:
         try:
             found = solve_disc(attracted, force)
         except ContactNotSolved:
             pass
         else:
-            if feedback(problem, stiffness, found.status) < 1.0:
+            if _feedback(problem, stiffness, found.status) < 1.0:
                 return found
-    largest = max(feedback(problem, stiffness, way) for way in (np.full(problem.size, OPEN), status))
+    largest = max(_feedback(problem, stiffness, way) for way in (np.full(problem.size, OPEN), status))
     scaled = replace(attraction, negative_stiffness=STABLE / max(STABLE, largest) * stiffness)
     return replace(solve_disc(replace(problem, attraction=scaled), force), reduced=True)
 
 
-def feedback(problem: DiscProblem, stiffness: Floats, status: Ints) -> float:
-    """Largest factor by which the attraction of the open nodes, weakening by `stiffness` (k,) per
-    gap, returns to itself, the closed nodes held.
-    """
-    free = np.flatnonzero((status == OPEN) & (stiffness > 0.0))
-    if not free.size:
-        return 0.0
-    C = problem.compliance
-    held = C[np.ix_(3 * free, 3 * free)]
-    stick = 3 * np.flatnonzero(status == STICK)
-    rows = np.concatenate([3 * np.flatnonzero(status != OPEN), stick + 1, stick + 2])
-    if rows.size:
-        held = held - C[np.ix_(3 * free, rows)] @ np.linalg.solve(
-            C[np.ix_(rows, rows)], C[np.ix_(rows, 3 * free)]
-        )
-    root = np.sqrt(stiffness[free])
-    gain = root[:, None] * held * root
-    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
+def _feedback(problem: DiscProblem, stiffness: Floats, status: Ints) -> float:
+    """`feedback` where the nodes have these statuses (k,)."""
+    free, stick = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), 3 * np.flatnonzero(status == STICK)
+    held = np.concatenate([3 * np.flatnonzero(status != OPEN), stick + 1, stick + 2])
+    return feedback(problem.compliance, problem.compliance, 3 * free, held, stiffness[free])

@@ -34,7 +34,6 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import Pad, surface_state
-from evfem.contact.sight import Sight
 from evfem.electrostatics.bounds import columns_sum, least_upper_sum
 from evfem.electrostatics.columns import Capacitance, Columns, Nearby
 from evfem.electrostatics.laws import Layer, eps_0
@@ -50,6 +49,8 @@ AIR = np.linspace(0.0, 1.0, 5)
 SKIN = np.linspace(0.0, 1.0, 6) ** 2
 #: share by which a discrete capacitance may miss its bounds
 MARGIN = 1e-3
+#: columns follow an outline up to this slope
+STEEP = 6.0
 #: columns below an edge with a middle node
 PARTS = 4
 #: solutions that are remembered
@@ -57,6 +58,27 @@ KEPT = 3
 #: nodes of a line that are moved at once for differences: one of so many, by this length (mm), small
 #: beside the gap that touching nodes keep
 APART, MOVED = 8, 1e-9
+
+
+def in_sight(places: Floats) -> Ints:
+    """Which of the places (L, 2) of an outline, from left to right, the display sees: at them stand
+    columns (K,). Of two neighbours along a slope above `STEEP` the higher one is behind an overhang, or
+    deep in a groove.
+
+    >>> in_sight(np.array([[0.0, 0.0], [1.0, 0.0], [0.9, 0.5], [2.0, 0.0]])).tolist()
+    [0, 1, 3]
+    """
+    apart, rise = np.diff(places, axis=0).T
+    if np.all(apart > 0.0) and np.all(apart >= np.abs(rise) / STEEP):
+        return np.arange(len(places))
+    x, y = places.T.tolist()
+    kept: list[int] = []
+    for k in range(len(x)):
+        while kept and x[k] - x[kept[-1]] < (y[kept[-1]] - y[k]) / STEEP and y[k] < y[kept[-1]]:
+            kept.pop()
+        if not kept or x[k] - x[kept[-1]] > max(0.0, (y[k] - y[kept[-1]]) / STEEP):
+            kept.append(k)
+    return np.array(kept)
 
 
 def facing(pad: Pad, points: Floats) -> Ints:
@@ -124,7 +146,6 @@ class FieldAttraction(Attraction):
     edges: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     skin: Any = None
     floating: bool = False
-    sight: Sight = field(default_factory=Sight)
     solved: OrderedDict[bytes, tuple[Capacitance | None, Floats]] = field(default_factory=OrderedDict)
 
     @property
@@ -246,7 +267,7 @@ class FieldAttraction(Attraction):
 
     def _remembered(self, position: Floats, pressing: Floats | None) -> tuple[Capacitance | None, Floats]:
         """Field and forces, anew where they are not among the last `KEPT`."""
-        key = position.tobytes() + (b"" if self.sight.kept is None else self.sight.kept.tobytes())
+        key = position.tobytes()
         if self.roughness is not None and pressing is not None:
             key += pressing.tobytes()
         found = self.solved.get(key)
@@ -334,17 +355,9 @@ class FieldAttraction(Attraction):
             return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
         return Columns((insulator, gap), (INSULATOR, AIR))
 
-    def begin(self) -> None:
-        """A step begins: where columns stand is free again."""
-        self.sight.begin()
-
-    def watch(self, position: Floats) -> bool:
-        """See an iterate at `position` (P, 2); whether its columns are kept from now on."""
-        return self.sight.watch(self._lines @ position)
-
     def seen(self, position: Floats) -> Any:
-        """The lines (sparse, L x P) at which columns stand (`evfem.contact.sight`)."""
-        kept = self.sight.of(self._lines @ position)
+        """The lines (sparse, L x P) at which columns stand, those that the display sees."""
+        kept = in_sight(self._lines @ position)
         return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
     def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:

@@ -21,8 +21,7 @@ has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A 
 none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
 only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
 closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. Tangent of a concave law, the first never falls below the second: one of the two holds; for
-another law chords see to that (`evfem.contact.attracted`).
+gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
 
 Algorithm (`solve_contact`), a primal-dual active set::
 
@@ -32,15 +31,8 @@ Algorithm (`solve_contact`), a primal-dual active set::
         gaps, slips <- start + C (forces + drops) + e d
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
-        change all violated nodes, or one of them (`evfem.contact.changes`); give up where that goes
-            round in a circle, or many are left when one at a time begins and the body gives way or
-            the attraction grows with the contact forces
-    start again from all nodes sticking, then from all open, before giving up
-
-After a few solves the drops of the attraction are taken out of the equations
-(`evfem.contact.elimination`), and the closed nodes are what is left to solve for, with one
-factorisation for statuses that differ in few nodes (`evfem.contact.updated`); the solution that is
-returned is always one of the whole equations.
+        change all violated nodes; the worst one alone where these statuses have been met before,
+            and always after a third of the solves
 
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
 slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
@@ -52,7 +44,7 @@ A bound of friction that is no multiple of the contact force (`evfem.contact.fri
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
 
 If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
-solution; its negative stiffness is then scaled to 0.9 of the critical value
+solution, or the wrong one; its negative stiffness is then scaled to 0.9 of the critical value
 (`solve_with_attraction`).
 
 Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175,
@@ -64,6 +56,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 
 from __future__ import annotations
 
+from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -72,11 +65,8 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, FEW_SOLVES, HOPELESS, ROUNDING, STABLE
-from evfem.contact.attracted import AttractionStiffness
-from evfem.contact.changes import Changes
-from evfem.contact.elimination import Elimination, Motions, bordered
-from evfem.contact.updated import ClosedNodes, Relations
+from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
+from evfem.contact.attracted import AttractionStiffness, feedback
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
 
@@ -141,12 +131,6 @@ class ContactProblem:
             return True
 
     @property
-    def seldom_ends(self) -> bool:
-        """Whether an active set seldom ends that has many violated nodes left when one at a time begins."""
-        rough = None if self.attraction is None else self.attraction.roughness
-        return self.gives_way or (rough is not None and bool(rough.gain.any()))
-
-    @property
     def resists(self) -> Any:
         """Which nodes have friction (k,) bool."""
         rough = self.friction > 0.0
@@ -157,41 +141,12 @@ class ContactProblem:
         limit = self.friction * normal
         return limit if self.cohesion is None else limit + self.cohesion
 
-    def solved(self, status: Ints) -> tuple[Floats, Floats, Floats]:
-        """Contact forces (2 k,), drops (2 k,) and extra unknowns (p,) for given statuses."""
-        return _solve_statuses(self, status)
-
-    @cached_property
-    def elimination(self) -> Elimination | None:
-        """The problem without the drops of the attraction; None where it has none, rough faces make
-        them depend on the contact forces, or the interface gives way.
-        """
-        attraction, extra, none = self.attraction, self.extra_unknowns, np.zeros((2 * self.size, 0))
-        if attraction is None or attraction.roughness is not None or self.give is not None:
-            return None
-        if not attraction.negative_stiffness.any():
-            return None
-        bone = (none, none.T, np.zeros((0, 0)), np.zeros(0))
-        if extra is not None:
-            bone = (extra.columns, extra.rows, extra.pivot, extra.right)
-        whole = Motions(self.start, self.compliance, *bone)
-        try:
-            return Elimination.of(whole, attraction.negative_stiffness, attraction.reference_gap)
-        except np.linalg.LinAlgError:
-            return None
-
-    @cached_property
-    def closed_nodes(self) -> ClosedNodes:
-        """What solves for the closed nodes without the drops."""
-        assert self.elimination is not None
-        return ClosedNodes(self.elimination.left)
-
 
 @dataclass(frozen=True)
 class ContactSolution:
     """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns
     (p,), new gaps and slips (2 k,), the number of dense solves, and whether the negative stiffness
-    had to be scaled down, or what turns with the profile.
+    had to be scaled down.
     """
 
     force: Floats
@@ -201,32 +156,16 @@ class ContactSolution:
     state: Floats
     solves: int
     reduced: bool = False
-    weakened: bool = False
 
 
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
-    """Signorini-Coulomb, started from `status` (k,) and, should that cycle, from all nodes sticking
-    or all open; raises `ContactNotSolved` when none of them ends within `ACTIVE_SET_LIMIT` solves and
-    one per node, or the body gives way.
+    """Signorini-Coulomb, started from `status` (k,); raises `ContactNotSolved` when the active set does
+    not end within `ACTIVE_SET_LIMIT` solves and one per node.
     """
-    most, failed = ACTIVE_SET_LIMIT + problem.size, ContactNotSolved("")
-    for start in (status, np.full(problem.size, STICK), np.full(problem.size, OPEN)):
-        try:
-            return _active_set(problem, start, most)
-        except ContactNotSolved as error:
-            failed = error
-            if problem.gives_way:  # other starts rarely find more, and cost as much
-                break
-    raise failed
-
-
-def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolution:
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    changes, violated, whole = Changes(), np.zeros(0, dtype=np.int64), False
-    for solves in range(1, most + 1):
-        fewer = not whole and solves > FEW_SOLVES and problem.elimination is not None
-        solved = _solve_closed if fewer else _solve_statuses
-        force, attraction_drop, extra = solved(problem, status)
+    met, violated = Counter[bytes](), np.zeros(0, dtype=np.int64)
+    for solves in range(1, ACTIVE_SET_LIMIT + problem.size + 1):
+        force, attraction_drop, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
         if problem.give is not None:
             state = state + problem.give * force
@@ -234,31 +173,27 @@ def _active_set(problem: ContactProblem, status: Ints, most: int) -> ContactSolu
             state = state + problem.extra_unknowns.columns @ extra
         wanted, violation = _next_statuses(problem, status, force, state)
         violated = np.flatnonzero(wanted != status)
-        if fewer and not violated.size:
-            whole = True
-            continue
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        if solves == ACTIVE_SET_LIMIT // 3 and violated.size > HOPELESS and problem.seldom_ends:
+        met[status.tobytes()] += 1
+        if met[status.tobytes()] > 2:
             break
-        picked = changes.picked(status, violated, violation)
-        if not picked.size:
-            break
+        one = met[status.tobytes()] > 1
+        changed = violation.argmax() if one else violated
         status = status.copy()
-        status[picked] = wanted[picked]
+        status[changed] = wanted[changed]
     raise ContactNotSolved(f"{violated.size} of {problem.size} nodes keep changing")
 
 
 def solve_with_attraction(
-    problem: ContactProblem, attraction: AttractionStiffness, status: Ints, snap: bool = False
+    problem: ContactProblem, attraction: AttractionStiffness, status: Ints
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted.
 
     If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
     linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
     `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, or where that does not do, of the much softer one without them. With
-    `snap` the nodes that are being lost close instead.
+    closed nodes hold it, or where that does not do, of the much softer one without them.
     """
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
         return solve_contact(problem, status)
@@ -267,58 +202,29 @@ def solve_with_attraction(
     gain = root[:, None] * problem.compliance[: problem.size, : problem.size] * root
     if np.abs(gain).sum(axis=1).max() < STABLE:
         return solve_contact(attracted, status)
-    for start in (status, _snapped(problem, attraction, status)) if snap else (status,):
-        try:
-            found = _active_set(attracted, start, ACTIVE_SET_LIMIT)
-        except ContactNotSolved:
-            continue
-        if _feedback(problem, attraction, found.status)[0] < 1.0:
+    with suppress(ContactNotSolved):
+        found = solve_contact(attracted, status)
+        if _feedback(problem, attraction, found.status) < 1.0:
             return found
-    most = STABLE
-    for way in (status, np.full(problem.size, OPEN)):
-        most = max(most, _feedback(problem, attraction, way)[0])
-        scaled = replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
-        weaker = replace(problem, attraction=scaled)
-        with suppress(ContactNotSolved):
-            found = _active_set(weaker, status, ACTIVE_SET_LIMIT)
-            if _feedback(problem, scaled, found.status)[0] < 1.0:
-                return replace(found, reduced=True)
-    if problem.gives_way:  # other starts rarely find more, and cost as much
-        raise ContactNotSolved("the body gives way the more, the more it is loaded")
-    return replace(solve_contact(weaker, status), reduced=True)
+
+    def scaled(most: float) -> AttractionStiffness:
+        return replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
+
+    most = max(STABLE, _feedback(problem, attraction, status))
+    with suppress(ContactNotSolved):
+        found = solve_contact(replace(problem, attraction=scaled(most)), status)
+        if _feedback(problem, scaled(most), found.status) < 1.0:
+            return replace(found, reduced=True)
+    most = max(most, _feedback(problem, attraction, np.full(problem.size, OPEN)))
+    return replace(solve_contact(replace(problem, attraction=scaled(most)), status), reduced=True)
 
 
-def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> tuple[float, Floats]:
-    """Largest factor by which the attraction of the open nodes returns to itself, the closed nodes
-    held, and the gaps (k,) that grow with it.
-    """
-    k, C, stiffness = problem.size, problem.compliance, attraction.negative_stiffness
-    free, closed = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), np.flatnonzero(status != OPEN)
-    mode = np.zeros(k)
-    if not free.size:
-        return 0.0, mode
-    held = C[np.ix_(free, free)]
-    if closed.size:
-        rows = np.concatenate([closed, k + np.flatnonzero(status == STICK)])
-        own = problem.under_forces[np.ix_(rows, rows)]
-        held = held - C[np.ix_(free, rows)] @ np.linalg.solve(own, C[np.ix_(rows, free)])
-    root = np.sqrt(stiffness[free])
-    gain = root[:, None] * held * root
-    factors, modes = np.linalg.eigh(0.5 * (gain + gain.T))
-    mode[free] = modes[:, -1] / root
-    return float(factors[-1]), mode
-
-
-def _snapped(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> Ints:
-    """Statuses (k,) with those open nodes closed that move most in the mode that is being lost, if
-    it is on its way to the surface.
-    """
-    factor, mode = _feedback(problem, attraction, status)
-    drift = solve_contact(problem, status).state[: problem.size] - attraction.reference_gap
-    if factor < 1.0 or drift @ (attraction.negative_stiffness * mode**2) >= 0.0:
-        return status
-    lost = (np.abs(mode) > 0.5 * np.abs(mode).max()) & (drift < 0.0)
-    return np.where(lost, STICK, status)
+def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
+    """`feedback` where the nodes have these statuses (k,)."""
+    stiffness, open_nodes = attraction.negative_stiffness, status == OPEN
+    gaps = np.flatnonzero(open_nodes & (stiffness > 0.0))
+    held = np.concatenate([np.flatnonzero(~open_nodes), problem.size + np.flatnonzero(status == STICK)])
+    return feedback(problem.compliance, problem.under_forces, gaps, held, stiffness[gaps])
 
 
 def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:
@@ -365,7 +271,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
         row = extra.rows[:, rows]
         row[:, : active.size] *= 1.0 - gain
         row[:, : active.size] += extra.rows[:, k + active] * sheared
-        matrix = bordered(matrix, extra.columns[rows], row, extra.pivot)
+        matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
         right = np.append(right, extra.right - extra.rows @ known)
     try:
         x = np.linalg.solve(matrix, right)
@@ -380,28 +286,6 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     if problem.cohesion is not None:
         force[k:] += problem.cohesion * against
     return force, drop, x[rows.size :]
-
-
-def _solve_closed(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
-    """The same as `_solve_statuses`, with the drops of the attraction eliminated."""
-    elimination, attraction, k = problem.elimination, problem.attraction, problem.size
-    assert elimination is not None
-    assert attraction is not None
-    against = (status == BACKWARD).astype(float) - (status == FORWARD)
-    ratio = problem.friction * against
-    # what a contact force is above the force that pushes beside the drops
-    above = attraction.gain_on_closing - attraction.negative_stiffness * attraction.reference_gap
-    shear = ratio * above if problem.cohesion is None else ratio * above + problem.cohesion * against
-    try:
-        force, extra = problem.closed_nodes.solved(Relations(status != OPEN, status == STICK, ratio, shear))
-    except np.linalg.LinAlgError as error:
-        raise ContactNotSolved(str(error)) from error
-    drop, active = np.zeros(2 * k), np.flatnonzero(status != OPEN)
-    drop[elimination.attracted] = elimination.drops(force, extra)
-    drop[active] = -attraction.gain_on_closing[active]
-    force = force.copy()
-    force[active] += above[active]
-    return force, drop, extra
 
 
 def _next_statuses(

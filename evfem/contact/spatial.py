@@ -10,8 +10,7 @@ coefficient that has a slope over x: :math:`df = T\,dx` with three components fo
 
 from __future__ import annotations
 
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -22,7 +21,7 @@ from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution
 from evfem.contact.disc import solve_attracted_disc
-from evfem.contact.signorini import ContactNotSolved, ExtraUnknowns
+from evfem.contact.signorini import ExtraUnknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +99,6 @@ class Turning:
         through[:, 3 * self.loaded] = self._through(rows)
         return through
 
-    def weaker(self, C: Floats) -> Turning | None:
-        """This stiffness scaled down to what the body with the compliance C (3 k, 3 k) holds; None
-        if it holds all of it.
-        """
-        if not self.loaded.size:
-            return None
-        feedback = self._through(C)[3 * self.loaded]
-        largest = float(np.linalg.eigvals(feedback).real.max(initial=0.0))
-        return replace(self, rate=STABLE / largest * self.rate) if largest > STABLE else None
-
 
 @dataclass(frozen=True, eq=False)
 class SpatialContactStep(LinearContactStep):
@@ -125,19 +114,6 @@ class SpatialContactStep(LinearContactStep):
         """
         own = np.diagonal(self.body.compliance)[0::3]
         turning = Turning.of(self.candidates.follower_rate(own)[near])
-        try:
-            return self._solve_turning(near, free, status, turning)
-        except ContactNotSolved:
-            weaker = None if self.timed else turning.weaker(self.body.among(near))
-            if weaker is not None:
-                with suppress(ContactNotSolved):
-                    found, pushed = self._solve_turning(near, free, status, weaker)
-                    return replace(found, weakened=True), pushed
-            raise
-
-    def _solve_turning(
-        self, near: Ints, free: Floats, status: Ints, turning: Turning
-    ) -> tuple[DiscSolution, Floats]:
         known, rows = self.candidates, self.body.rows(near)
         C, W = turning.apply(self.body.among(near), free[rows])
         axes = known.axes[near]

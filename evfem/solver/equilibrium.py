@@ -185,14 +185,10 @@ class Equilibrium(Statics):
         target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.drive.begin(old)
-        if self.attraction is not None:
-            self.attraction.begin()
         state = self.body.begin(old, target, frozen is not None, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0
         for iteration in range(self.strategy.iterations):
-            if self._keeps_columns(state, frozen):
-                changed = iteration
             attraction = self.attraction_at(old, state, state.voltage) if frozen is None else frozen
             state, balance = self.body.balance(state, attraction, target)
             self._seen = state, balance
@@ -211,12 +207,6 @@ class Equilibrium(Statics):
             self.interface.pins.watch(self.positions(state.u)[:, 0], state.touching)
             self.record.iterations += 1
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
-
-    def _keeps_columns(self, state: State, frozen: Floats | None) -> bool:
-        """Whether the attraction keeps its columns from this iterate on: what follows is another problem."""
-        if self.attraction is None or frozen is not None or state.voltage == 0.0:
-            return False
-        return self.attraction.watch(self.interface.resting(state))
 
     def _accepted(self, old: State, state: State, target: Target) -> State:
         """The balanced state with what body, friction and hand remember of it; raises where its outline

@@ -34,7 +34,6 @@ from evfem.common.constants import (
     GROWN,
     KILOVOLT,
     LARGEST_BONE_INCREMENT,
-    LOST,
     REACH,
     SHORTEST_FRACTION,
     SMALLEST_FORCE,
@@ -88,7 +87,7 @@ class FactorisedBody:
         self.travel = Travel(interface, self._solve, longest)
         self._anderson = Anderson()
         self._renewed = False
-        self._scaled_down = 0
+        self._scaled_down = False
 
     # -- a step begins
 
@@ -101,7 +100,7 @@ class FactorisedBody:
         self.linearisation.start_clock(old, target.duration)
         self._anderson.reset()
         self._renewed = False
-        self._scaled_down = 0
+        self._scaled_down = False
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
@@ -257,7 +256,7 @@ class FactorisedBody:
 
     def _contact_step(self, old: State, state: State, target: Target, residual: Floats) -> LinearContactStep:
         """The linear contact problem at an iterate."""
-        linearisation, dynamics = self.linearisation, self.body.dynamics
+        linearisation = self.linearisation
         weakening, gain = linearisation.negative_stiffness(state), linearisation.gain_on_closing(state)
         c, rough = linearisation.candidates, linearisation.roughness(state)
         known = self.interface.candidates(old, state, c, weakening, gain)
@@ -269,8 +268,6 @@ class FactorisedBody:
             residual=residual,
             bone=target.bone(state.bone) - state.bone,
             unknowns=self._unknowns(state, target),
-            snap=self._scaled_down >= LOST,
-            timed=self.body.drag_rate > 0.0 or (dynamics is not None and dynamics.step > 0.0),
         )
 
     def _unknowns(self, state: State, target: Target) -> tuple[ExtraUnknown, ...]:
@@ -284,7 +281,7 @@ class FactorisedBody:
     def _solve(self, step: LinearContactStep) -> StepSolution:
         found = step.solve()
         self.record.contact_solves += found.solves
-        self._scaled_down = self._scaled_down + 1 if found.reduced else 0
+        self._scaled_down = found.reduced
         return found
 
     def _driven(self, step: LinearContactStep, state: State, target: Target) -> DrivenStep:

@@ -7,13 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.contact import signorini
 from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     FORWARD,
     OPEN,
     STICK,
-    ContactNotSolved,
     ContactProblem,
     ExtraUnknowns,
     solve_with_attraction,
@@ -28,25 +26,14 @@ def lost(gap, fall=30.0, closing=12.0):
     return problem, AttractionStiffness(np.array([fall]), np.array([1.0]), np.array([closing]))
 
 
-def test_a_node_that_cannot_be_held_moves_the_right_way_or_snaps():
-    problem, pull = lost(gap=0.98)
-    slow = solve_with_attraction(problem, pull, np.array([OPEN]))
+@pytest.mark.parametrize("drift", [-0.02, 0.02])
+def test_a_node_that_cannot_be_held_moves_the_right_way(drift):
+    problem, pull = lost(gap=1.0 + drift)
+    found = solve_with_attraction(problem, pull, np.array([OPEN]))
     # with the fall reduced to nine tenths of what can be held the way is ten times the free one
-    assert slow.reduced
-    assert slow.state[0] == pytest.approx(1.0 - 0.02 / (1.0 - 0.9), rel=1e-12)
-    quick = solve_with_attraction(problem, pull, np.array([OPEN]), snap=True)
-    # closed, it presses with what the attraction gains less what the spring takes
-    assert not quick.reduced
-    assert quick.status.tolist() == [FORWARD]
-    assert quick.force[0] == pytest.approx(12.0 - 0.98 / 0.1, rel=1e-12)
-
-
-def test_a_node_on_its_way_up_does_not_snap():
-    problem, pull = lost(gap=1.02)
-    found = solve_with_attraction(problem, pull, np.array([OPEN]), snap=True)
     assert found.reduced
     assert found.status.tolist() == [OPEN]
-    assert found.state[0] > 1.0
+    assert found.state[0] == pytest.approx(1.0 + drift / (1.0 - 0.9), rel=1e-12)
 
 
 def test_an_attraction_that_can_be_held_is_taken_whole_and_a_closed_node_feels_all_of_it():
@@ -95,27 +82,6 @@ def test_an_attraction_that_closed_nodes_cannot_hold_moves_its_node_towards_the_
     # under the present attraction it would drift by -0.03; the fall is reduced to a feedback of 0.9
     assert found.reduced
     assert found.state[0] == pytest.approx(0.5 - 0.03 / (1.0 - 0.9))
-
-
-def test_a_scaled_attraction_is_told_even_where_other_statuses_solve_its_contact(monkeypatch):
-    """The active set ends nowhere but within `solve_contact`."""
-    problem, pull = lost(gap=0.98)
-    active_set, solve_contact, within = signorini._active_set, signorini.solve_contact, []
-
-    def failing(*known):
-        if not within:
-            raise ContactNotSolved("none")
-        return active_set(*known)
-
-    def solving(*known):
-        within.append(True)
-        return solve_contact(*known)
-
-    monkeypatch.setattr(signorini, "_active_set", failing)
-    monkeypatch.setattr(signorini, "solve_contact", solving)
-    found = solve_with_attraction(problem, pull, np.array([OPEN]))
-    assert within
-    assert found.reduced
 
 
 def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
@@ -208,24 +174,3 @@ def test_the_bone_carries_the_attraction_that_contact_forces_add():
     whole = ContactProblem(problem.start, problem.compliance, problem.friction, extra)
     found = solve_with_attraction(whole, pull, np.array([STICK]))
     assert found.force[0] == pytest.approx(2.0 / 0.25, rel=1e-12)
-
-
-def test_chords_are_below_tangents_where_the_attraction_grows_faster_and_faster():
-    """At 2 N/mm: 0.8 per N/mm, where 1 N/mm is gained since none; 0.3 and 1 N/mm; and a node without load."""
-    gain, lost, present = np.array([0.8, 0.3, 5.0]), np.array([1.0, 1.0, 0.0]), np.array([2.0, 2.0, 0.0])
-    rough = Roughness(np.append(gain, 0.5 * gain), np.append(lost, 0.5 * lost), present)
-    chords = rough.by_chords()
-    np.testing.assert_allclose(chords.gain, [0.5, 0.3, 5.0, 0.25, 0.15, 2.5], rtol=1e-12)
-    np.testing.assert_array_equal(chords.loss_on_opening, rough.loss_on_opening)
-    concave = rough.of(np.array([1, 2]))
-    assert concave.by_chords() is concave
-
-
-def test_an_attraction_in_proportion_to_the_load_has_no_chords():
-    """Its tangents are its chords, but for rounding."""
-    present = np.random.default_rng(3).uniform(0.1, 3.0, 1000)
-    gain = np.random.default_rng(4).uniform(0.1, 0.9, 1000)
-    lost = (1.0 + gain) * present - present
-    assert (gain * present > lost).any()
-    linear = Roughness(np.append(gain, gain), np.append(lost, lost), present)
-    assert linear.by_chords() is linear

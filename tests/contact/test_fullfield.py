@@ -10,8 +10,7 @@ from tools.meshes import arc
 import evfem as ev
 from evfem.contact import fullfield
 from evfem.contact.attraction import Attraction
-from evfem.contact.fullfield import FieldAttraction, certificate, facing, in_line
-from evfem.contact.sight import STEEP
+from evfem.contact.fullfield import STEEP, FieldAttraction, certificate, facing, in_line, in_sight
 from evfem.errors import Unresolved
 from evfem.simulation.model import make_model
 
@@ -133,23 +132,13 @@ def test_what_is_behind_an_overhang_has_no_column():
     assert full.forces(points, 1.0, None)[5] == pytest.approx([0.0, 0.0])
 
 
-def test_forces_do_not_jump_where_a_place_goes_out_of_sight_again_and_again():
-    """A place at the edge of sight: with its column and without, the forces differ. Once it has come back
-    twice they are those of one choice on either side, and of a free one in the next step.
-    """
-    pad, points = arc(4, 3.0, 2.0, quadratic=False)
-    _, full = attractions(pad, points, ev.Display(y=-0.1))
-    rise = np.array([0.05, 0.05 * STEEP])
-    inside, outside = points.copy(), points.copy()
-    inside[5], outside[5] = points[4] + rise * [1.0, 0.9999], points[4] + rise * [1.0, 1.0001]
-    apart = [np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max()]
-    kept = [full.watch(place) for place in (inside, outside, inside, outside)]
-    assert kept == [False, False, False, True]
-    apart.append(np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max())
-    assert apart[1] < 0.01 * apart[0]
-    full.begin()
-    again = np.abs(full.forces(inside, 1.0, None) - full.forces(outside, 1.0, None)).max()
-    assert again == apart[0]
+@pytest.mark.parametrize(
+    ("slope", "seen"), [(0.0, [0, 1, 2, 3]), (0.99 * STEEP, [0, 1, 2, 3]), (1.01 * STEEP, [0, 1, 3])]
+)
+def test_the_higher_end_of_a_steep_wall_has_no_column(slope, seen):
+    wall = np.array([[0.0, 0.0], [1.0, 0.0], [1.1, 0.1 * slope], [2.0, 0.1 * slope + 0.1]])
+    assert in_sight(wall).tolist() == seen
+    assert in_sight(wall[::-1] * [-1.0, 1.0]).tolist() == sorted(3 - k for k in seen)
 
 
 @pytest.mark.parametrize("beyond", [-0.01, 0.01])

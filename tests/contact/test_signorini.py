@@ -1,15 +1,12 @@
 """The dense contact solver against enumeration, non-negative least squares and its own conditions."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from evfem.common.constants import ACTIVE_SET_LIMIT
 from evfem.contact import signorini
-from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
@@ -19,7 +16,6 @@ from evfem.contact.signorini import (
     ContactProblem,
     ExtraUnknowns,
     solve_contact,
-    solve_with_attraction,
 )
 
 
@@ -296,8 +292,17 @@ def test_statuses_that_go_round_in_a_circle_are_not_followed_for_ever(monkeypatc
     problem = ContactProblem(np.append(np.full(k, -1.0), np.zeros(k)), compliance, np.zeros(k))
     with pytest.raises(ContactNotSolved, match="1 of 200 nodes keep changing"):
         solve_contact(problem, np.full(k, OPEN))
-    # the only node that changes has no other way than open, closed and open again
-    assert len(asked) == len(set(asked)) + 1 < 5
+    assert len(asked) < 10  # the only node that changes has no other way than open, closed and open again
+
+
+def test_a_circle_of_all_violated_nodes_is_left_through_the_worst_one():
+    """Three nodes of which two touch by turns, as long as all that violate their statuses change: I. Ben
+    Gharbia and J. C. Gilbert, Math. Program. 134 (2012) 349, doi:10.1007/s10107-010-0439-6, with alpha = 2.
+    """
+    compliance = np.kron(np.eye(2), [[1.0, 2.0, 0.0], [0.0, 1.0, 2.0], [2.0, 0.0, 1.0]])
+    problem = ContactProblem(np.array([-1.0, -1.0, -1.0, 0.0, 0.0, 0.0]), compliance, np.zeros(3))
+    found = solve_contact(problem, np.array([FORWARD, OPEN, OPEN]))
+    np.testing.assert_allclose(found.force[:3], 1.0 / 3.0, rtol=1e-12)
 
 
 def test_nothing_touches_nothing_pushes():
@@ -351,41 +356,6 @@ def test_extra_unknowns_feel_the_cohesion():
     assert found.extra[0] == pytest.approx((1.1 - 3.0) / 2.0, rel=1e-12)
 
 
-def test_the_equations_without_the_drops_are_the_whole_ones():
-    rng = np.random.default_rng(3)
-    for trial in range(24):
-        k = 7
-        problem = random_problem(trial, k, 0.0)
-        stiffness = np.where(rng.random(k) < 0.7, rng.uniform(0.05, 0.4, k), 0.0)
-        attraction = AttractionStiffness(stiffness, rng.uniform(0.0, 0.5, k), rng.uniform(0.0, 0.3, k))
-        if trial % 2:
-            columns, rows = rng.normal(size=(2 * k, 1)), rng.normal(size=(1, 2 * k))
-            extra = ExtraUnknowns(columns, rows, np.array([[1.3]]), np.array([0.4]))
-            problem = replace(problem, extra_unknowns=extra)
-        cohesion = rng.uniform(0.0, 0.1, k) if trial % 3 else None
-        friction = rng.uniform(0.0, 1.0, k)
-        problem = replace(problem, attraction=attraction, friction=friction, cohesion=cohesion)
-        status = rng.integers(0, 4, k)
-        found = signorini._solve_closed(problem, status)
-        for one, whole in zip(found, problem.solved(status), strict=True):
-            np.testing.assert_allclose(one, whole, rtol=1e-8, atol=1e-9)
-
-
-def test_what_is_returned_solves_the_whole_equations(monkeypatch):
-    problem = random_problem(1, 6, 0.3)
-    attraction = AttractionStiffness(np.full(6, 0.05), np.full(6, 0.1), np.zeros(6))
-    asked = []
-    monkeypatch.setattr(signorini, "FEW_SOLVES", 0)
-    for name in ("_solve_closed", "_solve_statuses"):
-        own = getattr(signorini, name)
-        monkeypatch.setattr(signorini, name, lambda p, s, n=name, f=own: asked.append(n) or f(p, s))
-    found = solve_with_attraction(problem, attraction, np.full(6, OPEN))
-    assert asked[0] == "_solve_closed"
-    assert asked[-1] == "_solve_statuses"
-    whole = replace(problem, attraction=attraction).solved(found.status)
-    np.testing.assert_array_equal(found.force, whole[0])
-
-
 def test_a_body_gives_way_where_its_compliance_is_not_positive():
     start, mu = np.zeros(4), np.zeros(2)
     turned = np.diag([1.0, 1.0, 1.0, -0.5])
@@ -396,50 +366,3 @@ def test_a_body_gives_way_where_its_compliance_is_not_positive():
         (np.eye(4) + 3.0 * np.eye(4, k=1), None, True),  # its symmetric part is not
     ):
         assert ContactProblem(start, compliance, mu, give=give).gives_way == gives_way
-
-
-@pytest.mark.parametrize(("hopeless", "given_up"), [(12, True), (30, False)])
-def test_many_violated_nodes_of_a_body_that_gives_way_are_given_up(monkeypatch, hopeless, given_up):
-    """Thirty nodes of random compliances of either sign, none of whose statuses hold: changed one at a
-    time they would go round in a circle at last.
-    """
-    solve, solves = signorini._solve_statuses, []
-    monkeypatch.setattr(signorini, "_solve_statuses", lambda *known: solves.append(1) or solve(*known))
-    monkeypatch.setattr(signorini, "HOPELESS", hopeless)
-    rng, compliance = np.random.default_rng(0), np.eye(60)
-    random = rng.normal(size=(30, 30))
-    compliance[:30, :30] = 0.5 * (random + random.T)
-    start = np.concatenate([-np.abs(rng.normal(size=30)), np.zeros(30)])
-    with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
-        solve_contact(ContactProblem(start, compliance, np.zeros(30)), np.full(30, OPEN))
-    assert (len(solves) == ACTIVE_SET_LIMIT // 3) == given_up
-
-
-@pytest.mark.parametrize(("hopeless", "given_up"), [(12, True), (30, False)])
-def test_many_violated_nodes_between_rough_faces_are_given_up(monkeypatch, hopeless, given_up):
-    """Each of thirty is lifted off by its tangent, which is below what an open one is drawn by, and turns
-    between the two; the body itself, of random compliance, holds. From each of three starts.
-    """
-    solve, solves = signorini._solve_statuses, []
-    monkeypatch.setattr(signorini, "_solve_statuses", lambda *known: solves.append(1) or solve(*known))
-    monkeypatch.setattr(signorini, "HOPELESS", hopeless)
-    rng, compliance, zero = np.random.default_rng(1), np.eye(60), np.zeros(30)
-    random = rng.normal(size=(30, 30))
-    compliance[:30, :30] += 0.01 * random @ random.T
-    gain, loss = np.append(np.full(30, 0.8), zero), np.append(np.ones(30), zero)
-    rough = AttractionStiffness(zero, zero, zero, Roughness(gain, loss, np.full(30, 2.0)))
-    start = np.append(-rng.uniform(1.1, 1.5, 30), zero)
-    problem = ContactProblem(start, compliance, zero, attraction=rough)
-    assert not problem.gives_way
-    with pytest.raises(ContactNotSolved, match=r"of 30 nodes keep changing"):
-        solve_contact(problem, np.full(30, OPEN))
-    assert (len(solves) == 3 * (ACTIVE_SET_LIMIT // 3)) == given_up
-
-
-def test_rough_faces_that_stay_apart_give_no_active_set_up():
-    """Where the attraction does not depend on the contact force."""
-    zero = np.zeros(2)
-    for gain, seldom in ((0.0, False), (0.5, True)):
-        rough = Roughness(np.array([gain, 0.0]), zero, np.ones(1))
-        pull = AttractionStiffness(zero[:1], zero[:1], zero[:1], rough)
-        assert ContactProblem(zero, np.eye(2), zero[:1], attraction=pull).seldom_ends == seldom

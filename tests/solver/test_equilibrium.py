@@ -13,13 +13,12 @@ from tools.meshes import block
 from evfem.contact import condensed
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
 from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
+from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
 from evfem.scene.motion import Hover, Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
-from evfem.solver import equilibrium
 from evfem.solver.control import Target
 from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
@@ -173,32 +172,6 @@ def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypa
     equilibrium.body.linearisation.forget()
     with pytest.raises(StepFailed, match="contact: as told"):
         equilibrium.step(state, target)
-
-
-def test_nodes_that_stay_lost_for_three_iterations_in_a_row_snap(monkeypatch):
-    """A soft pad 0.02 mm above 2 um of insulator closes; where the fall of the attraction had to
-    be reduced three times, and only there, the lost nodes are closed at once."""
-    solve, seen, snaps = condensed.LinearContactStep.solve, [], 0
-
-    def watched(step):
-        found = solve(step)
-        seen.append((step.snap, found.reduced))
-        return found
-
-    monkeypatch.setattr(condensed.LinearContactStep, "solve", watched)
-    for sag, top in ((0.05, 320.0), (0.2, 300.0)):
-        body, display = finger(block(16, 4, sag=sag), E=0.05), Display(Layer(2e-3, 3.35))
-        model = make_model(Scene(body, display, StrongTroxel(), top, [Hover(0.02)]))
-        bone = model.bone(0.0, -0.02)
-        state = model.equilibrium.rest(bone, 0.0)
-        for voltage in (0.5 * top, top):
-            seen.clear()
-            state = model.equilibrium.step(state, Target.held(bone, voltage))
-            for k, (snap, _) in enumerate(seen):
-                assert snap == (k >= 3 and all(reduced for _, reduced in seen[k - 3 : k]))
-            snaps += sum(snap for snap, _ in seen)
-        assert (state.status != OPEN).any()
-    assert snaps > 0
 
 
 @pytest.mark.filterwarnings("ignore:motion 1 presses")
@@ -420,37 +393,3 @@ def test_residuals_do_not_count_while_the_bone_is_on_its_way(monkeypatch):
     with pytest.raises(StepFailed, match="no equilibrium in"):
         solver.step(old, Target.held(model.bone(0.0, 0.3), 0.0))
     assert set(solver.record.residuals) == {1.0}
-
-
-def test_every_step_begins_with_free_columns_and_shows_them_every_iterate(monkeypatch):
-    """Under the full field a step that goes to and fro between two choices of columns keeps one."""
-    scene = Scene(
-        ROUND, Display(), StrongTroxel(), 300.0, [Press(indentation=0.1)], field="full", direction="normal"
-    )
-    model = make_model(scene)
-    attraction, seen = model.equilibrium.attraction, []
-    begin, watch = attraction.sight.begin, attraction.sight.watch
-    monkeypatch.setattr(attraction.sight, "begin", lambda: seen.append("begin") or begin())
-    monkeypatch.setattr(attraction.sight, "watch", lambda places: seen.append("iterate") or watch(places))
-    old, record = model.equilibrium.rest(model.bone(0.0, 0.0), 300.0), model.equilibrium.record
-    for depth in (0.05, 0.1):
-        seen.clear()
-        before = record.iterations
-        old = model.equilibrium.step(old, Target.held(model.bone(0.0, depth), 300.0))
-        assert seen == ["begin", *["iterate"] * (record.iterations - before + 1)]
-    seen.clear()
-    model.equilibrium.step(old, Target.held(model.bone(0.0, 0.1), 300.0), frozen=old.attraction)
-    assert seen == ["begin"]
-
-
-def test_residuals_before_the_columns_were_kept_do_not_end_a_step(monkeypatch):
-    """What follows is another problem."""
-    scene = Scene(ROUND, Display(), StrongTroxel(), 300.0, [Press(indentation=0.1)], field="full")
-    model = make_model(scene)
-    lengths = []
-    monkeypatch.setattr(equilibrium, "stuck", lambda since: lengths.append(len(since)) or False)
-    watched = iter([False, False, True])
-    monkeypatch.setattr(model.equilibrium.attraction.sight, "watch", lambda places: next(watched, False))
-    old = model.equilibrium.rest(model.bone(0.0, 0.0), 300.0)
-    model.equilibrium.step(old, Target.held(model.bone(0.0, 0.1), 300.0))
-    assert lengths[:4] == [1, 2, 1, 2]

@@ -48,16 +48,6 @@ def test_an_equilibrium_is_balanced(pressed):
     assert np.abs(pressed[1].reaction).max() > 1e-3
 
 
-def test_drag_holds_a_released_body_as_time_does(pressed):
-    body, state, target = pressed
-    body.begin(state, target, False, state)
-    body.linearisation.factorise(state)
-    forward = np.zeros(body.linearisation.tangent.schur.shape[0])
-    for rate in (0.0, 0.5, 0.0):
-        body.body.release(state.u, rate)
-        assert body._contact_step(state, state, target, forward).timed == (rate > 0.0)
-
-
 @pytest.mark.parametrize("missing", [0.01, -0.01])
 def test_a_prescribed_force_counts_like_the_forces_of_the_nodes(pressed, missing):
     """Relative to the largest reaction, which is the vertical one."""

@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from tools.builders import coarse_pad
 from tools.meshes import between, held
 
-from evfem.contact.follower import FollowerStiffness
 from evfem.contact.friction import AdhesiveFriction
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel, eps_0
@@ -172,11 +171,10 @@ def test_a_finger_pushed_aside_by_a_steep_texture_goes_on_to_where_it_is_held():
     assert broken(scene, result) == []
 
 
-def test_a_finger_that_is_not_held_on_a_steep_texture_is_released(monkeypatch):
-    """Where no weaker follower stiffness helps, the finger comes to rest by itself; and if it must
+def test_a_finger_that_is_not_held_on_a_steep_texture_is_released():
+    """The finger comes to rest by itself; and if it must
     not be released, the sentence says what pushes it aside.
     """
-    monkeypatch.setattr(FollowerStiffness, "weaker", lambda *known: ())
     motion = [Press(force=0.1, steps=2), Slide(0.42, steps=2)]
     scene = Scene(coarse_pad(), STEEP, motion=motion)
     held = Solver(strategy=Strategy(relaxation=False))

