@@ -32,8 +32,8 @@ from evfem.common.digest import digest
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, quoted
 from evfem.scene.file import loads, read_text, tables_of
+from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
-from evfem.scene.written import VERSION
 from evfem.simulation.result import origin
 from evfem.sweeps.file import scene_tables
 from evfem.sweeps.folder import SweepFolder

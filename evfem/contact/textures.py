@@ -18,6 +18,7 @@ self-affine profile along a line (Jacobs, Junge and Pastewka 2017, doi:10.1088/2
 from __future__ import annotations
 
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
@@ -25,8 +26,18 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.checks import Within, number, real, set_frozen, whole
-from evfem.contact.surfaces import FARTHEST, HIGHEST, MOST_TERMS, Friction, RigidSurface, Shift, Sinusoid
-from evfem.electrostatics.laws import Layer
+from evfem.contact.surfaces import (
+    FARTHEST,
+    HIGHEST,
+    MOST_TERMS,
+    Flat,
+    Friction,
+    Insulator,
+    Profile,
+    RigidSurface,
+    Shift,
+    Sinusoid,
+)
 from evfem.errors import InputError
 from evfem.tensor import Array
 
@@ -76,10 +87,10 @@ class Grating(RigidSurface):
     phase: Annotated[float, _PHASE, "place of a ridge's middle"] = 0.0
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         period = self.period
         groove = 0.5 * period if self.groove_width is None else self.groove_width
         allowed = f"a width in mm above 0 and below the period, {period:g}"
@@ -147,10 +158,10 @@ class SelfAffine(RigidSurface):
     seed: Annotated[int, _SEED, "the same seed gives the same surface"] = 0
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         period = self.period
         longest = period if self.longest is None else self.longest
         longest = real(
@@ -202,3 +213,13 @@ class SelfAffine(RigidSurface):
 
 def _within(most: float):  # type: ignore[no-untyped-def]
     return lambda length: FINEST <= length <= most * (1.0 + 1e-12)
+
+
+#: the surfaces by their kinds in a file
+SURFACES: Mapping[str, Any] = {
+    "flat": Flat,
+    "sinusoid": Sinusoid,
+    "profile": Profile,
+    "grating": Grating,
+    "self_affine": SelfAffine,
+}

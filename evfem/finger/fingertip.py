@@ -26,6 +26,7 @@ from evfem.finger.fingerpad import (
     STEEPEST,
     STEEPEST_FLAT,
     Electrical,
+    FingerPad,
     Materials,
     Skin,
     all_materials,
@@ -277,6 +278,10 @@ class Fingertip:
         count = max(int(fitting + 0.1), 1)
         middle, half = ((self.ridge_phase + 0.25) % 0.5 - 0.25) * self.ridge_width, 0.5 * count * step
         return count, (middle - half) / axis, (middle + half) / axis
+
+
+#: parametric fingers by their kinds in a file
+FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
 
 
 def tip_sizes(name: str) -> dict[str, Any]:

@@ -16,9 +16,10 @@ from typing import Any, Literal, get_args, get_origin
 from evfem.common.checks import Key, Within, keys_of
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.finger.fingertip import Fingertip
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.finger.fingertip import FINGERS
 from evfem.scene import format as file
+from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Output, Solver
 from evfem.solver.hand import Hand
@@ -148,8 +149,7 @@ def sections() -> list[Section]:
 
     return [
         section("", file.SceneTable),
-        section("finger", FingerPad, file.BesideFinger, kind="pad", tag=("kind", finger)),
-        section("finger", Fingertip, file.BesideFinger, kind="fingertip", tag=("kind", finger)),
+        *kinds("finger", FINGERS, finger, "kind", file.Measured, file.BesideFinger),
         section("finger", MeshedFinger, file.BesideFinger, kind="mesh"),
         *kinds("finger.materials.NAME", LAWS, "the law", "law"),
         section("finger.electrical", Electrical),
@@ -189,7 +189,7 @@ def schema() -> Schema:
     ]
     friction = {"$ref": "#/definitions/friction"}
     inner: dict[str, Schema] = {
-        "version": {"const": file.VERSION},
+        "version": {"const": VERSION},
         "finger": {"anyOf": fingers},
         "surface": {"oneOf": [one.schema(friction_law=friction) for one in tables["surface"]]},
         "electrostatics": tables["electrostatics"][0].schema(

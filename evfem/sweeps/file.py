@@ -23,9 +23,9 @@ from evfem.common.checks import instance, one_of, real, set_frozen, whole
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.file import read_text, tables_of
 from evfem.scene.format import SceneTable, names
-from evfem.scene.keys import at, read, shown
+from evfem.scene.keys import VERSION, at, read, shown
 from evfem.scene.scene import Scene
-from evfem.scene.written import VERSION, dump
+from evfem.scene.written import dump
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps.samples import METHODS, MOST_SAMPLES, Distribution, Normal, Samples, Uniform

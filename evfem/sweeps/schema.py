@@ -5,6 +5,7 @@ and as a JSON schema for editors (`evfem.scene.schema`).
 from __future__ import annotations
 
 from evfem.scene import schema as scenes
+from evfem.scene.keys import VERSION
 from evfem.scene.schema import DRAFT, Schema, Section, section
 from evfem.sweeps.file import DistributionTable, SamplesTable, SweepTable
 
@@ -35,7 +36,7 @@ def schema() -> Schema:
     told = {key.name: key.meaning for key in (*top.keys, *samples.keys)}
     parameters = {"type": "object", "description": told["parameters"]}
     made = top.schema(
-        version={"const": 1, "description": told["version"]},
+        version={"const": VERSION, "description": told["version"]},
         scene={"description": told["scene"], "anyOf": [{"type": "string"}, table]},
         samples={"description": told["samples"], **samples.schema(parameters=parameters)},
     )
