@@ -55,7 +55,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics fieldless options scene written keys format schema file resolution drift "
+        "motion terms electrics fieldless options scene keys written format schema file resolution drift "
         "partchecks parts sense fieldchoice timescales spatial way symmetry plan",
     ),
     "simulation": (

@@ -25,7 +25,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Within, number, real, set_frozen, whole
+from evfem.common.checks import SEED, Within, number, real, set_frozen
 from evfem.contact.surfaces import (
     FARTHEST,
     HIGHEST,
@@ -41,8 +41,8 @@ from evfem.contact.surfaces import (
 from evfem.errors import InputError
 from evfem.tensor import Array
 
-#: shortest length of a texture (mm), and largest seed
-FINEST, LARGEST_SEED = 1e-6, 2**63 - 1
+#: shortest length of a texture (mm)
+FINEST = 1e-6
 #: a wall's share of the narrower one of ridge and groove where nothing is said
 WALL = 0.5
 
@@ -58,7 +58,6 @@ _SHORTEST = {"allowed": "a wavelength in mm up to the longest", "unit": "mm"}
 _LONGEST = {"allowed": "a wavelength in mm up to the period", "unit": "mm"}
 _PHASE = number("a part of the period, -1 to 1", Within(-1.0, 1.0), "periods")
 _HURST = number("a Hurst exponent from 0 to 1", Within(0.0, 1.0))
-_SEED = whole(LARGEST_SEED, 0, "a whole number, not negative")
 
 
 @dataclass(frozen=True)
@@ -155,7 +154,7 @@ class SelfAffine(RigidSurface):
     period: Annotated[float, _length(FARTHEST), "after which the surface repeats"] = 10.0
     shortest: Annotated[float, _SHORTEST, "shortest wave"] = 0.2
     longest: Annotated[float | None, _LONGEST, "longest wave; without it the period"] = None
-    seed: Annotated[int, _SEED, "the same seed gives the same surface"] = 0
+    seed: Annotated[int, SEED, "the same seed gives the same surface"] = 0
     friction: Friction = 0.3
     y: Shift = None
     insulator: Insulator = None

@@ -86,7 +86,7 @@ def section(name: str, *classes: Any, kind: str = "", tag: tuple[str, str] | Non
 def _entry(key: Key) -> Entry:
     rule, unit = key.rule, key.rule.get("unit", "")
     shape = _shape(key.types)
-    if isinstance(limits := rule.get("limits", rule.get("test")), Within):
+    if isinstance(limits := rule.get("test"), Within):
         shape |= _limits(limits, shape.get("type") == "integer")
     if "names" in rule:
         shape["enum"] = list(rule["names"])
@@ -116,7 +116,7 @@ def _limits(within: Within, whole: bool) -> Schema:
     if within.low > -math.inf:
         found["exclusiveMinimum" if within.above else "minimum"] = plain(within.low)
     if within.high < math.inf:
-        found["maximum"] = plain(within.high)
+        found["exclusiveMaximum" if within.below else "maximum"] = plain(within.high)
     if within.not_zero:
         found["not"] = {"const": 0}
     return found

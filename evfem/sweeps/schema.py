@@ -7,14 +7,15 @@ from __future__ import annotations
 from evfem.scene import schema as scenes
 from evfem.scene.keys import VERSION
 from evfem.scene.schema import DRAFT, Schema, Section, section
-from evfem.sweeps.file import DistributionTable, SamplesTable, SweepTable
+from evfem.sweeps.file import DistributionTable, SweepTable
+from evfem.sweeps.samples import Samples
 
 
 def sections() -> list[Section]:
     """All tables of a sweep file but those of its scene."""
     return [
         section("", SweepTable),
-        section("samples", SamplesTable),
+        section("samples", Samples),
         section("samples.parameters.KEY", DistributionTable),
     ]
 
