@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "tqdm", "threadpoolctl", "pandas"},
-        "arrays constants notices views checks digest storage listed tables",
+        "arrays constants notices checks views digest storage listed tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},

@@ -215,6 +215,12 @@ class Key:
         return self.rule.get("allowed") or " | ".join(self.rule["names"])
 
     @property
+    def told(self) -> str:
+        """What it means and may be, in words."""
+        unit = f" ({self.rule['unit']})" if self.rule.get("unit") else ""
+        return f"{self.meaning}{unit}. Allowed: {self.allowed}"
+
+    @property
     def required(self) -> bool:
         """Whether it must be given."""
         return self.default is MISSING

@@ -209,10 +209,8 @@ class Display(_Level):
 
 @dataclass(frozen=True)
 class Sinusoid(RigidSurface):
-    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
-
-    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the
-    paper, height(x) = 0.025 (sin 6x + cos 12x - 1).
+    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase); without `terms` equation (25)
+    of the paper, 0.025 (sin 6x + cos 12x - 1) mm.
 
     >>> float(Sinusoid().height(0.0))
     0.0

@@ -62,12 +62,10 @@ _HURST = number("a Hurst exponent from 0 to 1", Within(0.0, 1.0))
 
 @dataclass(frozen=True)
 class Grating(RigidSurface):
-    """A grating: flat ridges at height 0, flat grooves at -`groove_depth`, one of each per
-    `period` (mm).
+    """A grating: flat ridges at height 0, flat grooves below, one of each per period.
 
-    `groove_width` is measured at half depth; None: half the period. `wall_width` is how much of x
-    each wall takes; None: half of the narrower one of ridge and groove. The middles of ridges are
-    at x = (k + `phase`) `period`. The steepest slope is pi `groove_depth` / (2 `wall_width`).
+    The middles of ridges are at x = (k + `phase`) `period`. The steepest slope is pi `groove_depth` / (2
+    `wall_width`).
 
     >>> grating = Grating(period=2.0, groove_depth=0.1, groove_width=0.5, wall_width=0.2)
     >>> grating.height(np.array([0.0, 0.64, 0.75, 1.0, 2.0])).round(3).tolist()
@@ -136,13 +134,11 @@ class Grating(RigidSurface):
 
 @dataclass(frozen=True)
 class SelfAffine(RigidSurface):
-    """Self-affine roughness with the Hurst exponent `hurst` and the root mean square height `rms`
-    (mm).
+    """Self-affine roughness: every wave from `longest` to `shortest` that fits a whole number of times into
+    `period`.
 
-    It repeats after `period` (mm) and has every wave from `longest` (None: the period) down to
-    `shortest` (mm) that fits a whole number of times into the period. The phases come from `seed`:
-    the same numbers give the same profile on every machine, and a band that is wider keeps the
-    waves that it had, but for their common factor.
+    The phases come from `seed`: the same numbers give the same profile on every machine, and a band that is
+    wider keeps the waves that it had, but for their common factor.
 
     >>> rough = SelfAffine(hurst=0.8, rms=0.01, period=10.0, shortest=0.2, seed=1)
     >>> len(rough.terms), f"{np.std(rough.height(np.arange(0.0, 10.0, 0.05))):.6f}"

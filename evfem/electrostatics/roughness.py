@@ -46,7 +46,7 @@ OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no b
 
 @dataclass(frozen=True)
 class ConstantRoughness:
-    """The separation is `gap` (mm) whatever the pressure.
+    """The same separation whatever the pressure.
 
     >>> ConstantRoughness(0.001).separation(np.array([0.0, 0.02])).tolist()
     [0.001, 0.001]
@@ -69,8 +69,7 @@ class ConstantRoughness:
 
 @dataclass(frozen=True)
 class PowerRoughness:
-    """The separation is `gap` (mm) at `pressure` (MPa) and falls with the power -`exponent` of the
-    contact pressure, from `open_gap` (mm) at none.
+    """The separation falls with the power -`exponent` of the contact pressure, from `open_gap` at none.
 
     >>> law = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
     >>> law.separation(np.array([0.0, 0.01, 0.04])).tolist()
@@ -107,8 +106,8 @@ class PowerRoughness:
 
 @dataclass(frozen=True)
 class ExponentialRoughness:
-    """The separation falls by `decay` (mm) for every factor e of the contact pressure, from
-    `open_gap` (mm) at none to nothing at `pressure` (MPa): Persson's u0 and beta E*.
+    """The separation falls by `decay` for every factor e of the contact pressure, from `open_gap` at none to
+    nothing at `pressure`: Persson's u0 and beta E*.
 
     >>> law = ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.008)
     >>> law.separation(np.array([0.0, np.exp(-2.0), 2.0])).round(12).tolist()

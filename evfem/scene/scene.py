@@ -94,11 +94,8 @@ class Scene:
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
     position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
     alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
-    surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
-    or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
-    `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
-    "auto" where bounds say that it matters; only there may the finger be not `grounded`: without a
-    charge, above electrodes of different voltages. `friction_law` says what the surface's coefficient of
+    surface. Only where the field is full may the finger be not `grounded`: without a charge, above electrodes
+    of different voltages. `friction_law` says what the surface's coefficient of
     friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
     `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
     drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but

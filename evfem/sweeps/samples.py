@@ -97,12 +97,10 @@ _PARAMETERS = {"allowed": "a table [samples.parameters] of distributions", "chec
 
 @dataclass(frozen=True)
 class Samples:
-    """`count` values of every parameter, independent of each other; the same seed gives the same
-    values.
+    """Values of every parameter, independent of each other.
 
-    `method` latin_hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly
-    one value of each parameter into each of `count` equally likely intervals; random draws them
-    freely.
+    A latin hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly one value of each
+    parameter into each of `count` equally likely intervals; random draws them freely.
 
     >>> sample = Samples({"surface.friction": Uniform(0.0, 1.0)}, count=4, seed=1)
     >>> np.sort(np.floor(4 * sample.draw()["surface.friction"]))
