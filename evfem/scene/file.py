@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from evfem.common.checks import MOST_STEPS
+from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
@@ -22,7 +23,6 @@ from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
 from evfem.finger.fingertip import FINGERS, tip_sizes
 from evfem.finger.layers import TABLE_2
 from evfem.scene.format import (
-    FRICTIONS,
     HOMES,
     SURFACES,
     BesideFinger,

@@ -12,7 +12,6 @@ from typing import Annotated, Any
 
 from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
 from evfem.contact import textures
-from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.contact.surfaces import Flat, Friction, Insulator, Profile, Shift
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
@@ -39,12 +38,8 @@ from evfem.scene.scene import (
 
 Table = Mapping[str, Any]
 Pairs = list[list[float]]
-_FRICTION_LAW = {
-    "allowed": "a table [surface.friction_law] with a kind",
-    "type": dict,
-    "kinds": lambda: FRICTIONS,
-}
-_TABLE = {"file": lambda name: name.lower().endswith(".csv")}
+_HEIGHTS = "the path of a csv file with the header x,height"
+_CSV = {"file": lambda name: name.lower().endswith(".csv")}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 
@@ -53,35 +48,37 @@ def _rows(allowed: str, unit: str) -> dict[str, Any]:
     return instance(allowed, list, unit=unit)
 
 
+def _path(allowed: str) -> dict[str, Any]:
+    return {"file": True} | instance(allowed, str, Path)
+
+
+def _table(name: str, more: str = "") -> dict[str, Any]:
+    return {"allowed": f"a table [{name}]{more}"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class SceneTable:
     """The whole file."""
 
     version: Annotated[int, {"allowed": str(VERSION)}, "version of the format"]
     finger: Annotated[
-        Table | None, {"allowed": "a table [finger]"}, "the finger; without it that of the paper's Table 2"
+        Table | None, _table("finger"), "the finger; without it that of the paper's Table 2"
     ] = None
     surface: Annotated[
-        Table,
-        {"allowed": "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"},
-        "what the finger touches",
+        Table, _table("surface", f" with a kind: {' | '.join(textures.SURFACES)}"), "what the finger touches"
     ]
     electrostatics: Annotated[
         Table | None,
-        {"allowed": "a table [electrostatics]"},
+        _table("electrostatics"),
         "insulator, voltage and force law; without it no attraction",
     ] = None
     hand: Annotated[
-        Table | None,
-        {"allowed": "a table [hand]"},
-        "between drive and bone; without it the drive moves the bone itself",
+        Table | None, _table("hand"), "between drive and bone; without it the drive moves the bone itself"
     ] = None
     solver: Annotated[
-        Table | None,
-        {"allowed": "a table [solver]"},
-        "how the scene is solved; the defaults are the recommended ones",
+        Table | None, _table("solver"), "how the scene is solved; the defaults are the recommended ones"
     ] = None
-    output: Annotated[Table | None, {"allowed": "a table [output]"}, "which fields are kept"] = None
+    output: Annotated[Table | None, _table("output"), "which fields are kept"] = None
     motion: Annotated[
         list[Table],
         instance("one or more tables [[motion]]", list),
@@ -110,8 +107,8 @@ class BesideSurface:
     """The key of [surface] that is the scene's."""
 
     friction_law: Annotated[
-        Any,
-        _FRICTION_LAW,
+        Table | None,
+        _table("surface.friction_law", " with a kind"),
         "what the coefficient means; without it Coulomb's law",
     ] = None
 
@@ -120,12 +117,7 @@ class BesideSurface:
 class ProfileTable:
     """[surface] of the kind profile."""
 
-    file: Annotated[
-        str | None,
-        {"allowed": "the path of a csv file with the header x,height", "file": True}
-        | instance("the path of a csv file with the header x,height", str, Path),
-        "heights over x",
-    ] = None
+    file: Annotated[str | None, _path(_HEIGHTS), "heights over x"] = None
     points: Annotated[
         Pairs | None, _rows("rows [[x, height], ...] in mm", "mm"), "the same in the scene file"
     ] = None
@@ -138,7 +130,7 @@ class ProfileTable:
         common: Any = {"friction": self.friction, "y": self.y, "insulator": self.insulator}
         if (self.file is None) == (self.points is None):
             given = ABSENT if self.file is None else "file and points"
-            raise InputError("surface.file", given, "the path of a csv file with the header x,height")
+            raise InputError("surface.file", given, _HEIGHTS)
         if self.points is not None:
             return Profile(*columns("surface.points", self.points), **common)
         return Profile.from_csv(self.file or "", **common)
@@ -150,8 +142,7 @@ class SampledTable:
 
     file: Annotated[
         str | None,
-        {"file": True}
-        | instance("the path of a csv file with the header time,voltage, or of a .wav", str, Path),
+        _path("the path of a csv file with the header time,voltage, or of a .wav"),
         "the samples",
     ] = None
     full_scale: Annotated[
@@ -211,7 +202,7 @@ class Electrostatics:
     ] = None
     frequency: DriveFrequency = None
     waveform: Waveform = "sine"
-    skin: Annotated[Skin, instance(f"{' | '.join(SKINS)} | the path of a csv file", str, Path), _TABLE] = None
+    skin: Annotated[Skin, instance(f"{' | '.join(SKINS)} | the path of a csv file", str, Path), _CSV] = None
     gap_conductivity: Conductivity = 0.0
     drive: Annotated[
         str | None,
@@ -220,10 +211,7 @@ class Electrostatics:
     ] = None
     voltage_file: Annotated[
         str | None,
-        {"file": True}
-        | instance(
-            "the path of a csv file (header: position,voltage or time,voltage) or of a .wav", str, Path
-        ),
+        _path("the path of a csv file (header: position,voltage or time,voltage) or of a .wav"),
         "voltage over the position, instead of a number",
     ] = None
     voltage_profile: Annotated[
@@ -231,11 +219,7 @@ class Electrostatics:
         _rows("rows [[position, voltage], ...] in mm and V", "mm, V"),
         "the same in the scene file",
     ] = None
-    signal: Annotated[
-        Any,
-        _SIGNAL,
-        "voltage over time, instead of a number",
-    ] = None
+    signal: Annotated[Any, _SIGNAL, "voltage over time, instead of a number"] = None
     insulator: Annotated[str | None, one_of(*INSULATORS), "a usual insulator by its name"] = None
     insulator_thickness: Annotated[
         float | None,

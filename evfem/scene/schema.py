@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from evfem.common.checks import Key, Within, keys_of
+from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, MeshedFinger
@@ -154,7 +155,7 @@ def sections() -> list[Section]:
         *kinds("finger.materials.NAME", LAWS, "the law", "law"),
         section("finger.electrical", Electrical),
         *kinds("surface", file.SURFACES, "which kind", "kind", file.BesideSurface),
-        *kinds("surface.friction_law", file.FRICTIONS, "which kind"),
+        *kinds("surface.friction_law", FRICTIONS, "which kind"),
         section("electrostatics", file.Electrostatics, *FORCE_LAWS.values()),
         *kinds("electrostatics.signal", file.SIGNALS, "which kind"),
         *kinds(
