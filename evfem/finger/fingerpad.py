@@ -326,23 +326,21 @@ def _check_section(pad: FingerPad, section: Section) -> None:
     if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
     if ridges:
-        _at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
+        at_most("ridge_width", ridges.pitch, 0.045 * pad.width, "0.045 times the width")
         height = "ridge_scan" if isinstance(ridges, ScannedRidges) else "ridge_height"
-        _at_most(height, ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness")
-        _at_most(
-            "ridge_crest", pad.ridge_crest + pad.ridge_groove, 0.9, "0.9 together with finger.ridge_groove"
-        )
+        at_most(height, ridges.height, 0.7 * thickness, f"0.7 times the {outermost.spoken}'s thickness")
+        check_flat(pad.ridge_crest + pad.ridge_groove)
         _check_walls(pad, ridges, outer)
-    _at_most(
+    at_most(
         "nail_thickness",
         pad.nail_thickness,
         thickness + 0.7 * below,
         f"{outermost.spoken} + 0.7 {second.spoken}",
     )
-    _at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
+    at_most("nail_width", pad.nail_width, 0.8 * pad.width, "0.8 times the width")
     skin = sum(section.thickness)
     *others, deepest = [layer for layer in section.layers if layer.thickness]
-    _at_most(
+    at_most(
         deepest.parameter,
         skin,
         0.6 * outer.smallest_radius,
@@ -381,9 +379,15 @@ def _check_walls(pad: FingerPad, ridges: Ridges | ScannedRidges, outer: Ellipse)
         )
 
 
-def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
+def at_most(name: str, value: float, limit: float, meaning: str, unit: str = "mm") -> None:
+    """Refuse a parameter of a finger above a limit that follows from others."""
     if value > limit * (1.0 + 1e-12):
-        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} mm ({meaning})")
+        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} {unit} ({meaning})")
+
+
+def check_flat(part: float) -> None:
+    """Refuse flat parts of a pitch that leave no room for the walls of a ridge."""
+    at_most("ridge_crest", part, 0.9, "together with finger.ridge_groove", "of the pitch")
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,8 @@ from evfem.finger.fingerpad import (
     Materials,
     Skin,
     all_materials,
+    at_most,
+    check_flat,
 )
 from evfem.finger.fingerpad import participant_sizes as sizes_in_section
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
@@ -309,10 +311,10 @@ def _check_shape(tip: Fingertip, solid: Solid) -> None:
     skin, radius = sum(solid.thickness), solid.outer.smallest_radius
     deepest = [layer for layer in LAYERS if layer.thickness][-1]
     meaning = "times the surface's smallest radius, together with the layers above it"
-    _at_most(deepest.parameter, skin, THICKEST * radius, f"{THICKEST:g} {meaning}")
+    at_most(deepest.parameter, skin, THICKEST * radius, f"{THICKEST:g} {meaning}")
     if tip.ridges != "none":
         axis = tip.length if tip.ridges == "across" else tip.width
-        _at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")
+        at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")
         _check_profile(tip, solid.thickness[0])
     angle = np.linspace(0.0, 0.5 * np.pi, 46)
     theta, phi = (grid.ravel() for grid in np.meshgrid(angle, angle))
@@ -334,17 +336,11 @@ def _check_shape(tip: Fingertip, solid: Solid) -> None:
 def _check_profile(tip: Fingertip, thickness: float) -> None:
     relief = tip.ridges
     height = float(np.ptp(relief.height)) if isinstance(relief, HeightMap) else tip.ridge_height
-    _at_most("ridge_height", height, 0.7 * thickness, "0.7 times the stratum corneum's thickness")
+    at_most("ridge_height", height, 0.7 * thickness, "0.7 times the stratum corneum's thickness")
     if isinstance(relief, HeightMap):
         return
-    flat = tip.ridge_crest + tip.ridge_groove
-    _at_most("ridge_crest", flat, 0.9, "0.9 together with finger.ridge_groove")
+    check_flat(tip.ridge_crest + tip.ridge_groove)
     slope, limit = tip._profile.steepest, STEEPEST_FLAT if tip.ridge_crest > 0.0 else STEEPEST
     if slope > limit:
         allowed = f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest"
         raise InputError("finger.ridge_height", f"walls with a slope of {slope:.3g}", allowed)
-
-
-def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
-    if value > limit * (1.0 + 1e-12):
-        raise InputError(f"finger.{name}", value, f"at most {limit:.4g} ({meaning})")

@@ -82,9 +82,14 @@ def test_a_waveform_more_is_a_class(monkeypatch):
             return grouped(order, weight / weight.sum())
 
     monkeypatch.setitem(timesignals.WAVEFORMS, "triangle", Triangle)
-    drive = ev.Drive(50.0, waveform="triangle", skin="gabriel_dry")
-    assert drive.peak(100.0) == pytest.approx(173.205, rel=1e-5)
-    law, layers = ev.electrostatics.drive.mean_law(
-        ev.StrongTroxel(), drive, 50.0, (ev.TOUCHSCREEN, ev.TOUCHSCREEN)
-    )
-    assert 0.0 < law.traction(0.1, 100.0, layers) < ev.StrongTroxel().traction(0.0, 100.0, layers).max()
+    keys = 'law = "strong_troxel"\nwaveform = "triangle"\nfrequency = 50.0\nskin = "gabriel_dry"\n'
+    scene = loads(TEXT.replace('law = "softened"\nsoftening = 0.02\n', keys).replace("voltage", "amplitude"))
+    assert loads(dump(scene)) == scene
+    assert scene.voltage == pytest.approx(100.0 / np.sqrt(3.0))
+    assert schema()["properties"]["electrostatics"]["properties"]["waveform"]["enum"][-1] == "triangle"
+    law, layers = scene.electrics.attraction
+    solids, expected = (scene.electrics.skin, scene.electrics.insulator), 0.0
+    for order, weight in zip(*(part.tolist() for part in Triangle.harmonics()), strict=True):
+        one = ev.Layers.of(*solids, frequency=50.0 * order, gap_eps_r=2.0)
+        expected += weight * scene.law.traction(0.1, scene.voltage, one)
+    assert law.traction(0.1, scene.voltage, layers) == pytest.approx(expected, rel=1e-12)
