@@ -1,6 +1,6 @@
 """A force law and a waveform more: one class each, and every door of the package knows them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -67,6 +67,20 @@ def test_a_law_more_is_a_class(softened):
     with pytest.raises(InputError, match=r"electrostatics\.field: given full with"):
         loads(TEXT.replace("voltage =", 'field = "full"\nvoltage ='))
     assert ev.simulate(scene).normal_force[-1] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_law_that_derives_from_another_is_for_python_alone():
+    class Weaker(ev.StrongTroxel):
+        def traction(self, gap, voltage, layers):
+            return 0.5 * super().traction(gap, voltage, layers)
+
+    scene = replace(ev.default_scene(), law=Weaker())
+    assert Weaker not in FORCE_LAWS.values()
+    with pytest.raises(InputError, match=r"electrostatics\.law: given Weaker"):
+        dump(scene)
+    with pytest.raises(InputError, match="full with Weaker; allowed: local, or StrongTroxel"):
+        replace(scene, field="full")
+    assert replace(scene, law=ev.StrongTroxel(), field="full").field == "full"
 
 
 def test_a_waveform_more_is_a_class(monkeypatch):
