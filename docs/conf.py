@@ -2,6 +2,9 @@
 
 import evfem
 
+for name in evfem.__all__:
+    getattr(evfem, name)  # and so has its parameters in its docstring
+
 project = "evfem"
 version = release = evfem.__version__
 language = "en"

@@ -7,8 +7,7 @@ import textwrap
 from pathlib import Path
 
 from evfem.scene import schema as scenes
-from evfem.scene.schema import Entry as Key
-from evfem.scene.schema import Section
+from evfem.scene.schema import Entry, Section
 from evfem.simulation.history import MEANINGS
 from evfem.simulation.result import COLUMNS, UNITS
 from evfem.sweeps import schema as sweeps
@@ -51,7 +50,7 @@ def heading(title: str, section: Section) -> str:
     return f"`{table}`: {section.kind}" if section.kind else f"`{table}`"
 
 
-def entry(key: Key) -> str:
+def entry(key: Entry) -> str:
     """An item of a list about a key, each sentence on a line."""
     if "const" in key.schema:
         return f'- `{key.name} = "{key.schema["const"]}"`'

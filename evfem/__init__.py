@@ -104,6 +104,8 @@ def __getattr__(name: str) -> Any:
     """PEP 562: load a name, or a module, when it is first asked for."""
     if name in _HOME:
         value = getattr(_import_module(f"{__name__}.{_HOME[name]}"), name)
+        if hasattr(value, "__dataclass_fields__"):
+            _import_module(f"{__name__}.common.views").describe(value)
     elif name in _MODULES:
         value = _import_module(f"{__name__}.{_MODULES[name]}")
     elif name in _GONE:

@@ -114,6 +114,13 @@ def _results(command: argparse.ArgumentParser) -> None:
     _complete(out, FOLDERS)
 
 
+def _pool(command: argparse.ArgumentParser) -> None:
+    """Where the points of a sweep are computed."""
+    command.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
+    said = "of a Dask cluster, tcp://HOST:PORT; local starts one"
+    command.add_argument("--scheduler", metavar="ADDRESS", help=said)
+
+
 def _again(command: argparse.ArgumentParser, resume: str, overwrite: str) -> None:
     """What to do with what an earlier run left in the folder: at most one of the two."""
     either = command.add_mutually_exclusive_group()
@@ -136,10 +143,7 @@ def _sweep_options(sweep: argparse.ArgumentParser) -> None:
     _complete(file, FILES)
     _results(sweep)
     _again(sweep, "keep the points of another sweep in the folder", "remove all points that are there")
-    sweep.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
-    sweep.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
-    )
+    _pool(sweep)
 
 
 def _signal_options(voltage: argparse.ArgumentParser) -> None:
@@ -275,10 +279,7 @@ def _simulate_options(command: argparse.ArgumentParser) -> None:
 def _database_options(command: argparse.ArgumentParser) -> None:
     out = command.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for its points")
     _complete(out, FOLDERS)
-    command.add_argument("--workers", type=int, metavar="N", help="processes; default: one for each core")
-    command.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, tcp://HOST:PORT; local starts one"
-    )
+    _pool(command)
 
 
 def _studio_options(studio: argparse.ArgumentParser) -> None:

@@ -16,9 +16,6 @@ from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model
 from evfem.simulation.result import Result
 
-#: names of the layers of a scene, from the electrode up, by their numbers in the cell data `layer`
-LAYERS = ("insulator", "air", "stratum_corneum")
-
 
 def full_field(solution: FieldSolution, path: str | Path) -> Path:
     """Write the field of a rigid outline as a .vtu file: `potential` (V) at points, `electric_field`

@@ -20,7 +20,7 @@ TESTS = Path(__file__).parent
 ROOMS = {
     "common": (
         {"numpy", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices views checks pools digest storage listed tables",
+        "arrays constants notices checks views pools digest storage listed tables",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -54,7 +54,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics fieldless options scene written keys format schema file resolution drift "
+        "motion terms electrics fieldless options scene keys written format schema file resolution drift "
         "partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (

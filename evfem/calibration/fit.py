@@ -33,8 +33,8 @@ from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in
 from evfem.errors import InputError, quoted
 from evfem.scene.file import loads, read_text, tables_of
+from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
-from evfem.scene.written import VERSION
 from evfem.simulation.provenance import origin
 from evfem.sweeps.file import scene_tables
 from evfem.sweeps.folder import SweepFolder

@@ -115,8 +115,8 @@ def set_frozen(target: object, **values: object) -> None:
 
 @dataclass(frozen=True)
 class Within:
-    """The test of a number from `low` to `high`; `low` itself is out where it is `above`, and 0
-    where it is `not_zero`.
+    """The test of a number from `low` to `high`; `low` itself is out where it is `above`, `high` where it is
+    `below`, and 0 where it is `not_zero`.
 
     >>> Within(0.0, 200.0)(0.0), Within(0.0, above=True)(0.0), Within(-1.0, 1.0, not_zero=True)(0.0)
     (True, False, False)
@@ -125,11 +125,12 @@ class Within:
     low: float = -math.inf
     high: float = math.inf
     above: bool = False
+    below: bool = False
     not_zero: bool = False
 
     def __call__(self, value: float) -> bool:
-        inside = (self.low < value if self.above else self.low <= value) and value <= self.high
-        return inside and not (self.not_zero and value == 0.0)
+        edge = (self.above and value == self.low) or (self.below and value == self.high)
+        return self.low <= value <= self.high and not edge and not (self.not_zero and value == 0.0)
 
 
 def number(allowed: str, test: Callable[[float], bool], unit: str = "") -> dict[str, Any]:
@@ -152,6 +153,9 @@ def whole(most: int = MOST_STEPS, least: int = 1, allowed: str = "") -> dict[str
     allowed = allowed or f"a whole number from {least} to {most}"
     check = lambda key, value: count(key, value, most, least, allowed)  # noqa: E731
     return {"allowed": allowed, "check": check, "test": Within(least, most)}
+
+
+SEED = whole(2**63 - 1, 0, "a whole number, not negative")
 
 
 def one_of(*names: str) -> dict[str, Any]:
@@ -213,6 +217,12 @@ class Key:
         return self.rule.get("allowed") or " | ".join(self.rule["names"])
 
     @property
+    def told(self) -> str:
+        """What it means and may be, in words."""
+        unit = f" ({self.rule['unit']})" if self.rule.get("unit") else ""
+        return f"{self.meaning}{unit}. Allowed: {self.allowed}"
+
+    @property
     def required(self) -> bool:
         """Whether it must be given."""
         return self.default is MISSING
@@ -230,15 +240,15 @@ def fields_of(cls: type) -> tuple[Key, ...]:
     """The fields of a dataclass that its constructor takes, whether they say what they mean or not."""
     hints, found = get_type_hints(cls, include_extras=True), []
     for spec in fields(cls):
-        about = getattr(hints[spec.name], "__metadata__", ())
-        rule = dict(spec.metadata).copy()
+        hint = hints[spec.name]
+        about = getattr(hint, "__metadata__", ())
+        rule = dict(spec.metadata)
         for one in about:
             rule |= one if isinstance(one, dict) else {}
-        annotation = getattr(hints[spec.name], "__origin__", None) if about else hints[spec.name]
+        meaning = "".join([one for one in about if isinstance(one, str)][-1:])
         default = spec.default if spec.default_factory is MISSING else spec.default_factory()
-        words = [one for one in about if isinstance(one, str)]
         if spec.init:
-            found.append(Key(spec.name, annotation, default, rule, words[-1] if words else ""))
+            found.append(Key(spec.name, hint.__origin__ if about else hint, default, rule, meaning))
     return tuple(found)
 
 

@@ -1,5 +1,5 @@
 """How objects show themselves: their fields that are not as usual, small tables and curves for
-notebooks.
+notebooks; and what `help` says of the parameters of a class.
 """
 
 from __future__ import annotations
@@ -7,12 +7,18 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING, Field, fields, is_dataclass
+from inspect import cleandoc
+from textwrap import fill
 from typing import Any
+
+from evfem.common.checks import fields_of, keys_of
 
 #: size of a curve in pixels
 WIDTH, HEIGHT = 240, 48
 LONGEST = 160
+#: columns of what `help` says
+COLUMNS = 96
 #: what is shown as 0, in any of our units
 TINY = 1e-12
 
@@ -92,3 +98,17 @@ def curves(lines: Mapping[str, tuple[str, Sequence[float]]]) -> str:
         drawn += f'<polyline fill="none" {style} points="{points}">{title}</polyline>'
     box = f'viewBox="0 {-max(finite):.6g} {longest - 1} {height:.6g}" preserveAspectRatio="none"'
     return f'<svg width="{WIDTH}" height="{HEIGHT}" overflow="visible" {box} role="img">{drawn}</svg>'
+
+
+def describe(cls: Any) -> None:
+    """Let `help` say the parameters of a dataclass, from their annotations: type, meaning and range."""
+    keys = keys_of(cls) if isinstance(cls, type) and is_dataclass(cls) else ()
+    if not keys:
+        return
+    lines = []
+    for key in keys:
+        words = key.meaning if key.annotation is bool or key.allowed.startswith("a table [") else key.told
+        lines += [fill(f"- `{key.field}`: {words}", COLUMNS, subsequent_indent="  ")]
+    cls.__doc__ = "\n".join([cleandoc(cls.__doc__ or ""), "", *lines])
+    plain = {key.field: key.annotation for key in fields_of(cls) if key.rule}
+    cls.__init__.__annotations__ = {**cls.__init__.__annotations__, **plain}

@@ -9,7 +9,7 @@ law                   tau                                                       
 ====================  ==================================================================  ===========
 `Coulomb`             mu p                                                                coulomb
 `LoadIndexFriction`   mu p (p / pressure)^(index - 1)                                     load_index
-`AdhesiveFriction`    strength min(1, p / full) + mu p                                               adhesive
+`AdhesiveFriction`    strength min(1, p / full) + mu p                                    adhesive
 `RateFriction`        mu p (ratio + (1 - ratio) exp(-v / speed)) (v / speed)^exponent     rate
 `AgeingFriction`      mu p (1 - (1 - fresh) exp(-t / time))                               ageing
 ====================  ==================================================================  ===========
@@ -68,8 +68,7 @@ class Coulomb:
 
 @dataclass(frozen=True)
 class LoadIndexFriction:
-    """The force grows with the power `index` of the load: the coefficient is that of the surface at
-    `pressure` (MPa), and below `lowest` (MPa; None: a hundredth of it) what it is there.
+    """The force grows with a power of the load; the coefficient is that of the surface at one pressure.
 
     >>> law = LoadIndexFriction(pressure=0.01, index=0.7)
     >>> round(float(law.bound(0.02, 0.3, 0.0, 0.0) / law.bound(0.01, 0.3, 0.0, 0.0)), 12) == round(2**0.7, 12)
@@ -95,8 +94,8 @@ class LoadIndexFriction:
 
 @dataclass(frozen=True)
 class AdhesiveFriction:
-    """Every place in real contact resists with the shear `strength` (MPa) besides mu p. Contact is
-    complete from the pressure `full` on (MPa; None: the strength), and below it grows in proportion.
+    """Every place in real contact resists with a shear strength besides mu p; contact grows in proportion to
+    the pressure until it is complete.
 
     >>> AdhesiveFriction(strength=0.004).bound(np.array([0.002, 0.01]), 0.3, 0.0, 0.0).tolist()
     [0.0026, 0.007]
@@ -124,9 +123,7 @@ class AdhesiveFriction:
 
 @dataclass(frozen=True)
 class RateFriction:
-    """Friction of sliding at `speed` (mm/s): it falls from mu to `ratio` mu around it, and goes with
-    the power `exponent` of the speed, which below `slowest` (mm/s; None: a hundredth of `speed`)
-    counts as that.
+    """Friction of sliding: it falls from mu to `ratio` mu around `speed`, and goes with a power of the speed.
 
     >>> stribeck = RateFriction(speed=5.0, ratio=0.5)
     >>> stribeck.bound(0.01, 0.4, np.array([0.0, 1e9]), 0.0).tolist()
@@ -158,8 +155,8 @@ class RateFriction:
 
 @dataclass(frozen=True)
 class AgeingFriction:
-    """A place that has just touched resists with the share `fresh` of mu p; the rest comes with its
-    real area of contact, of first order with the `time` (s), sliding or not.
+    """A place that has just touched resists with a share of mu p; the rest comes with its real area of
+    contact, of first order with the time, sliding or not.
 
     >>> law = AgeingFriction(fresh=0.2, time=6.7)
     >>> law.bound(0.01, 0.5, 0.0, np.array([0.0, 20.0])).round(5).tolist()

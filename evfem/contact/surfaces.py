@@ -20,7 +20,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
-from evfem.common.checks import Within, check_fields, number, real, set_frozen
+from evfem.common.checks import Within, check_fields, instance, number, real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Layer
@@ -48,7 +48,11 @@ EQUATION_25 = ((0.025, 6.0, 0.0), (0.025, 12.0, np.pi / 2), (-0.025, 0.0, np.pi 
 
 Friction = Annotated[
     float | Rows,
-    {"allowed": FRICTION, "type": float | list[list[float]]},
+    {
+        "allowed": FRICTION,
+        "check": lambda key, given: _friction(key, given),
+        "type": float | list[list[float]],
+    },
     "Coulomb's coefficient, or its table over x (mm), linear in between",
 ]
 Shift = Annotated[
@@ -56,6 +60,7 @@ Shift = Annotated[
     number("a height in mm, within 1e3 mm", Within(-HIGHEST, HIGHEST), "mm"),
     "shift of the profile; without it the finger just touches at the start",
 ]
+Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None", Layer, type(None))]
 
 
 class RigidSurface:
@@ -68,11 +73,8 @@ class RigidSurface:
     insulator: Layer | None
     is_flat = False
 
-    def _check_common(self) -> None:
-        set_frozen(self, friction=_friction(self.friction))
+    def __post_init__(self) -> None:
         check_fields(self, "surface.")
-        if not (self.insulator is None or isinstance(self.insulator, Layer)):
-            raise InputError("surface.insulator", quoted(self.insulator), "Layer(thickness, eps_r), or None")
 
     @property
     def has_friction(self) -> bool:
@@ -172,10 +174,7 @@ class Flat(_Level):
 
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
-
-    def __post_init__(self) -> None:
-        self._check_common()
+    insulator: Insulator = None
 
 
 @dataclass(frozen=True)
@@ -191,13 +190,13 @@ class Display(_Level):
     (Layer(thickness=0.09, eps_r=3.35), Layer(thickness=0.001, eps_r=3.9))
     """
 
-    insulator: Layer | None = FILM
+    insulator: Insulator = FILM
     friction: Friction = 0.3
     y: Shift = None
     electrodes: Rows | None = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         if self.electrodes is None:
             return
         rows = _rows("surface.electrodes", self.electrodes, 3, ELECTRODES, MOST_TERMS)
@@ -210,10 +209,8 @@ class Display(_Level):
 
 @dataclass(frozen=True)
 class Sinusoid(RigidSurface):
-    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase).
-
-    `terms`: rows [amplitude in mm, wavenumber in rad/mm, phase in rad]; None: equation (25) of the
-    paper, height(x) = 0.025 (sin 6x + cos 12x - 1).
+    """A sum of sines, height(x) = sum of amplitude sin(wavenumber x + phase); without `terms` equation (25)
+    of the paper, 0.025 (sin 6x + cos 12x - 1) mm.
 
     >>> float(Sinusoid().height(0.0))
     0.0
@@ -226,10 +223,10 @@ class Sinusoid(RigidSurface):
         "sum of a sin(k x + phase); without it eq. (25) of the paper",
     ] = None
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         terms = EQUATION_25 if self.terms is None else self.terms
         rows = _rows("surface.terms", terms, 3, TERMS, MOST_TERMS)
         if (np.abs(rows) > [HIGHEST, FASTEST, FASTEST]).any():
@@ -274,7 +271,7 @@ class Profile(RigidSurface):
     samples: Array
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __init__(
         self,
@@ -285,7 +282,7 @@ class Profile(RigidSurface):
         insulator: Layer | None = None,
     ) -> None:
         set_frozen(self, friction=friction, y=y, insulator=insulator)
-        self._check_common()
+        super().__post_init__()
         set_frozen(self, x=numbers("surface.x", x, "a list of positions in mm"))
         set_frozen(self, samples=numbers("surface.height", height, "a list of heights in mm"))
         _check_samples(self.x, self.samples)
@@ -344,14 +341,14 @@ class Profile(RigidSurface):
         return 2.0 * c[1] + d * 6.0 * c[0]
 
 
-def _friction(given: Any) -> float | Rows:
+def _friction(key: str, given: Any) -> float | Rows:
     """A number as float, a table as a tuple of rows."""
     if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
-        return real("surface.friction", given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
-    rows = _rows("surface.friction", given, 2, FRICTION, MOST_ROWS)
+        return real(key, given, FRICTION, lambda mu: 0.0 <= mu <= ROUGHEST)
+    rows = _rows(key, given, 2, FRICTION, MOST_ROWS)
     x, mu = np.array(rows).T
     if not ((mu >= 0.0) & (mu <= ROUGHEST) & (np.abs(x) <= FARTHEST)).all() or (np.diff(x) < 0.0).any():
-        raise InputError("surface.friction", given, FRICTION)
+        raise InputError(key, given, FRICTION)
     return rows
 
 

@@ -18,20 +18,31 @@ self-affine profile along a line (Jacobs, Junge and Pastewka 2017, doi:10.1088/2
 from __future__ import annotations
 
 import random
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Within, number, real, set_frozen, whole
-from evfem.contact.surfaces import FARTHEST, HIGHEST, MOST_TERMS, Friction, RigidSurface, Shift, Sinusoid
-from evfem.electrostatics.laws import Layer
+from evfem.common.checks import SEED, Within, number, real, set_frozen
+from evfem.contact.surfaces import (
+    FARTHEST,
+    HIGHEST,
+    MOST_TERMS,
+    Flat,
+    Friction,
+    Insulator,
+    Profile,
+    RigidSurface,
+    Shift,
+    Sinusoid,
+)
 from evfem.errors import InputError
 from evfem.tensor import Array
 
-#: shortest length of a texture (mm), and largest seed
-FINEST, LARGEST_SEED = 1e-6, 2**63 - 1
+#: shortest length of a texture (mm)
+FINEST = 1e-6
 #: a wall's share of the narrower one of ridge and groove where nothing is said
 WALL = 0.5
 
@@ -47,17 +58,14 @@ _SHORTEST = {"allowed": "a wavelength in mm up to the longest", "unit": "mm"}
 _LONGEST = {"allowed": "a wavelength in mm up to the period", "unit": "mm"}
 _PHASE = number("a part of the period, -1 to 1", Within(-1.0, 1.0), "periods")
 _HURST = number("a Hurst exponent from 0 to 1", Within(0.0, 1.0))
-_SEED = whole(LARGEST_SEED, 0, "a whole number, not negative")
 
 
 @dataclass(frozen=True)
 class Grating(RigidSurface):
-    """A grating: flat ridges at height 0, flat grooves at -`groove_depth`, one of each per
-    `period` (mm).
+    """A grating: flat ridges at height 0, flat grooves below, one of each per period.
 
-    `groove_width` is measured at half depth; None: half the period. `wall_width` is how much of x
-    each wall takes; None: half of the narrower one of ridge and groove. The middles of ridges are
-    at x = (k + `phase`) `period`. The steepest slope is pi `groove_depth` / (2 `wall_width`).
+    The middles of ridges are at x = (k + `phase`) `period`. The steepest slope is pi `groove_depth` / (2
+    `wall_width`).
 
     >>> grating = Grating(period=2.0, groove_depth=0.1, groove_width=0.5, wall_width=0.2)
     >>> grating.height(np.array([0.0, 0.64, 0.75, 1.0, 2.0])).round(3).tolist()
@@ -76,10 +84,10 @@ class Grating(RigidSurface):
     phase: Annotated[float, _PHASE, "place of a ridge's middle"] = 0.0
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         period = self.period
         groove = 0.5 * period if self.groove_width is None else self.groove_width
         allowed = f"a width in mm above 0 and below the period, {period:g}"
@@ -126,13 +134,11 @@ class Grating(RigidSurface):
 
 @dataclass(frozen=True)
 class SelfAffine(RigidSurface):
-    """Self-affine roughness with the Hurst exponent `hurst` and the root mean square height `rms`
-    (mm).
+    """Self-affine roughness: every wave from `longest` to `shortest` that fits a whole number of times into
+    `period`.
 
-    It repeats after `period` (mm) and has every wave from `longest` (None: the period) down to
-    `shortest` (mm) that fits a whole number of times into the period. The phases come from `seed`:
-    the same numbers give the same profile on every machine, and a band that is wider keeps the
-    waves that it had, but for their common factor.
+    The phases come from `seed`: the same numbers give the same profile on every machine, and a band that is
+    wider keeps the waves that it had, but for their common factor.
 
     >>> rough = SelfAffine(hurst=0.8, rms=0.01, period=10.0, shortest=0.2, seed=1)
     >>> len(rough.terms), f"{np.std(rough.height(np.arange(0.0, 10.0, 0.05))):.6f}"
@@ -144,13 +150,13 @@ class SelfAffine(RigidSurface):
     period: Annotated[float, _length(FARTHEST), "after which the surface repeats"] = 10.0
     shortest: Annotated[float, _SHORTEST, "shortest wave"] = 0.2
     longest: Annotated[float | None, _LONGEST, "longest wave; without it the period"] = None
-    seed: Annotated[int, _SEED, "the same seed gives the same surface"] = 0
+    seed: Annotated[int, SEED, "the same seed gives the same surface"] = 0
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
     def __post_init__(self) -> None:
-        self._check_common()
+        super().__post_init__()
         period = self.period
         longest = period if self.longest is None else self.longest
         longest = real(
@@ -202,3 +208,13 @@ class SelfAffine(RigidSurface):
 
 def _within(most: float):  # type: ignore[no-untyped-def]
     return lambda length: FINEST <= length <= most * (1.0 + 1e-12)
+
+
+#: the surfaces by their kinds in a file
+SURFACES: Mapping[str, Any] = {
+    "flat": Flat,
+    "sinusoid": Sinusoid,
+    "profile": Profile,
+    "grating": Grating,
+    "self_affine": SelfAffine,
+}

@@ -62,12 +62,10 @@ class Drive:
     """An alternating voltage and what conducts, for `Scene(drive=...)`; the scene's `voltage` is
     its effective value.
 
-    `frequency` in Hz; None where the voltage is a signal over time that has its own, or a direct
-    voltage that is resolved in time. `waveform` sine or square. `skin`: a name in
-    `evfem.electrostatics.SKINS`, a `Dielectric`, a table or a number; None is the finger's own
-    permittivity. `gap_conductivity` in S/m. Without `resolved` the attraction is its mean over the
-    cycle, which is right where the finger is too slow to follow twice the frequency; resolved, the
-    steps follow the voltage of the moment, and charges move.
+    `frequency` is None where the voltage is a signal over time that has its own, or a direct voltage that is
+    resolved in time. `skin` may also be a `Dielectric`, a table or a number. The mean over the cycle is right
+    where the finger is too slow to follow twice the frequency; resolved, the steps follow the voltage of the
+    moment, and charges move.
 
     >>> Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8).peak(50.0)
     70.71067811865476

@@ -16,7 +16,6 @@ has no cells::
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -89,25 +88,6 @@ class FieldMesh:
         """The same cells with the body `distance` (mm) higher."""
         points = self.points + distance * np.stack([np.zeros_like(self.lift), self.lift])
         return FieldMesh(points, self.line, self.row, self.cells, self.in_slab, self.lift, self.shape,
-                         self.periodic)  # fmt: skip
-
-    def refined(self) -> FieldMesh:
-        """Every cell cut into four."""
-
-        def around(values: Any) -> Any:  # corners, middles of sides and of the cell: (..., 9, m)
-            corner = values[..., self.cells]
-            side = (corner + np.roll(corner, -1, axis=-2)) / 2
-            return np.concatenate([corner, side, corner.mean(axis=-2, keepdims=True)], axis=-2)
-
-        row, line = (np.rint(2 * around(index)).astype(int) for index in (self.row, self.line))
-        width = 2 * self.shape[1] + 1
-        kept, first, number = np.unique(row * width + line, return_index=True, return_inverse=True)
-        number = number.reshape(row.shape)
-        quarters = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
-        cells = np.concatenate([number[quarter] for quarter in quarters], axis=1)
-        points = np.stack([around(axis).ravel()[first] for axis in self.points])
-        return FieldMesh(points, kept % width, kept // width, cells, np.tile(self.in_slab, 4),
-                         around(self.lift).ravel()[first], (2 * self.shape[0], width - 1),
                          self.periodic)  # fmt: skip
 
 

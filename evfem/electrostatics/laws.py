@@ -182,13 +182,16 @@ FORCE_LAWS: dict[str, Any] = {}
 class NamedLaw:
     """A force law with a name in scene files, whose annotated fields are keys of [electrostatics]: a class
     `class Own(NamedLaw, name="own")` is all that one needs, here or in a module that has been imported.
+    What derives from a law without a name is for Python alone.
     """
 
     #: whether its force is the stress of a field between the conductors, which rigid layers alone have
     of_a_field = False
 
-    def __init_subclass__(cls, name: str) -> None:
-        FORCE_LAWS[name] = cls
+    def __init_subclass__(cls, name: str = "") -> None:
+        cls.of_a_field = vars(cls).get("of_a_field", False)  # another law has another force
+        if name:
+            FORCE_LAWS[name] = cls
 
 
 @dataclass(frozen=True)

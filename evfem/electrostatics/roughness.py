@@ -29,8 +29,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Values, Within, check_fields, number, plain
-from evfem.errors import InputError, quoted
+from evfem.common.checks import Values, Within, check_fields, number, plain, real
+from evfem.errors import InputError
 from evfem.protocols import RoughnessLaw
 from evfem.tensor import derivative
 
@@ -46,7 +46,7 @@ OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no b
 
 @dataclass(frozen=True)
 class ConstantRoughness:
-    """The separation is `gap` (mm) whatever the pressure.
+    """The same separation whatever the pressure.
 
     >>> ConstantRoughness(0.001).separation(np.array([0.0, 0.02])).tolist()
     [0.001, 0.001]
@@ -69,8 +69,7 @@ class ConstantRoughness:
 
 @dataclass(frozen=True)
 class PowerRoughness:
-    """The separation is `gap` (mm) at `pressure` (MPa) and falls with the power -`exponent` of the
-    contact pressure, from `open_gap` (mm) at none.
+    """The separation falls with the power -`exponent` of the contact pressure, from `open_gap` at none.
 
     >>> law = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
     >>> law.separation(np.array([0.0, 0.01, 0.04])).tolist()
@@ -107,8 +106,8 @@ class PowerRoughness:
 
 @dataclass(frozen=True)
 class ExponentialRoughness:
-    """The separation falls by `decay` (mm) for every factor e of the contact pressure, from
-    `open_gap` (mm) at none to nothing at `pressure` (MPa): Persson's u0 and beta E*.
+    """The separation falls by `decay` for every factor e of the contact pressure, from `open_gap` at none to
+    nothing at `pressure`: Persson's u0 and beta E*.
 
     >>> law = ExponentialRoughness(decay=0.001, pressure=1.0, open_gap=0.008)
     >>> law.separation(np.array([0.0, np.exp(-2.0), 2.0])).round(12).tolist()
@@ -144,25 +143,39 @@ class ExponentialRoughness:
 
 
 LAWS = {cls.law: cls for cls in (ConstantRoughness, PowerRoughness, ExponentialRoughness)}
-ALLOWED = f"a length in mm from 0 to {WIDEST:g}, or an object with a method separation(pressure)"
+ALLOWED = f"a length in mm from 0 to {WIDEST:g}, a table with a law, or an object with separation(pressure)"
 
 
-def roughness_of(given: Any) -> RoughnessLaw | None:
+def roughness_of(given: Any, key: str = "roughness_gap") -> RoughnessLaw | None:
     """The law of a scene: a length (mm) is that of constant roughness, 0 none at all.
 
     >>> roughness_of(0.0), roughness_of(0.001)
     (None, ConstantRoughness(gap=0.001))
     """
     if isinstance(given, type) and hasattr(given, "separation"):
-        raise InputError("roughness_gap", f"the class {given.__name__}", "an object of it")
+        raise InputError(key, f"the class {given.__name__}", "an object of it")
     if isinstance(given, RoughnessLaw):
         return given
-    if isinstance(given, bool) or not isinstance(given, (int, float)):
-        raise InputError("roughness_gap", quoted(given), ALLOWED)
-    try:
-        return ConstantRoughness(given) if given != 0.0 else None
-    except InputError as error:
-        raise InputError("roughness_gap", given, ALLOWED) from error
+    gap = real(key, given, ALLOWED, Within(0.0, WIDEST))
+    return ConstantRoughness(gap) if gap != 0.0 else None
+
+
+def _gap(key: str, given: Any) -> Any:
+    return given if roughness_of(given, key) is given else float(given)
+
+
+RoughnessGap = Annotated[
+    float | RoughnessLaw,
+    {
+        "allowed": ALLOWED,
+        "check": _gap,
+        "type": float | dict,
+        "kinds": lambda: LAWS,
+        "tag": "law",
+        "unit": "mm",
+    },
+    "what rough skin keeps between itself and the insulator in contact",
+]
 
 
 def separation_derivative(law: RoughnessLaw, pressure: Values) -> Values:

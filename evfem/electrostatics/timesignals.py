@@ -76,7 +76,7 @@ Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 @dataclass(frozen=True)
 class Sine:
-    """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`) in V; frequency in Hz, phase in rad.
+    """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`).
 
     >>> Sine(frequency=50.0, amplitude=100.0, bias=20.0)(0.005)
     120.0
@@ -124,8 +124,7 @@ class Sine:
 
 @dataclass(frozen=True)
 class Square:
-    """+`amplitude` in the first half of each period and -`amplitude` in the second, in V;
-    frequency in Hz.
+    """+`amplitude` in the first half of each period and -`amplitude` in the second.
 
     >>> Square(frequency=50.0, amplitude=100.0)([0.0, 0.009, 0.01, 0.02]).tolist()
     [100.0, 100.0, -100.0, 100.0]
@@ -167,8 +166,8 @@ class Square:
 
 @dataclass(frozen=True)
 class OpenCircuit:
-    """A direct `voltage` (V) until the time `after` (s); then the electrode is disconnected and keeps
-    its charge, whatever that does to its voltage. For a resolved `Drive`.
+    """A direct voltage until the electrode is disconnected; then it keeps its charge, whatever that does to
+    its voltage. For a resolved `Drive`.
 
     >>> OpenCircuit(100.0, after=0.1).largest
     100.0
@@ -194,8 +193,7 @@ class OpenCircuit:
 
 @dataclass(frozen=True)
 class ChargeControl:
-    """The electrode has the `charge`, in nC per mm of depth, and the voltage that this takes: a
-    number, or a signal over time whose values are charges. For a resolved `Drive`.
+    """The electrode has a charge, and the voltage that this takes. For a resolved `Drive`.
 
     A plate of the area A under the charge Q is pulled by Q^2 / (2 eps_0 A), however far it is.
 
@@ -237,12 +235,11 @@ class ChargeControl:
 
 @dataclass(frozen=True)
 class Carrier:
-    """`envelope` times sin(2 pi `frequency` t), in V: a carrier, modulated where the envelope is a
-    signal.
+    """`envelope` times sin(2 pi `frequency` t): a carrier, modulated where the envelope is a signal.
 
-    With `resolved` False it is the root mean square over the carrier's cycles instead, envelope /
-    sqrt(2): the steps need only resolve the envelope, and a law proportional to the squared
-    voltage gives the mean attraction exactly.
+    With `resolved` False it is the root mean square over the carrier's cycles instead, envelope / sqrt(2):
+    the steps need only resolve the envelope, and a law proportional to the squared voltage gives the mean
+    attraction exactly.
 
     >>> hum = Carrier(10_000.0, envelope=Sine(75.0, amplitude=50.0, bias=100.0))
     >>> hum.largest, hum.highest_frequency
@@ -289,11 +286,8 @@ class Carrier:
 
 @dataclass(frozen=True)
 class Sampled:
-    """Samples `voltage` (V, one axis) at `rate` (Hz), the first one at the time `start` (s): linear
-    between them.
-
-    Before the first and after the last sample it is constant; with `repeat` it starts again one
-    period after the last sample, as long as it lasts.
+    """Samples, linear between them and constant before the first and after the last; with `repeat` they start
+    again one period after the last, as long as they last.
 
     >>> steps = Sampled([0.0, 100.0, 0.0], rate=1000.0)
     >>> steps(0.0005), steps(0.5)
@@ -302,7 +296,7 @@ class Sampled:
     50.0
     """
 
-    voltage: Annotated[Any, {"unit": "V"}, "the samples"]
+    voltage: Annotated[Any, {"allowed": "numbers in V"}, "the samples"]
     rate: Annotated[float, RATE, "of the samples"]
     start: Annotated[float, START, "time of the first sample"] = 0.0
     repeat: Annotated[bool, yes_or_no(), "whether it begins anew at its end"] = False

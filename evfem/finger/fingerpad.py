@@ -114,10 +114,7 @@ _REGIONS["check"] = _regions
 
 @dataclass(frozen=True)
 class Electrical:
-    """The dielectric between the pad's surface and the conducting tissue below.
-
-    `stratum_corneum_thickness` in mm; None: the local thickness of that region of the mesh.
-    """
+    """The dielectric between the pad's surface and the conducting tissue below."""
 
     stratum_corneum_thickness: Annotated[
         float | None,
@@ -137,38 +134,30 @@ class FingerPad:
     """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail
     above.
 
-    **Outline.** Full axes `width` and `height`; on the lower side fingerprint ridges: their crests
-    lie on the ellipse, grooves are cut in. With t = abs(x - crest) / (`ridge_width`/2), x the
-    abscissa of the point of the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep,
-    measured along the ellipse's normal. Crests stand at x = (k + `ridge_phase`) `ridge_width`.
-    With `ridge_crest` > 0 the ridges are flat-topped instead: crest and groove are flat over the
-    fractions `ridge_crest` and `ridge_groove` of the pitch, with cosine-shaped walls. Ridges fade
+    **Outline.** On the lower side fingerprint ridges, whose crests lie on the ellipse at x = (k +
+    `ridge_phase`) `ridge_width`. With t = abs(x - crest) / (`ridge_width`/2), x the abscissa of the point of
+    the ellipse, a groove is `ridge_height` t**`ridge_exponent` deep, along the ellipse's normal; with
+    `ridge_crest` > 0 crest and groove are flat instead, with cosine-shaped walls. Ridges fade
     out between 0.72 and 0.79 of half the width (6.0 to 6.6 mm). `ridge_exponent` 7 is the shape
     that meets the ratio of ridge to gross contact area of Adams et al.
-    (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (`RidgeScan`, or the path of a csv file
-    with the header x,height or x,y) takes the place of this profile; `ridge_width` then says how
-    finely the pad is divided.
+    (doi:10.1098/rsif.2012.0467) within 10 %. A `ridge_scan` (or a `RidgeScan`) takes the place of this
+    profile; `ridge_width` then says how finely the pad is divided.
 
-    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the
-    ridges: the stratum corneum is `stratum_corneum_thickness` thick at a crest and `ridge_height`
-    less in a groove. Its default and those of outline and ridges are Table 2 of the paper.
-    Assumed, of the size that finger models use (for example doi:10.1115/1.1613673): epidermis 0.47
-    mm, dermis 1.0 mm. Below the nail everything down to the bone is dermis (the nail bed). The
-    hypodermis fills the rest.
+    **Layers.** Interfaces are true normal offsets of the smooth ellipse and do not follow the ridges: the
+    stratum corneum is `ridge_height` thinner in a groove. Its thickness, outline and ridges are Table 2 of
+    the paper. Assumed, of the size that finger models use (for example doi:10.1115/1.1613673): epidermis and
+    dermis. Below the nail everything down to the bone is dermis (the nail bed). The hypodermis fills the
+    rest.
 
     **Nail and bone.** Nail 0.45 mm thick (measured 0.40 to 0.48 mm: Wollina et al., Skin Res.
-    Technol. 7 (2001) 60-64), `nail_width` its chord (assumed). The bone is an ellipse with the
-    full axes `bone_width`, `bone_height` of the benchmark problem, its centre `bone_offset` above
-    that of the finger (assumed: there is more pulp than nail bed).
+    Technol. 7 (2001) 60-64), its width assumed. The bone is an ellipse of the benchmark problem's size,
+    its centre assumed: there is more pulp than nail bed.
 
-    **Mesh.** `resolution` coarse, medium, paper or fine: about 3k, 10k, 22k and 50k nodes, with
-    12, 24, 24 and 48 linear cells per ridge within about 3.5 mm of the middle. `paper` spreads its
-    cells over the layers as the paper does. Sets of nodes: `pad` (the outline with y <= 0),
-    `bone`, `nail` (the outer side of the nail).
+    **Mesh.** From coarse to fine 12, 24, 24 and 48 linear cells per ridge within about 3.5 mm of the middle;
+    `paper` spreads its cells over the layers as the paper does. Sets of nodes: `pad` (the outline with y <=
+    0), `bone`, `nail` (the outer side of the nail).
 
-    `materials` replaces the laws of Table 2 by region; `viscosity` is the relaxation time (s) of
-    materials without their own. Raises `InputError` for values out of range and for geometry that
-    cannot exist.
+    Raises `InputError` for values out of range and for geometry that cannot exist.
 
     >>> finger = FingerPad(resolution="coarse", materials={"nail": NeoHookean(E=20.0, nu=0.3)})
     >>> mesh = finger.mesh(order=1)
@@ -202,7 +191,7 @@ class FingerPad:
     bone_width: BoneWidth = 6.0
     bone_height: BoneHeight = 5.0
     bone_offset: BoneOffset = 1.0
-    resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 23k, 50k nodes"] = "medium"
+    resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 22k, 50k nodes"] = "medium"
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
@@ -361,11 +350,10 @@ def _check_scan(ridges: ScannedRidges, slope: float, spacing: float) -> None:
 
 @dataclass(frozen=True)
 class MeshedFinger:
-    """A finger on a mesh of the user's own: a file or a `Mesh`, one material law per region.
+    """A finger on a mesh of the user's own: a file or a `Mesh`, whose `regions` are those of `meshfile.read`.
 
-    `regions` maps names to numbers as in `meshfile.read`; `viscosity` is the relaxation time in s
-    of every material that has none of its own. The mesh is read and checked at once: raises
-    `InputError` when it is faulty or does not fit the materials.
+    The mesh is read and checked at once: raises `InputError` when it is faulty or does not fit the
+    materials.
     """
 
     source: Annotated[str | os.PathLike[str] | Mesh, _MESH, "a mesh of your own, in mm"]

@@ -21,7 +21,14 @@ from evfem.common.checks import between, check_fields, keys_of, one_of, set_froz
 from evfem.common.views import called, short, table
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
-from evfem.finger.fingerpad import Electrical, Materials, Skin, all_materials, own_parameters
+from evfem.finger.fingerpad import (
+    Electrical,
+    FingerPad,
+    Materials,
+    Skin,
+    all_materials,
+    own_parameters,
+)
 from evfem.finger.fingerpad import participant_sizes as sizes_in_section
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
 from evfem.finger.layers import LAYERS, thickness_of
@@ -93,28 +100,23 @@ class Fingertip:
     """The lower half of a finger's end in three dimensions: x across the finger, y up, z along it,
     its tip towards +z.
 
-    **Shape.** The lower half of an ellipsoid with the full axes `width`, `height` and `length`
-    around (0, 0, 0), above it the lower half of the bone, an ellipsoid with the full axes
-    `bone_width`, `bone_height` and `bone_length` whose centre is `bone_offset` higher. `length` is
-    about that of the paper's fingers seen from above, 26 mm held at 30 degrees; the bone's length
-    is assumed. The cut between the two moves with the bone (`rim` "fixed": the nail holds it) or
-    is "free". `posture` in degrees turns the tip down.
+    **Shape.** The lower half of an ellipsoid around (0, 0, 0), above it the lower half of the bone, another
+    ellipsoid. `length` is about that of the paper's fingers seen from above, 26 mm held at 30 degrees; the
+    bone's length is assumed. The cut between the two moves with the bone (`rim` "fixed": the nail holds it)
+    or is "free".
 
-    **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along
-    the finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile
-    of `FingerPad`: `ridge_height`, `ridge_width`, `ridge_exponent`, `ridge_phase`, `ridge_crest`,
-    `ridge_groove`. Or a measured print: a `HeightMap`, the path of a csv file with the header
-    x,z,height in mm, or of a grey image whose points are `ridge_pixel` mm apart, white
-    `ridge_height` above black, seen from below with the tip up; `ridge_width` then says how finely
-    the pad is divided. Ridges fade out towards the edges of the rectangle that is 0.64 of the
-    pad's axes.
+    **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along the
+    finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile of
+    `FingerPad`. Or a measured print: a `HeightMap`, the path of a csv file with the header x,z,height in mm,
+    or of a grey image whose points are `ridge_pixel` mm apart, white `ridge_height` above black, seen from
+    below with the tip up; `ridge_width` then says how finely the pad is divided. Ridges fade out towards the
+    edges of the rectangle that is 0.64 of the pad's axes.
 
     **Layers and materials** are those of `FingerPad` (one table), without nail and nail bed.
 
-    **Mesh.** `resolution` coarse, medium or fine: smooth about 5k, 12k and 43k nodes; with
-    parallel ridges 22k, 34k and 115k, with curved ones 53k, 83k and 193k. Sets of nodes: `pad`
-    (the skin's surface), `bone` (with the cut, where the rim is fixed), `rim` (the cut). `mesh(1)`
-    has linear hexahedra, twice as many in each direction.
+    **Mesh.** Smooth about 5k, 12k and 43k nodes; with parallel ridges 22k, 34k and 115k, with curved ones
+    53k, 83k and 193k. Sets of nodes: `pad` (the skin's surface), `bone` (with the cut, where the rim is
+    fixed), `rim` (the cut). `mesh(1)` has linear hexahedra, twice as many in each direction.
 
     Raises `InputError` for values out of range and for geometry that cannot exist.
 
@@ -267,6 +269,10 @@ class Fingertip:
         count = max(int(fitting + 0.1), 1)
         middle, half = ((self.ridge_phase + 0.25) % 0.5 - 0.25) * self.ridge_width, 0.5 * count * step
         return count, (middle - half) / axis, (middle + half) / axis
+
+
+#: parametric fingers by their kinds in a file
+FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
 
 
 def tip_sizes(name: str) -> dict[str, Any]:

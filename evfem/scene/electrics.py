@@ -173,8 +173,9 @@ def check_drive(scene: Any) -> None:
     if scene.law is None:
         allowed = "a scene with an electrostatic law and a voltage"
         raise InputError("electrostatics.frequency", "a drive without a law", allowed)
-    (_check_resolved if drive.resolved else _check_mean)(scene, drive)
-    assert scene.electrics.attraction  # dielectrics that need a frequency say so
+    if scene.ground.insulator is not None:  # which is refused elsewhere
+        (_check_resolved if drive.resolved else _check_mean)(scene, drive)
+        _ = scene.electrics.attraction  # dielectrics that need a frequency say so
 
 
 def _check_mean(scene: Any, drive: Drive) -> None:

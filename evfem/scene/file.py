@@ -15,25 +15,24 @@ from pathlib import Path
 from typing import Any
 
 from evfem.common.checks import MOST_STEPS
+from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
-from evfem.finger.fingertip import tip_sizes
+from evfem.finger.fingertip import FINGERS, tip_sizes
 from evfem.finger.layers import TABLE_2
 from evfem.scene.format import (
-    FINGERS,
-    FRICTIONS,
     HOMES,
     SURFACES,
-    VERSION,
     BesideFinger,
     BesideSurface,
     Electrostatics,
+    Measured,
     SceneTable,
     names,
 )
-from evfem.scene.keys import at, check_size, kind_of, read, read_kind, shown
+from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, shown
 from evfem.scene.motion import MOTIONS, Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.written import dump
@@ -105,7 +104,7 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
             ramped = any(
                 isinstance(one, Mapping) and one.get("kind") == VoltageRamp.kind for one in top.motion
             )
-            parts |= found.scene_keys(law, ramped, folder)
+            parts |= found.scene_keys(law, ramped)
             insulated = {"insulator": found.layer(), "electrodes": found.electrodes}
     with mistakes.of_a_part():
         parts |= _surface(top.surface, folder, **insulated)
@@ -119,17 +118,16 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     return Scene(**parts, name=name.translate(dict.fromkeys(map(ord, "\\:\n"), "_")))
 
 
-def _electrostatics(table: Any, folder: Path) -> tuple[Electrostatics, Any]:
+def _electrostatics(table: Mapping[str, Any], folder: Path) -> tuple[Electrostatics, Any]:
     """The table, and the force law with those of its keys that are the law's."""
-    if not isinstance(table, Mapping) or "law" not in table:  # which says what may have been meant
-        return read(Electrostatics, table, "electrostatics", folder, homes=HOMES), None
-    cls = FORCE_LAWS[kind_of(table, "electrostatics", FORCE_LAWS, "law")]
-    own = [name for name in names(cls) if name not in names(Electrostatics)]
+    laws = [cls for name, cls in FORCE_LAWS.items() if name == table.get("law")]
+    own = [name for name in names(*laws or FORCE_LAWS.values()) if name not in names(Electrostatics)]
     mistakes, law, found = Mistakes(), None, None
     with mistakes.of_a_part():
-        law = read(cls, {name: table[name] for name in own if name in table}, "electrostatics")
-    with mistakes.of_a_part():
-        found = read(Electrostatics, table, "electrostatics", folder, beside=("law", *own), homes=HOMES)
+        found = read(Electrostatics, table, "electrostatics", folder, beside=own, homes=HOMES)
+    for cls in laws:
+        with mistakes.of_a_part():
+            law = read(cls, {name: table[name] for name in own if name in table}, "electrostatics")
     mistakes.report()
     return found, law
 
@@ -147,18 +145,21 @@ def _motions(tables: list[Any]) -> list[Motion]:
     return motions
 
 
-def _surface(table: Any, folder: Path, insulator: Any = None, electrodes: Any = None) -> dict[str, Any]:
+def _surface(
+    table: Mapping[str, Any], folder: Path, insulator: Any = None, electrodes: Any = None
+) -> dict[str, Any]:
     """The surface, and what its table says of the scene."""
-    kind, mistakes, found = kind_of(table, "surface", SURFACES), Mistakes(), dict[str, Any]()
-    given = {"insulator": insulator}
-    if electrodes is not None and kind != "flat":
-        raise InputError("electrostatics.electrodes", f"beside a surface of kind {kind}", "a flat surface")
-    kinds = SURFACES if insulator is None else {**SURFACES, "flat": Display}
-    if kinds[kind] is Display:
-        given["electrodes"] = electrodes
-    beside = names(BesideSurface)
-    with mistakes.of_a_part(), at("surface", surface_electrodes="electrostatics.electrodes"):
-        found["surface"] = read_kind(table, "surface", kinds, folder, beside=beside, homes=HOMES, **given)
+    mistakes, found = Mistakes(), dict[str, Any]()
+    with mistakes.of_a_part():
+        kind, kinds, more = kind_of(table, "surface", SURFACES), SURFACES, {"insulator": insulator}
+        if electrodes is not None and kind != "flat":
+            given = f"beside a surface of kind {kind}"
+            raise InputError("electrostatics.electrodes", given, "a flat surface")
+        if insulator is not None and kind == "flat":
+            kinds, more["electrodes"] = {"flat": Display}, electrodes
+        beside = names(BesideSurface)
+        with at("surface", {"surface.electrodes": "electrostatics.electrodes"}):
+            found["surface"] = read_kind(table, "surface", kinds, folder, beside=beside, homes=HOMES, **more)
     with mistakes.of_a_part():
         if "friction_law" in table:
             found["friction_law"] = read_kind(table["friction_law"], "surface.friction_law", FRICTIONS)
@@ -166,36 +167,39 @@ def _surface(table: Any, folder: Path, insulator: Any = None, electrodes: Any = 
     return found
 
 
-def _finger(table: Any, folder: Path) -> dict[str, Any]:
+def _finger(table: Mapping[str, Any], folder: Path) -> dict[str, Any]:
     """The finger, and what its table says of the scene."""
-    if not isinstance(table, Mapping):
-        raise InputError("finger", shown(table), "a table [finger]")
-    mistakes, found, given = Mistakes(), dict[str, Any](), dict(table)
+    mistakes, found = Mistakes(), dict[str, Any]()
     with mistakes.of_a_part(), at("finger"):
-        if "depth" in given:
-            found["depth"] = DEPTH["check"]("depth", given.pop("depth"))
+        if "depth" in table:
+            found["depth"] = DEPTH["check"]("depth", table["depth"])
     with mistakes.of_a_part():
-        found["finger"] = _meshed(given, folder) if "mesh" in given else _parametric(given, folder)
+        found["finger"] = (_meshed if "mesh" in table else _parametric)(table, folder)
     mistakes.report()
     return found
 
 
-def _meshed(table: dict[str, Any], folder: Path) -> MeshedFinger:
-    geometry = [name for name in table if name in {"kind", *names(FingerPad)} - {*names(MeshedFinger)}]
-    if geometry:
-        raise InputError(f"finger.{geometry[0]}", "geometry beside a mesh", "no geometry keys beside mesh")
+def _meshed(table: Mapping[str, Any], folder: Path) -> MeshedFinger:
+    geometry = {"kind", *names(Measured, FingerPad)} - {*names(MeshedFinger)}
+    for name in table:
+        if name in geometry:
+            raise InputError(f"finger.{name}", "geometry beside a mesh", "no geometry keys beside mesh")
     return read(MeshedFinger, table, "finger", folder, beside=names(BesideFinger), homes=HOMES)
 
 
-def _parametric(table: dict[str, Any], folder: Path) -> Any:
-    cls = FINGERS[kind_of({"kind": "pad"} | table, "finger", FINGERS)]
-    with at("finger"):
+def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
+    cls = FINGERS[kind_of({"kind": "pad", **table}, "finger", FINGERS)]
+    mistakes, sizes, found = Mistakes(), dict[str, Any](), None
+    with mistakes.of_a_part(), at("finger"):
         if "participant" in table:
-            sizes = participant_sizes if cls is FingerPad else tip_sizes
-            table = sizes(table["participant"]) | table
+            sizes = (participant_sizes if cls is FingerPad else tip_sizes)(table["participant"])
     if isinstance(laws := table.get("materials"), Mapping):
-        table = table | {"materials": {name: _completed(name, law) for name, law in laws.items()}}
-    return read(cls, table, "finger", folder, beside=("kind", *names(BesideFinger)), homes=HOMES)
+        table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
+    with mistakes.of_a_part():
+        beside = [*names(Measured, BesideFinger), "mesh"]
+        found = read(cls, {**sizes, **table}, "finger", folder, tag="kind", beside=beside, homes=HOMES)
+    mistakes.report()
+    return found
 
 
 def _completed(name: str, table: Any) -> Any:

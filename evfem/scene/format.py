@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
-from evfem.contact.friction import KINDS as FRICTIONS
-from evfem.contact.surfaces import Flat, Friction, Profile, Shift, Sinusoid
-from evfem.contact.textures import Grating, SelfAffine
+from evfem.contact import textures
+from evfem.contact.surfaces import Flat, Friction, Insulator, Profile, Shift
 from evfem.electrostatics import timesignals
-from evfem.electrostatics.dielectrics import SKINS, DielectricTable, dielectric
+from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer
 from evfem.electrostatics.signalfile import read_voltage
@@ -23,8 +22,7 @@ from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import RATE, START, Sampled
 from evfem.errors import ABSENT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad
-from evfem.finger.fingertip import Fingertip
-from evfem.scene.keys import LARGEST_TABLE, at, check_size, columns, shown
+from evfem.scene.keys import VERSION, at, columns, shown
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import (
     DEPTH,
@@ -38,15 +36,10 @@ from evfem.scene.scene import (
     Solver,
 )
 
-VERSION = 1
 Table = Mapping[str, Any]
 Pairs = list[list[float]]
-_FRICTION_LAW = {
-    "allowed": "a table [surface.friction_law] with a kind",
-    "type": dict,
-    "kinds": lambda: FRICTIONS,
-}
-_LAW = among(FORCE_LAWS)
+_HEIGHTS = "the path of a csv file with the header x,height"
+_CSV = {"file": lambda name: name.lower().endswith(".csv")}
 _SIGNAL = instance("a table [electrostatics.signal] with a kind", timesignals.TimeSignal)
 _SIGNAL |= {"type": dict, "kinds": lambda: SIGNALS}
 
@@ -55,35 +48,37 @@ def _rows(allowed: str, unit: str) -> dict[str, Any]:
     return instance(allowed, list, unit=unit)
 
 
+def _path(allowed: str) -> dict[str, Any]:
+    return {"file": True} | instance(allowed, str, Path)
+
+
+def _table(name: str, more: str = "") -> dict[str, Any]:
+    return {"allowed": f"a table [{name}]{more}"}
+
+
 @dataclass(frozen=True, kw_only=True)
 class SceneTable:
     """The whole file."""
 
     version: Annotated[int, {"allowed": str(VERSION)}, "version of the format"]
     finger: Annotated[
-        Table | None, {"allowed": "a table [finger]"}, "the finger; without it that of the paper's Table 2"
+        Table | None, _table("finger"), "the finger; without it that of the paper's Table 2"
     ] = None
     surface: Annotated[
-        Table,
-        {"allowed": "a table [surface] with a kind: flat | sinusoid | profile | grating | self_affine"},
-        "what the finger touches",
+        Table, _table("surface", f" with a kind: {' | '.join(textures.SURFACES)}"), "what the finger touches"
     ]
     electrostatics: Annotated[
         Table | None,
-        {"allowed": "a table [electrostatics]"},
+        _table("electrostatics"),
         "insulator, voltage and force law; without it no attraction",
     ] = None
     hand: Annotated[
-        Table | None,
-        {"allowed": "a table [hand]"},
-        "between drive and bone; without it the drive moves the bone itself",
+        Table | None, _table("hand"), "between drive and bone; without it the drive moves the bone itself"
     ] = None
     solver: Annotated[
-        Table | None,
-        {"allowed": "a table [solver]"},
-        "how the scene is solved; the defaults are the recommended ones",
+        Table | None, _table("solver"), "how the scene is solved; the defaults are the recommended ones"
     ] = None
-    output: Annotated[Table | None, {"allowed": "a table [output]"}, "which fields are kept"] = None
+    output: Annotated[Table | None, _table("output"), "which fields are kept"] = None
     motion: Annotated[
         list[Table],
         instance("one or more tables [[motion]]", list),
@@ -92,12 +87,18 @@ class SceneTable:
 
 
 @dataclass(frozen=True)
-class BesideFinger:
-    """Keys of [finger] that are no parameters of its kind."""
+class Measured:
+    """The key of a parametric [finger] that is no parameter of its kind."""
 
     participant: Annotated[
         str | None, {"allowed": "i to xi"}, "sizes of one of Table 1's fingers; other keys go before"
     ] = None
+
+
+@dataclass(frozen=True)
+class BesideFinger:
+    """The key of [finger] that is the scene's."""
+
     depth: Annotated[float | None, DEPTH, "of the finger; adds forces in N, areas in mm2"] = None
 
 
@@ -106,8 +107,8 @@ class BesideSurface:
     """The key of [surface] that is the scene's."""
 
     friction_law: Annotated[
-        Any,
-        _FRICTION_LAW,
+        Table | None,
+        _table("surface.friction_law", " with a kind"),
         "what the coefficient means; without it Coulomb's law",
     ] = None
 
@@ -116,25 +117,20 @@ class BesideSurface:
 class ProfileTable:
     """[surface] of the kind profile."""
 
-    file: Annotated[
-        str | None,
-        {"allowed": "the path of a csv file with the header x,height", "file": True}
-        | instance("the path of a csv file with the header x,height", str, Path),
-        "heights over x",
-    ] = None
+    file: Annotated[str | None, _path(_HEIGHTS), "heights over x"] = None
     points: Annotated[
         Pairs | None, _rows("rows [[x, height], ...] in mm", "mm"), "the same in the scene file"
     ] = None
     friction: Friction = 0.3
     y: Shift = None
-    insulator: Layer | None = None
+    insulator: Insulator = None
 
-    def made(self, folder: Path) -> Profile:
+    def made(self) -> Profile:
         """The profile of the file or of the points."""
         common: Any = {"friction": self.friction, "y": self.y, "insulator": self.insulator}
         if (self.file is None) == (self.points is None):
             given = ABSENT if self.file is None else "file and points"
-            raise InputError("surface.file", given, "the path of a csv file with the header x,height")
+            raise InputError("surface.file", given, _HEIGHTS)
         if self.points is not None:
             return Profile(*columns("surface.points", self.points), **common)
         return Profile.from_csv(self.file or "", **common)
@@ -146,8 +142,7 @@ class SampledTable:
 
     file: Annotated[
         str | None,
-        {"file": True}
-        | instance("the path of a csv file with the header time,voltage, or of a .wav", str, Path),
+        _path("the path of a csv file with the header time,voltage, or of a .wav"),
         "the samples",
     ] = None
     full_scale: Annotated[
@@ -164,7 +159,7 @@ class SampledTable:
     ] = None
     repeat: Annotated[bool, yes_or_no(), "whether it begins anew at its end"] = False
 
-    def made(self, folder: Path) -> Sampled:
+    def made(self) -> Sampled:
         """The samples of the file, or as they stand in the table."""
         file = self.file if self.file is None else Path(self.file)
         wav = file is not None and file.suffix.lower() == ".wav"
@@ -181,7 +176,7 @@ class SampledTable:
                 raise InputError(name, f"{shown(value)} beside {beside}", "nothing here")
         if file is None:
             return Sampled(self.voltage, self.rate or 0.0, self.start or 0.0, self.repeat)
-        with at("electrostatics.signal", path="electrostatics.signal.file"):
+        with at("electrostatics.signal", {"path": "electrostatics.signal.file"}):
             if wav:
                 return Sampled.from_wav(file, self.full_scale, start=self.start or 0.0, repeat=self.repeat)
             return Sampled.from_csv(file, repeat=self.repeat)
@@ -194,7 +189,7 @@ SIGNALS: Mapping[str, Any] = {**timesignals.SIGNALS, "sampled": SampledTable}
 class Electrostatics:
     """[electrostatics]: law, voltage and drive of a scene, and the insulator of its surface."""
 
-    law: Annotated[str, _LAW, "force law of the paper, eqs (2) to (5)"]
+    law: Annotated[str, among(FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
     voltage: Annotated[
         float | None,
         number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V"),
@@ -207,7 +202,7 @@ class Electrostatics:
     ] = None
     frequency: DriveFrequency = None
     waveform: Waveform = "sine"
-    skin: Annotated[Skin, instance(f"{' | '.join(SKINS)} | the path of a csv file", str)] = None
+    skin: Annotated[Skin, instance(f"{' | '.join(SKINS)} | the path of a csv file", str, Path), _CSV] = None
     gap_conductivity: Conductivity = 0.0
     drive: Annotated[
         str | None,
@@ -216,10 +211,7 @@ class Electrostatics:
     ] = None
     voltage_file: Annotated[
         str | None,
-        {"file": True}
-        | instance(
-            "the path of a csv file (header: position,voltage or time,voltage) or of a .wav", str, Path
-        ),
+        _path("the path of a csv file (header: position,voltage or time,voltage) or of a .wav"),
         "voltage over the position, instead of a number",
     ] = None
     voltage_profile: Annotated[
@@ -227,11 +219,7 @@ class Electrostatics:
         _rows("rows [[position, voltage], ...] in mm and V", "mm, V"),
         "the same in the scene file",
     ] = None
-    signal: Annotated[
-        Any,
-        _SIGNAL,
-        "voltage over time, instead of a number",
-    ] = None
+    signal: Annotated[Any, _SIGNAL, "voltage over time, instead of a number"] = None
     insulator: Annotated[str | None, one_of(*INSULATORS), "a usual insulator by its name"] = None
     insulator_thickness: Annotated[
         float | None,
@@ -269,11 +257,11 @@ class Electrostatics:
         mistakes.report()
         return Layer(*own.values()) if self.insulator is None else INSULATORS[self.insulator]
 
-    def scene_keys(self, law: Any, ramped: bool, folder: Path) -> dict[str, Any]:
+    def scene_keys(self, law: Any, ramped: bool) -> dict[str, Any]:
         """What it says of a scene beside its law; `ramped`: the voltage may begin without one."""
         names = ("air_layer", "direction", "field", "grounded", "coupling", "roughness_gap")
         own = {"law": law, "voltage": self._voltage(not ramped)}
-        return own | {"drive": self._drive(folder)} | {name: getattr(self, name) for name in names}
+        return own | {"drive": self._drive()} | {name: getattr(self, name) for name in names}
 
     def _voltage(self, needed: bool) -> Any:
         names = ("voltage", "amplitude", "voltage_file", "voltage_profile", "signal")
@@ -283,7 +271,7 @@ class Electrostatics:
             raise InputError("electrostatics.voltage", " and ".join(given) or ABSENT, allowed)
         key = "electrostatics.voltage_file"
         if self.voltage_file is not None:
-            with at(key, voltage_file=key, path=key):
+            with at(key, {"voltage_file": key, "path": key}):
                 return read_voltage(Path(self.voltage_file))
         if self.voltage_profile is not None:
             with at("electrostatics.voltage_profile"):
@@ -292,31 +280,17 @@ class Electrostatics:
             return self.amplitude / timesignals.WAVEFORMS[self.waveform].crest
         return self.signal or self.voltage or 0.0
 
-    def _drive(self, folder: Path) -> Drive | None:
-        """The drive, None where no key asks for one."""
+    def _drive(self) -> Drive | None:
+        """The drive, None where no key asks for one; a number is its own mean over the cycle."""
         usual = {"frequency": None, "waveform": "sine", "skin": None, "gap_conductivity": 0.0, "drive": None}
         given = {name: getattr(self, name) for name in usual}
-        if given in (usual, usual | {"drive": "mean"}) and (given == usual or self.signal is None):
+        if given == usual or (given == usual | {"drive": "mean"} and self.signal is None):
             return None
-        resolved = given.pop("drive") == "resolved"
         with at("electrostatics"):
-            if given["skin"] is not None and given["skin"] not in SKINS:
-                path = folder / given["skin"]
-                if path.suffix.lower() != ".csv":
-                    dielectric(given["skin"])
-                check_size("electrostatics.skin", path, LARGEST_TABLE)
-                given["skin"] = DielectricTable.from_csv(path)
-            return Drive(**given, resolved=resolved)
+            return Drive(resolved=given.pop("drive") == "resolved", **given)
 
 
-SURFACES: Mapping[str, Any] = {
-    "flat": Flat,
-    "sinusoid": Sinusoid,
-    "profile": ProfileTable,
-    "grating": Grating,
-    "self_affine": SelfAffine,
-}
-FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
+SURFACES: Mapping[str, Any] = {**textures.SURFACES, "profile": ProfileTable}
 
 
 def names(*classes: Any) -> list[str]:
@@ -326,7 +300,7 @@ def names(*classes: Any) -> list[str]:
 
 #: tables that a key may have been meant for
 HOMES: Mapping[str, list[str]] = {
-    "[finger]": names(BesideFinger, FingerPad),
+    "[finger]": names(Measured, BesideFinger, FingerPad),
     "[finger.electrical]": names(Electrical),
     "[electrostatics]": names(Electrostatics),
     "[surface]": names(BesideSurface, Flat),

@@ -11,11 +11,14 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import is_dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, get_origin
 
 from evfem.common.checks import GONE, Key, keys_of
 from evfem.errors import ABSENT, InputError, Mistakes, near, readable, together, unknown
 
+#: of the format
+VERSION = 1
 #: largest file of numbers, in bytes
 LARGEST_TABLE = 64 * 2**20
 
@@ -26,18 +29,19 @@ def read(
     place: str,
     folder: Path = Path(),
     *,
+    tag: str = "",
     beside: Sequence[str] = (),
     homes: Mapping[str, Collection[str]] | None = None,
     **given: Any,
 ) -> Any:
     """What a table describes, or all mistakes in it: first unknown keys, then others but the lack of what an
-    unknown one may stand for. Paths start at `folder`; keys of somebody else's may stand `beside`; `homes`
-    are other tables, whose keys may have been meant; what is `given` no file has.
+    unknown one may stand for. Paths start at `folder`; the key `tag` and those of somebody else's may stand
+    `beside`; `homes` are other tables, whose keys may have been meant; what is `given` no file has.
     """
     if not isinstance(table, Mapping):
         raise InputError(place, shown(table), f"a table [{place}]")
     keys = keys_of(cls)
-    known = [*beside[:1], *(key.name for key in keys), *beside[1:]]
+    known = list(dict.fromkeys([*([tag] if tag else []), *(key.name for key in keys), *beside]))
     mistakes, meant = Mistakes(), set[str]()
     for name, value in table.items():
         path = _join(place, name)
@@ -53,43 +57,41 @@ def read(
             elif key.required and key.name not in meant:
                 raise InputError(key.name, ABSENT, key.allowed)
     mistakes.report()
-    with at(place, **{key.field: f"{place}.{key.name}" for key in keys if key.field != key.name}):
+    with at(place):
         made = cls(**given)
-        return made.made(folder) if hasattr(made, "made") else made
+        return made.made() if hasattr(made, "made") else made
 
 
 def read_kind(
     table: Any, place: str, kinds: Mapping[str, Any], folder: Path = Path(), tag: str = "kind", **more: Any
 ) -> Any:
-    """What a table describes that says by a key which of `kinds` it is."""
-    cls = kinds[kind_of(table, place, kinds, tag)]
-    beside = (tag, *more.pop("beside", ()))
-    return read(cls, table, place, folder, beside=beside, **more)
+    """What a table describes that says by its key `tag` which of `kinds` it is."""
+    return read(kinds[kind_of(table, place, kinds, tag)], table, place, folder, tag=tag, **more)
 
 
 def _value(key: Key, given: Any, place: str, folder: Path) -> Any:
     """The value of a key: of a table the object that it describes, of a path that of the file."""
-    kinds, tag = key.rule.get("kinds"), key.rule.get("tag", "kind")
-    several = any(get_origin(one) is Mapping for one in key.types)
-    inner: Any = next((one for one in key.types if is_dataclass(one)), None)
-    if kinds is not None and isinstance(given, Mapping):
-        if not several:
-            return read_kind(given, place, kinds(), folder, tag)
+    rule, types = key.rule, key.types
+    several = any(get_origin(one) is Mapping for one in types)
+    if several and not isinstance(given, Mapping):
+        raise InputError(key.name, shown(given), key.allowed)
+    if several and "kinds" in rule:
         mistakes, found = Mistakes(), {}
         for name, table in given.items():
             with mistakes.of_a_part():
-                found[name] = read_kind(table, f"{place}.{name}", kinds(), folder, tag)
+                found[name] = read_kind(table, f"{place}.{name}", rule["kinds"](), folder, rule["tag"])
         mistakes.report()
         return found
-    if several and not isinstance(given, Mapping):
-        raise InputError(key.name, shown(given), key.allowed)
+    if "kinds" in rule and isinstance(given, Mapping):
+        return read_kind(given, place, rule["kinds"](), folder, rule.get("tag", "kind"))
+    inner: Any = next((one for one in types if is_dataclass(one)), None)
     if inner is not None and keys_of(inner):
         return read(inner, given, place, folder)
-    file = key.rule.get("file")
-    if file is not None and isinstance(given, str) and (not callable(file) or file(given)):
+    file = rule.get("file", False)
+    if isinstance(given, str) and (file(given) if callable(file) else file):
         given = folder / given
         check_size(key.name, given, LARGEST_TABLE if callable(file) or file is True else file)
-    return key.rule["check"](key.name, given) if "check" in key.rule else given
+    return rule["check"](key.name, given) if "check" in rule else given
 
 
 def _unknown_key(
@@ -147,12 +149,8 @@ def shown(value: object) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def _table_of(key: str) -> str:
-    return re.split(r"[.\[]", key)[0]
-
-
 @contextmanager
-def at(place: str, **renamed: str) -> Iterator[None]:
+def at(place: str, renamed: Mapping[str, str] = MappingProxyType({})) -> Iterator[None]:
     """Errors raised inside name the key as it stands in the file, in the table at `place`."""
     try:
         yield
@@ -161,10 +159,13 @@ def at(place: str, **renamed: str) -> Iterator[None]:
 
 
 def _moved(mistake: InputError, place: str, renamed: Mapping[str, str]) -> InputError:
-    key = renamed.get(mistake.key.replace(" ", "_").replace(".", "_"), "")
-    if not key:
-        key = mistake.key if _table_of(mistake.key) == _table_of(place) else _join(place, mistake.key)
-    given = (
-        mistake.given if mistake.given is ABSENT or isinstance(mistake.given, str) else shown(mistake.given)
+    key, given = renamed.get(mistake.key, mistake.key), mistake.given
+    if key == mistake.key and _table_of(key) != _table_of(place):
+        key = _join(place, key)
+    return InputError(
+        key, given if given is ABSENT or isinstance(given, str) else shown(given), mistake.allowed
     )
-    return InputError(key, given, mistake.allowed)
+
+
+def _table_of(key: str) -> str:
+    return re.split(r"[.\[]", key)[0]

@@ -26,16 +26,15 @@ _VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
 _ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
 Steps = Annotated[int, whole(), "in how many equal parts"]
-Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it is"]
+Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it was: the indentation, or the applied force"]
 
 
 @dataclass(frozen=True)
 class Press:
-    """Press to a `force` (N/mm, on the bone) or an `indentation` (mm), absolute, in `steps` equal
-    parts.
+    """Press to a force on the bone or to an indentation, both absolute, in equal parts.
 
-    `speed` (mm/s, only with `indentation`) sets how much time passes; without it the press takes
-    no time and is quasi-static. Raises InputError unless exactly one target is given.
+    Without a `speed` the press takes no time and is quasi-static. Raises InputError unless exactly one target
+    is given.
 
     >>> Press(force=0.05).steps
     10
@@ -64,14 +63,12 @@ class Press:
 
 @dataclass(frozen=True)
 class Slide:
-    """Slide by `distance` (mm, negative towards -x) in `steps` equal parts.
+    """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
     which the load drifts (`evfem.scene.drift`). A finger that touches nothing and is not attracted has
     no force at any height: in every motion with `hold` it stays where it is, and gives way to what
-    touches it. `speed` (mm/s) sets how much time passes; it is needed with `dynamics` other than
-    quasistatic. A finger in three dimensions slides at an `angle`, in degrees from +x in the plane of
-    the display, 90 being +z.
+    touches it. `speed` sets how much time passes.
 
     >>> Slide(distance=5.0).steps
     100
@@ -101,8 +98,7 @@ class Slide:
 
 @dataclass(frozen=True)
 class Hover:
-    """Hold the bone so that the undeformed outline is `gap` (mm) off the surface:
-    `indentation = -gap`.
+    """Hold the bone so that the undeformed outline is off the surface: `indentation = -gap`.
 
     The tissue is free to move under the attraction. Going there takes no time.
     """
@@ -117,10 +113,7 @@ class Hover:
 
 @dataclass(frozen=True)
 class VoltageRamp:
-    """Take the voltage (V) from its present value to `voltage` in `steps` equal parts.
-
-    `hold` keeps the indentation or the applied force of the moment before.
-    """
+    """Take the voltage from its present value to another, in equal parts."""
 
     voltage: Annotated[float, _VOLTAGE, "at the end, from the present one"]
     steps: Steps = 10
@@ -133,10 +126,7 @@ class VoltageRamp:
 
 @dataclass(frozen=True)
 class Wait:
-    """Stay where it is for `duration` (s), in `steps` equal parts: for a voltage that changes with
-    time, and for tissue that creeps.
-
-    `hold` keeps the indentation or the applied force of the moment before.
+    """Stay where it is for some time: for a voltage that changes with time, and for tissue that creeps.
 
     >>> Wait(duration=0.1).steps
     100

@@ -19,14 +19,11 @@ _TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3
 
 @dataclass(frozen=True)
 class Solver:
-    """How a scene is solved; the defaults are the recommended ones.
+    """How a scene is solved; the defaults are the recommended ones."""
 
-    `element` None means q2p1 on quads, p2 on triangles and hex27p1 on hexahedra. `tolerance` is the
-    largest free residual over max(largest reaction, 1e-6 N/mm) of every accepted step. Penalties
-    (N/mm3) go with `contact="penalty"` alone. `strategy` says how hard steps are tried.
-    """
-
-    element: Annotated[str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles"] = None
+    element: Annotated[
+        str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
+    ] = None
     dynamics: Annotated[str, one_of(*DYNAMICS), "without time, with viscosity, or with inertia too"] = (
         "quasistatic"
     )
@@ -87,11 +84,8 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output:
-    """Fields are kept of every `every`-th step, and of the last one; None keeps all.
-
-    What is left open `evfem run` chooses so that its files of fields stay small
-    (`evfem.export.FieldFiles`): with `every` None it may write fewer of them, with `precision`
-    None in single precision. `compression` makes them smaller still, and slower to write.
+    """Which fields are kept. What is left open `evfem run` chooses so that its files of fields stay small
+    (`evfem.export.FieldFiles`).
     """
 
     every: Annotated[

@@ -28,11 +28,10 @@ from evfem.contact.friction import Coulomb
 from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
-from evfem.electrostatics.roughness import LAWS as ROUGHNESS_LAWS
-from evfem.electrostatics.roughness import WIDEST, roughness_of
+from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, RoughnessLaw, Surface, TimeSignal
+from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive
 from evfem.scene.fieldless import without_field
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
@@ -56,16 +55,6 @@ FieldChoice = Annotated[
 ]
 Grounded = Annotated[bool, yes_or_no(), "false: the finger has no charge; with field full"]
 Coupling = Annotated[str, one_of(*COUPLINGS), "staggered_once: the paper's, once in each step"]
-_ROUGHNESS: dict[str, Any] = {
-    "allowed": f"a length in mm from 0 to {WIDEST:g}, or a table [electrostatics.roughness_gap] with a law",
-    "type": float | dict,
-    "kinds": lambda: ROUGHNESS_LAWS,
-    "tag": "law",
-    "unit": "mm",
-}
-RoughnessGap = Annotated[
-    float | RoughnessLaw, _ROUGHNESS, "what rough skin keeps between itself and the insulator in contact"
-]
 
 
 @runtime_checkable
@@ -105,11 +94,8 @@ class Scene:
     `voltage` in V: a number, acting in full from the first step, a `VoltageProfile` over the
     position of the bone, or a signal over time (`Sine`, `Carrier`, `Sampled`). A `drive` makes it
     alternate, or leak. `law` None and `voltage` 0: no electrostatics. The insulator belongs to the
-    surface. `air_layer` False: only touching nodes carry electrostatic force. `roughness_gap` (mm,
-    or a `RoughnessLaw`) is what rough skin keeps between itself and the insulator where they touch.
-    `field` "full" solves Poisson's problem below the pad instead of taking it column by column,
-    "auto" where bounds say that it matters; only there may the finger be not `grounded`: without a
-    charge, above electrodes of different voltages. `friction_law` says what the surface's coefficient of
+    surface. Only where the field is full may the finger be not `grounded`: without a charge, above electrodes
+    of different voltages. `friction_law` says what the surface's coefficient of
     friction means (`Coulomb`, `LoadIndexFriction`, `AdhesiveFriction`, `RateFriction`,
     `AgeingFriction` or one's own). A `hand` is between drive and bone: motions then say where the
     drive goes. `depth` (mm) is how deep the plane finger is meant to be; it changes no number but
@@ -242,7 +228,9 @@ def _check_parts(scene: Scene) -> None:
 
 def _check_electrostatics(scene: Scene) -> None:
     check_fields(scene, "electrostatics.")
-    _check_roughness(scene)
+    if scene.law is None and scene.roughness_gap != 0.0:
+        allowed = "only with a law of attraction: without one it changes nothing"
+        raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
         allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
@@ -279,19 +267,6 @@ def _check_hand(scene: Scene) -> None:
         if isinstance(motion, Slide) and motion.speed is None:
             allowed = "a speed in mm/s, needed with a hand that has a damping or a mass"
             raise InputError(f"motion[{i}].speed", ABSENT, allowed)
-
-
-def _check_roughness(scene: Scene) -> None:
-    if isinstance(scene.roughness_gap, (int, float)) and not isinstance(scene.roughness_gap, bool):
-        gap = real("electrostatics.roughness_gap", scene.roughness_gap, _ROUGHNESS["allowed"])
-        set_frozen(scene, roughness_gap=gap)
-    try:
-        rough = roughness_of(scene.roughness_gap)
-    except InputError as error:
-        raise InputError("electrostatics.roughness_gap", error.given, error.allowed) from error
-    if rough is not None and scene.law is None:
-        allowed = "only with a law of attraction: without one it changes nothing"
-        raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
 
 
 def _check_field(scene: Scene) -> None:

@@ -14,11 +14,13 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from evfem.common.checks import Key, Within, keys_of
+from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.finger.fingertip import Fingertip
+from evfem.finger.fingerpad import Electrical, MeshedFinger
+from evfem.finger.fingertip import FINGERS
 from evfem.scene import format as file
+from evfem.scene.keys import VERSION
 from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Output, Solver
 from evfem.solver.hand import Hand
@@ -85,11 +87,11 @@ def section(name: str, *classes: Any, kind: str = "", tag: tuple[str, str] | Non
 def _entry(key: Key) -> Entry:
     rule, unit = key.rule, key.rule.get("unit", "")
     shape = _shape(key.types)
-    if isinstance(limits := rule.get("limits", rule.get("test")), Within):
+    if isinstance(limits := rule.get("test"), Within):
         shape |= _limits(limits, shape.get("type") == "integer")
     if "names" in rule:
         shape["enum"] = list(rule["names"])
-    shape["description"] = f"{key.meaning}{f' ({unit})' if unit else ''}. Allowed: {key.allowed}"
+    shape["description"] = key.told
     if not key.required and isinstance(key.default, (bool, int, float, str)):
         shape["default"] = key.default
     default = "" if key.required else _toml(key.default)
@@ -115,7 +117,7 @@ def _limits(within: Within, whole: bool) -> Schema:
     if within.low > -math.inf:
         found["exclusiveMinimum" if within.above else "minimum"] = plain(within.low)
     if within.high < math.inf:
-        found["maximum"] = plain(within.high)
+        found["exclusiveMaximum" if within.below else "maximum"] = plain(within.high)
     if within.not_zero:
         found["not"] = {"const": 0}
     return found
@@ -148,13 +150,12 @@ def sections() -> list[Section]:
 
     return [
         section("", file.SceneTable),
-        section("finger", FingerPad, file.BesideFinger, kind="pad", tag=("kind", finger)),
-        section("finger", Fingertip, file.BesideFinger, kind="fingertip", tag=("kind", finger)),
+        *kinds("finger", FINGERS, finger, "kind", file.Measured, file.BesideFinger),
         section("finger", MeshedFinger, file.BesideFinger, kind="mesh"),
         *kinds("finger.materials.NAME", LAWS, "the law", "law"),
         section("finger.electrical", Electrical),
         *kinds("surface", file.SURFACES, "which kind", "kind", file.BesideSurface),
-        *kinds("surface.friction_law", file.FRICTIONS, "which kind"),
+        *kinds("surface.friction_law", FRICTIONS, "which kind"),
         section("electrostatics", file.Electrostatics, *FORCE_LAWS.values()),
         *kinds("electrostatics.signal", file.SIGNALS, "which kind"),
         *kinds(
@@ -189,7 +190,7 @@ def schema() -> Schema:
     ]
     friction = {"$ref": "#/definitions/friction"}
     inner: dict[str, Schema] = {
-        "version": {"const": file.VERSION},
+        "version": {"const": VERSION},
         "finger": {"anyOf": fingers},
         "surface": {"oneOf": [one.schema(friction_law=friction) for one in tables["surface"]]},
         "electrostatics": tables["electrostatics"][0].schema(

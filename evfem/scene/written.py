@@ -15,25 +15,17 @@ import tomli_w
 
 from evfem.common.checks import keys_of
 from evfem.contact.friction import KINDS, Coulomb
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.contact.textures import Grating, SelfAffine
+from evfem.contact.surfaces import Display, Profile
+from evfem.contact.textures import SURFACES
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import SIGNALS
 from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad, MeshedFinger
+from evfem.finger.fingerpad import MeshedFinger
+from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
-
-VERSION = 1
-SURFACES: Mapping[str, Any] = {
-    "flat": Flat,
-    "sinusoid": Sinusoid,
-    "profile": Profile,
-    "grating": Grating,
-    "self_affine": SelfAffine,
-}
 
 
 def dump(scene: Scene) -> str:
@@ -44,8 +36,8 @@ def dump(scene: Scene) -> str:
     """
     if scene.forms:
         raise InputError("forms", "weak forms of your own", "a scene without them, for a file")
-    surface = _of_kind(scene.surface, {**SURFACES, "display": Display}, "surface")
-    surface["kind"] = surface["kind"].replace("display", "flat")
+    kinds = {**SURFACES, "flat": Display} if type(scene.surface) is Display else SURFACES
+    surface = _of_kind(scene.surface, kinds, "surface")
     if isinstance(scene.surface, Profile):
         rows = zip(scene.surface.x.tolist(), scene.surface.samples.tolist(), strict=True)
         surface["points"] = [list(row) for row in rows]
@@ -100,13 +92,13 @@ def _of_kind(value: Any, kinds: Mapping[str, Any], place: str, tag: str = "kind"
 
 
 def _finger(finger: Any) -> dict[str, Any]:
-    from evfem.finger.fingertip import Fingertip
+    from evfem.finger.fingertip import FINGERS
 
     if isinstance(finger, MeshedFinger):
         if not isinstance(finger.source, (str, Path)):
             raise InputError("finger.mesh", "a mesh object", "a mesh in a file, for a file")
         return _keys(finger, "finger")
-    table = _of_kind(finger, {"pad": FingerPad, "fingertip": Fingertip}, "finger")
+    table = _of_kind(finger, FINGERS, "finger")
     usual = type(finger)().materials
     own = {name: table["materials"][name] for name, law in finger.materials.items() if law != usual[name]}
     table["materials"] = own

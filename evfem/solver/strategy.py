@@ -27,16 +27,7 @@ _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
 @dataclass(frozen=True)
 class Strategy:
-    """The defaults need no tuning in any scene of `evfem study stability`.
-
-    `iterations`: most of one part; `patience`: the factorisation is renewed if more iterations than
-    this would be left with the old one; `smallest_part`: as a share of what is left of a requested step,
-    its square where the step takes time, for tissue with viscosity or inertia is the stiffer the shorter
-    a part; `easy`: a part with so few iterations lets the next one grow by the factor `growth`; `reach`:
-    a part begins at most so many times the last one's displacements ahead (0: at the last state);
-    `relaxation`: whether the finger is released where short parts fail and take no time; `steps`:
-    "given", each requested step is one part unless that fails, or "auto", where friction or time
-    remember the path each is cut into parts whose error of the path is at most `path_error` of the force.
+    """How hard steps are tried; the defaults need no tuning in any scene of `evfem study stability`.
 
     >>> Strategy().iterations, Strategy(growth=2.0).growth
     (40, 2.0)
@@ -45,7 +36,9 @@ class Strategy:
     evfem.errors.InputError: smallest_part: given 2.0; allowed: a share of a step, above 0, at most 1
     """
 
-    iterations: Annotated[int, _COUNT, "most of one part of a step"] = 40
+    iterations: Annotated[
+        int, _COUNT, "most of one part of a step; half as many again if the end is near"
+    ] = 40
     patience: Annotated[float, _PATIENCE, "iterations with an old factorisation before it is renewed"] = 8.0
     smallest_part: Annotated[
         float,
@@ -54,7 +47,9 @@ class Strategy:
     ] = 1.0 / 1024.0
     easy: Annotated[int, _COUNT, "iterations of a part after which the next one may be longer"] = 8
     growth: Annotated[float, _GROWTH, "by which factor"] = 1.25
-    reach: Annotated[float, _REACH, "first guess: so many of the last part's displacements ahead"] = 1.5
+    reach: Annotated[
+        float, _REACH, "first guess: so many of the last part's displacements ahead, 0: none"
+    ] = 1.5
     relaxation: Annotated[bool, yes_or_no(), "whether a finger without an equilibrium near is released"] = (
         True
     )

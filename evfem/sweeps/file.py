@@ -19,20 +19,19 @@ from typing import Annotated, Any
 
 import tomli_w
 
-from evfem.common.checks import instance, one_of, real, set_frozen, whole
+from evfem.common.checks import instance, real, set_frozen
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.file import read_text, tables_of
 from evfem.scene.format import SceneTable, names
-from evfem.scene.keys import at, read, shown
+from evfem.scene.keys import VERSION, at, read, shown
 from evfem.scene.scene import Scene
-from evfem.scene.written import VERSION, dump
+from evfem.scene.written import dump
 from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS
-from evfem.sweeps.samples import METHODS, MOST_SAMPLES, Distribution, Normal, Samples, Uniform
+from evfem.sweeps.samples import Distribution, Normal, Samples, Uniform
 
 #: most points of a sweep
 MOST_POINTS = 100_000
-LARGEST_SEED = 2**63 - 1
 STATISTICS = ("last", "mean", "min", "max")
 OUTPUTS = (
     "applied_force.last",
@@ -45,6 +44,7 @@ OUTPUTS = (
 FIRST, LAST = ("point",), ("status", "seconds", "message")
 TABLES = tuple(name for name in names(SceneTable) if name != "version")
 Row = Mapping[str, Any]
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -254,40 +254,22 @@ class SweepTable:
     ] = None
 
 
-@dataclass(frozen=True)
-class SamplesTable:
-    """[samples]."""
-
-    count: Annotated[int, whole(MOST_SAMPLES), "number of samples"]
-    seed: Annotated[
-        int, whole(LARGEST_SEED, 0, "a whole number, not negative"), "the same seed gives the same samples"
-    ]
-    parameters: Annotated[
-        dict[str, Any],
-        instance("a table [samples.parameters] of distributions", dict),
-        "a distribution for each key",
-    ]
-    method: Annotated[str, one_of(*METHODS), "how they are drawn"] = METHODS[0]
-
-
 def _pair(allowed: str) -> dict[str, Any]:
-    def check(key: str, value: Any) -> tuple[float, float]:
+    def check(key: str, value: Any) -> Pair:
         if not isinstance(value, list) or len(value) != 2:
             raise InputError(key, shown(value), allowed)
         return real(key, value[0], allowed), real(key, value[1], allowed)
 
-    return {"allowed": allowed, "check": check}
+    return {"allowed": allowed, "check": check, "type": list[float]}
 
 
 @dataclass(frozen=True)
 class DistributionTable:
     """One parameter in [samples.parameters]."""
 
-    uniform: Annotated[list[float] | None, _pair("[low, high]"), "every value as likely as any other"] = None
-    normal: Annotated[list[float] | None, _pair("[mean, sd]"), "instead: a normal distribution"] = None
-    between: Annotated[list[float] | None, _pair("[low, high]"), "where a normal distribution is cut off"] = (
-        None
-    )
+    uniform: Annotated[Pair | None, _pair("[low, high]"), "every value as likely as any other"] = None
+    normal: Annotated[Pair | None, _pair("[mean, sd]"), "instead: a normal distribution"] = None
+    between: Annotated[Pair | None, _pair("[low, high]"), "where a normal distribution is cut off"] = None
 
 
 def load(path: str | Path) -> Sweep:
@@ -336,25 +318,22 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
 
 
 def _samples(table: Mapping[str, Any]) -> Samples:
-    parsed = read(SamplesTable, table, "samples")
-    parameters = {}
-    for key, value in _flat(parsed.parameters):
-        place = f"samples.parameters.{key}"
-        if not isinstance(value, dict):
-            raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
-        with at(place):
-            parameters[key] = _distribution(read(DistributionTable, value, place), place)
-    return Samples(parameters, parsed.count, parsed.seed, parsed.method)
+    if isinstance(given := table.get("parameters"), Mapping):
+        table = {**table, "parameters": {key: _distribution(key, value) for key, value in _flat(given)}}
+    return read(Samples, table, "samples")
 
 
-def _distribution(table: DistributionTable, place: str) -> Distribution:
-    if (table.uniform is None) == (table.normal is None):
-        given = "neither uniform nor normal" if table.uniform is None else "uniform and normal"
-        raise InputError(place, given, "exactly one of the two")
-    if table.uniform is not None:
-        if table.between is not None:
-            raise InputError(f"{place}.between", "between beside uniform", "between with normal alone")
-        return Uniform(*table.uniform)
-    assert table.normal is not None
-    between = None if table.between is None else (table.between[0], table.between[1])
-    return Normal(table.normal[0], table.normal[1], between)
+def _distribution(key: str, value: Any) -> Distribution:
+    place = f"samples.parameters.{key}"
+    if not isinstance(value, Mapping):
+        raise InputError(place, shown(value), "{ uniform = [low, high] } or { normal = [mean, sd] }")
+    table: DistributionTable = read(DistributionTable, value, place)
+    with at(place):
+        if table.uniform is not None and table.normal is None:
+            if table.between is not None:
+                raise InputError("between", "between beside uniform", "between with normal alone")
+            return Uniform(*table.uniform)
+        if table.normal is not None and table.uniform is None:
+            return Normal(*table.normal, table.between)
+    given = "uniform and normal" if table.uniform else "neither uniform nor normal"
+    raise InputError(place, given, "exactly one of the two")

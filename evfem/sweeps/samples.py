@@ -11,11 +11,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import NormalDist
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import choice, count, real, set_frozen
+from evfem.common.checks import SEED, check_fields, one_of, real, set_frozen, whole
 from evfem.errors import ABSENT, InputError, quoted
 
 METHODS = ("latin_hypercube", "random")
@@ -80,37 +81,39 @@ class Normal:
 Distribution = Uniform | Normal
 
 
+def _parameters(key: str, given: Any) -> dict[str, Distribution]:
+    if not isinstance(given, Mapping) or not given:
+        raise InputError(
+            key, quoted(given) if given else ABSENT, "at least one parameter with a distribution"
+        )
+    for name, distribution in given.items():
+        if not isinstance(distribution, Distribution):
+            raise InputError(f"{key}.{name}", quoted(distribution), "Uniform or Normal")
+    return dict(given)
+
+
+_PARAMETERS = {"allowed": "a table [samples.parameters] of distributions", "check": _parameters}
+
+
 @dataclass(frozen=True)
 class Samples:
-    """`count` values of every parameter, independent of each other; the same seed gives the same
-    values.
+    """Values of every parameter, independent of each other.
 
-    `method` latin_hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly
-    one value of each parameter into each of `count` equally likely intervals; random draws them
-    freely.
+    A latin hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly one value of each
+    parameter into each of `count` equally likely intervals; random draws them freely.
 
     >>> sample = Samples({"surface.friction": Uniform(0.0, 1.0)}, count=4, seed=1)
     >>> np.sort(np.floor(4 * sample.draw()["surface.friction"]))
     array([0., 1., 2., 3.])
     """
 
-    parameters: Mapping[str, Distribution]
-    count: int
-    seed: int
-    method: str = METHODS[0]
+    parameters: Annotated[Mapping[str, Distribution], _PARAMETERS, "a distribution for each key"]
+    count: Annotated[int, whole(MOST_SAMPLES), "number of samples"]
+    seed: Annotated[int, SEED, "the same seed gives the same samples"]
+    method: Annotated[str, one_of(*METHODS), "how they are drawn"] = METHODS[0]
 
     def __post_init__(self) -> None:
-        set_frozen(
-            self, parameters=dict(self.parameters), count=count("samples.count", self.count, MOST_SAMPLES)
-        )
-        choice("samples.method", self.method, METHODS)
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
-            raise InputError("samples.seed", quoted(self.seed), "a whole number, not negative")
-        if not self.parameters:
-            raise InputError("samples.parameters", ABSENT, "at least one parameter with a distribution")
-        for name, distribution in self.parameters.items():
-            if not isinstance(distribution, Distribution):
-                raise InputError(f"samples.parameters.{name}", quoted(distribution), "Uniform or Normal")
+        check_fields(self, "samples.")
 
     def draw(self) -> dict[str, Floats]:
         """The values of every parameter, (count,) each, in the order of `parameters`."""

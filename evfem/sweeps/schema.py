@@ -5,15 +5,17 @@ and as a JSON schema for editors (`evfem.scene.schema`).
 from __future__ import annotations
 
 from evfem.scene import schema as scenes
+from evfem.scene.keys import VERSION
 from evfem.scene.schema import DRAFT, Schema, Section, section
-from evfem.sweeps.file import DistributionTable, SamplesTable, SweepTable
+from evfem.sweeps.file import DistributionTable, SweepTable
+from evfem.sweeps.samples import Samples
 
 
 def sections() -> list[Section]:
     """All tables of a sweep file but those of its scene."""
     return [
         section("", SweepTable),
-        section("samples", SamplesTable),
+        section("samples", Samples),
         section("samples.parameters.KEY", DistributionTable),
     ]
 
@@ -35,7 +37,7 @@ def schema() -> Schema:
     told = {key.name: key.meaning for key in (*top.keys, *samples.keys)}
     parameters = {"type": "object", "description": told["parameters"]}
     made = top.schema(
-        version={"const": 1, "description": told["version"]},
+        version={"const": VERSION, "description": told["version"]},
         scene={"description": told["scene"], "anyOf": [{"type": "string"}, table]},
         samples={"description": told["samples"], **samples.schema(parameters=parameters)},
     )

@@ -121,9 +121,7 @@ class _InvariantLaw:
 class NeoHookean(Isotropic, _InvariantLaw):
     """Compressible neo-Hookean law, psi = mu/2 (tr C - 3 - 2 ln J) + lambda/2 (ln J)^2.
 
-    E (MPa) and nu are Young's modulus and Poisson's ratio at small strain; mu = E / (2 (1 + nu))
-    and lambda = E nu / ((1 + nu)(1 - 2 nu)). `viscosity`: relaxation time of Kelvin-Voigt damping
-    in s (None: the finger's default); `density` in t/mm^3. Source: Bonet and Wood, Nonlinear
+    mu = E / (2 (1 + nu)) and lambda = E nu / ((1 + nu)(1 - 2 nu)). Source: Bonet and Wood, Nonlinear
     Continuum Mechanics for Finite Element Analysis, 2nd ed., 2008, doi:10.1017/CBO9780511755446,
     section 6.4.3.
 
@@ -155,10 +153,9 @@ class NeoHookean(Isotropic, _InvariantLaw):
 class Yeoh(_InvariantLaw):
     """Yeoh's law with a volumetric part in ln J.
 
-    psi = c1 (Ib - 3) + c2 (Ib - 3)^2 + c3 (Ib - 3)^3 + K/2 (ln J)^2 with Ib = J^(-2/3) tr C; c1,
-    c2, c3 and K in MPa. The initial shear modulus is 2 c1; the bulk modulus K is given as `bulk`,
-    or by Poisson's ratio at small strain as `nu`. `viscosity` and `density` as in `NeoHookean`.
-    Source: Yeoh, Rubber Chem. Technol. 66 (1993) 754-771, doi:10.5254/1.3538343.
+    psi = c1 (Ib - 3) + c2 (Ib - 3)^2 + c3 (Ib - 3)^3 + K/2 (ln J)^2 with Ib = J^(-2/3) tr C. The initial
+    shear modulus is 2 c1; K is `bulk`, or that of Poisson's ratio at small strain, `nu`. Source: Yeoh, Rubber
+    Chem. Technol. 66 (1993) 754-771, doi:10.5254/1.3538343.
 
     >>> Yeoh(c1=0.5, c2=0.1, c3=0.01, nu=0.25).bulk_modulus
     1.6666666666666667
@@ -206,9 +203,8 @@ class Yeoh(_InvariantLaw):
 class LinearElastic(Isotropic):
     """Small-strain isotropic elasticity, psi = mu e : e + lambda/2 (tr e)^2, e = (F + F^T)/2 - I.
 
-    E (MPa), nu, mu and lambda as in `NeoHookean`, `viscosity` and `density` too. Not objective:
-    rotations of more than a few degrees strain it. Its volume change is tr e: in the split form
-    theta stands for tr(F) - d and S + q I is the stress.
+    mu and lambda as in `NeoHookean`. Not objective: rotations of more than a few degrees strain it. Its
+    volume change is tr e: in the split form theta stands for tr(F) - d and S + q I is the stress.
 
     >>> LinearElastic(E=2.6, nu=0.3).mu
     1.0

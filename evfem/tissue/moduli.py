@@ -9,8 +9,8 @@ from evfem.common.checks import Within, check_fields, number
 from evfem.errors import InputError
 
 POSITIVE = number("a positive number in MPa", Within(0.0, above=True), "MPa")
-POISSON = number("a number above -1 and below 0.5 (0.4999 is fine)", lambda nu: -1.0 < nu < 0.5)
-POISSON |= {"limits": Within(-1.0, 0.5, above=True)}
+_BELOW_HALF = Within(-1.0, 0.5, above=True, below=True)
+POISSON = number("a number above -1 and below 0.5 (0.4999 is fine)", _BELOW_HALF)
 _POSITIVE_TIME = number("a relaxation time in s, at least 0", Within(0.0), "s")
 _DENSITY = number("a positive number in t/mm3", Within(0.0, above=True), "t/mm3")
 # keys that laws share

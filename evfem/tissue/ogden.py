@@ -37,12 +37,10 @@ _ALPHA = _numbers(f"{_TERMS} or beyond +-{MOST:g}", lambda value: 0.0 < abs(valu
 class Ogden:
     """Ogden's law with a volumetric part in ln J.
 
-    psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with
-    l_i = J^(-1/3) times the principal stretches. mu (MPa) and alpha (no unit) are numbers or
-    sequences of equal length; the initial shear modulus is the sum of mu_p alpha_p / 2. K is given
-    as `bulk`, or by Poisson's ratio at small strain as `nu`. `viscosity` and `density` as in
-    `materials.NeoHookean`. Source: Ogden, Proc. R. Soc. Lond. A 328 (1972) 567-583,
-    doi:10.1098/rspa.1972.0096.
+    psi = sum over p of mu_p/alpha_p (l1^alpha_p + l2^alpha_p + l3^alpha_p - 3) + K/2 (ln J)^2 with l_i =
+    J^(-1/3) times the principal stretches. The initial shear modulus is the sum of mu_p alpha_p / 2; K is
+    `bulk`, or that of Poisson's ratio at small strain, `nu`. Source: Ogden, Proc. R. Soc. Lond. A 328 (1972)
+    567-583, doi:10.1098/rspa.1972.0096.
 
     >>> Ogden(mu=[1.0, -0.2], alpha=[2.0, -2.0], nu=0.25).shear_modulus
     1.2
@@ -131,8 +129,3 @@ class Ogden:
         _, q = self.split_stress(F, theta)
         P33 = q + sum(m * np.exp(-a / 3.0 * theta) for m, a in zip(*self._terms, strict=True))
         return P33 / det(F)
-
-
-def _power(exponent: float) -> bool:
-    """Whether stretches of tissue to this power are numbers that tell something."""
-    return 0.0 < abs(exponent) <= MOST

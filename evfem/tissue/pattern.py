@@ -126,11 +126,11 @@ class Pattern:
         return data[: self.indices.size]
 
     @cached_property
-    def blocks(self) -> Ints:
-        """The places (B, P, dim, dim, L) as the compiled loops take them."""
-        from evfem.tissue.kernels.blocks import blocked
+    def blocks(self) -> Any:
+        """The places (B, P, dim, dim, L) as the compiled loops take them, which check them but once."""
+        from evfem.tissue.kernels.blocks import blocked, loops
 
-        return blocked(self.places)
+        return loops(self.dim).bounded(blocked(self.places), self.zeros().size)
 
     def full(self, upper: Floats) -> Any:
         """Both triangles as a scipy CSR matrix."""

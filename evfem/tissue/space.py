@@ -41,7 +41,7 @@ from evfem.mesh.hexahedron import EDGES, FACES, PLACES
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det
 from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.kernels.blocks import Cells, blocked
+from evfem.tissue.kernels.blocks import Cells, blocked, loops
 
 
 def scikit_mesh(mesh: Mesh) -> Any:
@@ -210,7 +210,7 @@ def cells_of(space: Space) -> Cells:
         inverse = sampled.inverse[:, :S].reshape(E, S, D * D)
     return Cells(
         (space.size, len(nodes), n, Q, S, mean.shape[1]),
-        nodes,
+        loops(D).bounded(nodes, space.size),
         blocked(space.weight),
         space.at.reference,
         blocked(space.at.inverse.reshape(E, Q, D * D)),

@@ -171,7 +171,7 @@ class Tissue:
         """`cell_stress` by the compiled loops."""
         cells = self.space.cells
         components = 4 if self.space.dim == 2 else 6
-        means = np.empty((len(cells.nodes), components + 1, LANES))
+        means = np.empty((len(cells.weight), components + 1, LANES))
         filled = blocked(self.pressure(u))
         loops.stresses(cells, np.ascontiguousarray(u), self._moduli[0], filled, means)
         found = unblocked(means, len(self.space.nodes))
@@ -180,7 +180,7 @@ class Tissue:
     def _theta(self, loops: Any, u: Floats, du: Floats | None) -> Floats:
         """theta (E, Q) at u by the compiled loops, or its change along du (N, dim)."""
         cells = self.space.cells
-        sampled = np.empty((len(cells.nodes), self.space.samples, LANES))
+        sampled = np.empty((len(cells.weight), self.space.samples, LANES))
         loops.log_volumes(cells, np.ascontiguousarray(u), du, sampled)
         return projected(self.space.projection, unblocked(sampled, len(self.space.nodes)))
 

@@ -1,8 +1,10 @@
 """What objects say of themselves: short, true, complete where it counts, and safe inside a page."""
 
+import pydoc
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
+from inspect import signature
 from xml.etree import ElementTree
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from tools.fakes import fake_result
 
 import evfem as ev
+from evfem.common.checks import keys_of
 from evfem.scene import file as scenefile
 from evfem.simulation.rendering import ApparentFriction, Comparison
 from evfem.simulation.result import Result
@@ -141,6 +144,19 @@ def test_provenance_of_a_scene_that_no_file_can_hold_is_complete():
     for part in ("nail_width=10.5", "friction=0.3", "Slide(distance=5.0, steps=100", "tolerance=1e-08"):
         assert part in text
     assert scenefile.loads(provenance(ev.default_scene(), fake_result().mesh, {})["parameters"])
+
+
+def test_help_says_every_parameter_with_its_meaning_and_range():
+    said = pydoc.plain(pydoc.render_doc(ev.Slide))
+    assert "class Slide(builtins.object)\n |  Slide(distance: float, steps: int = 100" in said
+    assert "- `speed`: needed with dynamics other than quasistatic (mm/s). Allowed: a speed in mm/s," in said
+    told = 0
+    for one in (getattr(ev, name) for name in ev.__all__):
+        for key in keys_of(one) if isinstance(one, type) and is_dataclass(one) else ():
+            assert f"\n- `{key.field}`: " in one.__doc__, one
+            assert "Annotated" not in str(signature(one))
+            told += 1
+    assert told > 150
 
 
 def test_showing_a_scene_loads_nothing_heavy():

@@ -17,11 +17,13 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 
 import evfem
 from evfem import cli, studies
+from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.scene import file as scenefile
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps import file as sweepfile
@@ -93,7 +95,8 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
     monkeypatch.setattr(elements, "ELEMENTS", table)
-    run(page, {None}, capsys)
+    with patch.dict(FORCE_LAWS):  # and another a law
+        run(page, {None}, capsys)
 
 
 @pytest.mark.solver

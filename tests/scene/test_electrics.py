@@ -109,6 +109,9 @@ def test_what_does_not_go_together_in_python():
             replace(scene, voltage=voltage, drive=drive)
     with pytest.raises(InputError, match="a drive without a law"):
         replace(scene, law=None, voltage=0.0)
+    for drive in (ev.Drive(50.0), ev.Drive(50.0, resolved=True)):
+        with pytest.raises(InputError, match="a law and no insulator"):
+            replace(scene, surface=ev.Flat(), drive=drive)
     with pytest.raises(InputError, match="normal in a resolved drive"):
         replace(scene, direction="normal", drive=ev.Drive(50.0, resolved=True))
 

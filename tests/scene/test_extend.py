@@ -1,6 +1,6 @@
 """A force law and a waveform more: one class each, and every door of the package knows them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
@@ -69,6 +69,20 @@ def test_a_law_more_is_a_class(softened):
     assert ev.simulate(scene).normal_force[-1] == pytest.approx(0.0, abs=1e-12)
 
 
+def test_a_law_that_derives_from_another_is_for_python_alone():
+    class Weaker(ev.StrongTroxel):
+        def traction(self, gap, voltage, layers):
+            return 0.5 * super().traction(gap, voltage, layers)
+
+    scene = replace(ev.default_scene(), law=Weaker())
+    assert Weaker not in FORCE_LAWS.values()
+    with pytest.raises(InputError, match=r"electrostatics\.law: given Weaker"):
+        dump(scene)
+    with pytest.raises(InputError, match="full with Weaker; allowed: local, or StrongTroxel"):
+        replace(scene, field="full")
+    assert replace(scene, law=ev.StrongTroxel(), field="full").field == "full"
+
+
 def test_a_waveform_more_is_a_class(monkeypatch):
     @dataclass(frozen=True)
     class Triangle(timesignals.Square):
@@ -82,9 +96,14 @@ def test_a_waveform_more_is_a_class(monkeypatch):
             return grouped(order, weight / weight.sum())
 
     monkeypatch.setitem(timesignals.WAVEFORMS, "triangle", Triangle)
-    drive = ev.Drive(50.0, waveform="triangle", skin="gabriel_dry")
-    assert drive.peak(100.0) == pytest.approx(173.205, rel=1e-5)
-    law, layers = ev.electrostatics.drive.mean_law(
-        ev.StrongTroxel(), drive, 50.0, (ev.TOUCHSCREEN, ev.TOUCHSCREEN)
-    )
-    assert 0.0 < law.traction(0.1, 100.0, layers) < ev.StrongTroxel().traction(0.0, 100.0, layers).max()
+    keys = 'law = "strong_troxel"\nwaveform = "triangle"\nfrequency = 50.0\nskin = "gabriel_dry"\n'
+    scene = loads(TEXT.replace('law = "softened"\nsoftening = 0.02\n', keys).replace("voltage", "amplitude"))
+    assert loads(dump(scene)) == scene
+    assert scene.voltage == pytest.approx(100.0 / np.sqrt(3.0))
+    assert schema()["properties"]["electrostatics"]["properties"]["waveform"]["enum"][-1] == "triangle"
+    law, layers = scene.electrics.attraction
+    solids, expected = (scene.electrics.skin, scene.electrics.insulator), 0.0
+    for order, weight in zip(*(part.tolist() for part in Triangle.harmonics()), strict=True):
+        one = ev.Layers.of(*solids, frequency=50.0 * order, gap_eps_r=2.0)
+        expected += weight * scene.law.traction(0.1, scene.voltage, one)
+    assert law.traction(0.1, scene.voltage, layers) == pytest.approx(expected, rel=1e-12)

@@ -399,6 +399,8 @@ WRONG = [
     (SHORT, "version = 1", "version = " + "1" * 5000, "scene", "no valid TOML"),
     (DISPLAY, 'law = "kaczmarek"', 'law = "coulomb"', "electrostatics.law", "strong_troxel | kaczmarek"),
     (DISPLAY, 'law = "kaczmarek"', "", "electrostatics.law", "missing; allowed:"),
+    (DISPLAY, 'law = "kaczmarek"', "gap_eps_r = 2.0", "electrostatics.law", "missing; allowed:"),
+    (DISPLAY, "air_layer =", "air_laye =", "electrostatics.air_laye", "allowed: air_layer? (law, voltage,"),
     (DISPLAY, "voltage = 1000.0", "", "electrostatics.voltage", "missing; allowed:"),
     (DISPLAY, "voltage = 1000.0", "voltage = '1 kV'", "electrostatics.voltage", 'given "1 kV"'),
     (DISPLAY, "voltage = 1000.0", "voltage = 1e9", "electrostatics.voltage", "given 1000000000.0"),
@@ -439,6 +441,14 @@ WRONG = [
     (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "none.vtu"', "finger.mesh", "No such file"),
     (OWN_MESH, 'mesh = "pad.vtu"', "mesh = 3", "finger.mesh", "given 3"),
     (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nwidth = 16.0', "finger.width", "no geometry keys"),
+    (
+        OWN_MESH,
+        'mesh = "pad.vtu"',
+        'mesh = "pad.vtu"\nparticipant = "i"',
+        "finger.participant",
+        "no geometry",
+    ),
+    (SHORT, "force = 0.05", "force = 0.05\n[finger]\nmesg = 'pad.vtu'", "finger.mesg", "mesh? (kind,"),
     (OWN_MESH, 'mesh = "pad.vtu"', 'mesh = "pad.vtu"\nviscosity = -1.0', "finger.viscosity", "given -1.0"),
     (OWN_MESH, "tissue = 0", "tissue = 'zero'", "finger.regions", 'given "zero"'),
     (OWN_MESH, "nu = 0.48", "nu = 0.5", "finger.materials.tissue.nu", "given 0.5"),
@@ -492,23 +502,23 @@ def test_mistakes_in_different_places_are_reported_at_once(folder):
     text = text.replace('law = "kaczmarek"', "").replace(
         "distance = 5.0\nsteps = 100", "distance = 0\nsteps = 0"
     )
-    text = text.replace("width = 16.68", "width = 500\nwidht = 3").replace(
+    text = text.replace("width = 16.68", "width = 500\nwidht = 3\nparticipant = 'xx'").replace(
         "height = 12.79", "height = '12'", 1
     )
     with pytest.raises(InputError) as caught:
         loads(text, folder)
     keys = [mistake.key for mistake in caught.value.mistakes]
     assert keys == [
-        *("finger.widht", "finger.width", "finger.height", "electrostatics.law"),
+        *("finger.participant", "finger.widht", "finger.width", "finger.height", "electrostatics.law"),
         *("surface.frictoin", "surface.y", "motion[0].force", "motion[1].distance", "motion[1].steps"),
     ]
     sentence = str(caught.value)
-    assert sentence.startswith("9 mistakes: (1) finger.widht: given an unknown key; allowed: width?")
-    assert "(4) electrostatics.law: missing; allowed: strong_troxel | kaczmarek (5) surface" in sentence
+    assert sentence.startswith('10 mistakes: (1) finger.participant: given "xx"; allowed: i | ii')
+    assert "(2) finger.widht: given an unknown key; allowed: width?" in sentence
     assert sentence.endswith(" more")
     assert "\n" not in sentence
     again = pickle.loads(pickle.dumps(caught.value))
-    assert (str(again), again.mistakes[3].given) == (sentence, caught.value.mistakes[3].given)
+    assert (str(again), again.mistakes[4].given) == (sentence, caught.value.mistakes[4].given)
 
 
 def test_what_an_unknown_key_may_stand_for_is_not_said_to_be_missing(folder):

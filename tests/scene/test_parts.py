@@ -711,7 +711,7 @@ def test_a_roughness_without_mistakes_is_taken():
 
     for rough in (Apart(), Same()):
         assert plan(scene(law=ev.Kaczmarek(), voltage=300.0, roughness_gap=rough)).warnings == ()
-    with pytest.raises(InputError, match=r"given 4\.0; allowed: a length in mm from 0 to 1, or an object"):
+    with pytest.raises(InputError, match=r"given 4\.0; allowed: a length in mm from 0 to 1, a table"):
         scene(law=ev.Kaczmarek(), voltage=300.0, roughness_gap=4.0)
     with pytest.raises(InputError, match="given the class Apart; allowed: an object of it"):
         scene(law=ev.Kaczmarek(), voltage=300.0, roughness_gap=Apart)

@@ -13,22 +13,23 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats
 
 LANES = 8
 
 
 class Cells(NamedTuple):
-    """A space in blocks, of D dimensions. `sizes` (N, B, n, Q, S, M); `nodes` (B, n, L); `weight` (B, Q,
-    L); `reference` (Q, n, D) gradients of the shape functions in the reference cell and `inverse` (B, Q,
-    D D, L) dxi/dX at the points; the same where ln J is sampled, `sample_reference` (S, n, D) and
-    `sample_inverse` (B, S, D D, L), or in space None and (B, n, D, L), the means of the shape gradients,
-    with S = 1; S = 0 where that is at the points. `psi` (B, M, S or Q, L) and `mean` (B, M, L) of the modes
-    of theta, see `elastic.h`; M = 0 in the plane where theta is ln J of the quadrature point.
+    """A space in blocks, of D dimensions. `sizes` (N, B, n, Q, S, M); `nodes` (B, n, L), as `bounded` of
+    the loops makes them; `weight` (B, Q, L); `reference` (Q, n, D) gradients of the shape functions in the
+    reference cell and `inverse` (B, Q, D D, L) dxi/dX at the points; the same where ln J is sampled,
+    `sample_reference` (S, n, D) and `sample_inverse` (B, S, D D, L), or in space None and (B, n, D, L), the
+    means of the shape gradients, with S = 1; S = 0 where that is at the points. `psi` (B, M, S or Q, L) and
+    `mean` (B, M, L) of the modes of theta, see `elastic.h`; M = 0 in the plane where theta is ln J of the
+    quadrature point.
     """
 
     sizes: tuple[int, ...]
-    nodes: Ints
+    nodes: Any
     weight: Floats
     reference: Floats
     inverse: Floats

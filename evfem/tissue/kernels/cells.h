@@ -156,5 +156,6 @@ INLINE tensor inverse_transposed(tensor H, lanes e) { return scaled(1.0 / (1.0 +
 /* Add one pair's stiffness (DIM, DIM) to the entries of the matrix; what is below the diagonal of a node
    with itself goes to the place beyond the last one. */
 INLINE void scatter(tensor K, const int32_t *place, double *data) {
-    EACH(i) EACH(j) for (int l = 0; l < LANES; l++) data[place[(DIM * i + j) * LANES + l]] += item(&K.a[i][j])[l];
+    EACH(i) EACH(j) for (int l = 0; l < LANES; l++)
+        data[place[(DIM * i + j) * LANES + l]] += item(&K.a[i][j])[l];
 }

@@ -13,8 +13,6 @@
 typedef double lanes __attribute__((vector_size(8 * LANES)));
 typedef lanes stored __attribute__((aligned(8))); /* as numpy's arrays are */
 
-typedef int32_t wholes __attribute__((vector_size(4 * LANES), aligned(4)));
-
 /* The numbers in the lanes of a vector in memory. */
 INLINE double *item(lanes *vector) { return (double *)vector; }
 
@@ -46,14 +44,5 @@ INLINE lanes log_of_volume(lanes e) {
 INLINE int any(lanes values) {
     for (int i = 0; i < LANES; i++)
         if (values[i] != 0.0) return 1;
-    return 0;
-}
-
-/* Whether any of so many blocks of whole numbers is below 0 or above `last`. */
-INLINE int outside(const wholes *numbers, Py_ssize_t blocks, int32_t last) {
-    wholes found = {0};
-    for (Py_ssize_t b = 0; b < blocks; b++) found |= (numbers[b] < 0) | (numbers[b] > last);
-    for (int i = 0; i < LANES; i++)
-        if (found[i]) return 1;
     return 0;
 }

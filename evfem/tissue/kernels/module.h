@@ -12,9 +12,6 @@
 /* -- one version for each instruction set ---------------------------------------------------- */
 
 #define VERSION(SUFFIX, ISA)                                                                             \
-    ISA static int outside_##SUFFIX(const int32_t *numbers, Py_ssize_t blocks, int32_t last) {           \
-        return outside((const wholes *)numbers, blocks, last);                                           \
-    }                                                                                                    \
     ISA static double forces_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
                                       const stored *lmbda, double *out, double *smallest) {              \
         SIZED(elastic_forces, u, mu, lmbda, out, smallest)                                               \
@@ -24,15 +21,15 @@
                                      double *data) {                                                     \
         SIZED(elastic_tangent, u, mu, lmbda, given, places, data)                                        \
     }                                                                                                    \
-    ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) {\
+    ISA static void log_volumes_##SUFFIX(const mesh *m, const double *u, const double *du, stored *out) { \
         SIZED(log_volumes, u, du, out)                                                                   \
     }                                                                                                    \
-    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pressure,           \
+    ISA static void volume_forces_##SUFFIX(const mesh *m, const double *u, const stored *pressure,       \
                                            double *out) {                                                \
-        SIZED(volume_forces, u, pressure, out)                                                               \
+        SIZED(volume_forces, u, pressure, out)                                                           \
     }                                                                                                    \
     ISA static void stresses_##SUFFIX(const mesh *m, const double *u, const stored *mu,                  \
-                                      const stored *pressure, stored *out) {                            \
+                                      const stored *pressure, stored *out) {                             \
         SIZED(cell_stresses, u, mu, pressure, out)                                                       \
     }                                                                                                    \
     ISA static double smallest_##SUFFIX(const mesh *m, const double *u) { SIZED(smallest_volume, u) }    \
@@ -44,13 +41,14 @@
         SIZED(viscous_forces, u, rate, strain0, out)                                                     \
     }                                                                                                    \
     ISA static void viscous_tangent_##SUFFIX(const mesh *m, const double *u, const stored *rate,         \
-                                             const stored *strain0, const int32_t *places, double *data) { \
+                                             const stored *strain0, const int32_t *places,               \
+                                             double *data) {                                             \
         SIZED(viscous_tangent, u, rate, strain0, places, data)                                           \
     }                                                                                                    \
     static const versions version_##SUFFIX = {                                                           \
         forces_##SUFFIX,   tangent_##SUFFIX, log_volumes_##SUFFIX, volume_forces_##SUFFIX,               \
         stresses_##SUFFIX, smallest_##SUFFIX, strains_##SUFFIX,    viscous_##SUFFIX,                     \
-        viscous_tangent_##SUFFIX, outside_##SUFFIX};
+        viscous_tangent_##SUFFIX};
 
 typedef struct {
     double (*forces)(const mesh *, const double *, const stored *, const stored *, double *, double *);
@@ -64,7 +62,6 @@ typedef struct {
     double (*viscous)(const mesh *, const double *, const stored *, const stored *, double *);
     void (*viscous_tangent)(const mesh *, const double *, const stored *, const stored *, const int32_t *,
                             double *);
-    int (*outside)(const int32_t *, Py_ssize_t, int32_t);
 } versions;
 
 VERSION(plain, )
@@ -85,13 +82,6 @@ static const versions *chosen(void) {
 
 static const versions *version;
 
-/* Raise IndexError unless all of `count` numbers, whole blocks of LANES, are from 0 to below `end`. */
-static void check_within(const int32_t *numbers, Py_ssize_t count, Py_ssize_t end, const char *what) {
-    int32_t last = end > INT32_MAX ? INT32_MAX : (int32_t)end - 1;
-    if (!PyErr_Occurred() && version->outside(numbers, count / LANES, last))
-        PyErr_Format(PyExc_IndexError, "a %s outside 0 to %zd", what, end - 1);
-}
-
 typedef struct {
     held all;
     mesh m;
@@ -110,11 +100,11 @@ static mesh read_cells(held *all, PyObject *cells, Py_ssize_t *size) {
         return m;
     Py_ssize_t B = m.blocks, n = m.n, Q = m.at.count, M = m.modes;
     int known = DIM == 2 ? n == 4 || n == 6 || n == 9 : (n == 8 || n == 27) && M > 0;
-    if (!known || *size < 0 || B < 0 || Q < 0 || Q > MOST_POINTS || S < 0 || S > MOST_POINTS || M < 0 ||
-        M > MOST_MODES || (DIM == 2 && !M != !S))
+    known = known && *size >= 0 && *size <= INT32_MAX && B >= 0 && B <= INT32_MAX;
+    known = known && Q >= 0 && Q <= MOST_POINTS && S >= 0 && S <= MOST_POINTS && M >= 0 && M <= MOST_MODES;
+    if (!known || (DIM == 2 && !M != !S))
         PyErr_SetString(PyExc_ValueError, "cells of a kind that the loops do not know");
-    m.nodes = hold(all, nodes, 'i', B * n * LANES, 0);
-    check_within(m.nodes, B * n * LANES, *size, "node number");
+    m.nodes = numbers_of(nodes, B * n * LANES, *size);
     m.weight = hold(all, weight, 'd', B * Q * LANES, 0);
     m.at.reference = hold(all, at[0], 'd', DIM * Q * n, 0);
     m.at.inverse = hold(all, at[1], 'd', B * Q * DIM * DIM * LANES, 0);
@@ -124,7 +114,7 @@ static mesh read_cells(held *all, PyObject *cells, Py_ssize_t *size) {
         int whole = DIM == 3 && sample[0] == Py_None; /* means over the cell */
         m.sample.count = whole ? 1 : S;
         m.sample.reference = whole ? NULL : hold(all, sample[0], 'd', DIM * S * n, 0);
-        m.sample.inverse = hold(all, sample[1], 'd', (whole ? n * DIM : (Py_ssize_t)S * DIM * DIM) * B * LANES, 0);
+        m.sample.inverse = hold(all, sample[1], 'd', B * DIM * (whole ? n : S * DIM) * LANES, 0);
     }
     m.psi = hold(all, psi, 'd', B * M * (M ? m.sample.count : 0) * LANES, 0);
     m.mean = hold(all, mean, 'd', B * M * LANES, 0);
@@ -139,8 +129,8 @@ static Py_ssize_t read_request(request *r, PyObject *cells, PyObject *u, PyObjec
     r->m = read_cells(&r->all, cells, &size);
     r->u = hold(&r->all, u, 'd', DIM * size, 0);
     if (first) r->first = hold(&r->all, first, 'd', r->m.blocks * LANES, 0);
-    if (second)
-        r->second = hold(&r->all, second, 'd', r->m.blocks * (strains ? STRAINS * r->m.at.count : 1) * LANES, 0);
+    int items = strains ? STRAINS * r->m.at.count : 1;
+    if (second) r->second = hold(&r->all, second, 'd', r->m.blocks * items * LANES, 0);
     return size;
 }
 
@@ -149,10 +139,9 @@ static Py_ssize_t pairs(const mesh *m) { return m->blocks * m->n * (m->n + 1) / 
 /* The matrix's entries, and where in them those of the pairs go. */
 static const int32_t *hold_places(request *r, PyObject *places, PyObject *data, double **values) {
     Py_ssize_t count = pairs(&r->m) * DIM * DIM * LANES;
-    const int32_t *place = hold(&r->all, places, 'i', count, 0);
     *values = hold(&r->all, data, 'd', -1, 1);
-    if (*values) check_within(place, count, r->all.views[r->all.count - 1].len / (Py_ssize_t)sizeof(double), "place");
-    return place;
+    if (!*values) return NULL;
+    return numbers_of(places, count, r->all.views[r->all.count - 1].len / (Py_ssize_t)sizeof(double));
 }
 
 static PyObject *finish(request *r, PyObject *result) {
@@ -289,6 +278,8 @@ static PyObject *call_add_viscous(PyObject *self, PyObject *args) {
 }
 
 static PyMethodDef methods[] = {
+    {"bounded", call_bounded, METH_VARARGS,
+     "bounded(numbers, end): nodes or places, all from 0 to below end, as the other functions take them."},
     {"forces", call_forces, METH_VARARGS,
      "forces(cells, u, mu, lmbda, out): add the nodal forces (N, DIM); stored energy and smallest J."},
     {"add_tangent", call_add_tangent, METH_VARARGS,

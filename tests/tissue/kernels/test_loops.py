@@ -19,6 +19,7 @@ from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded
 from evfem.tissue.laws import NeoHookean
+from evfem.tissue.pattern import Pattern
 from evfem.tissue.weakform import Tissue
 
 every_element = pytest.mark.parametrize("element", list(CELLS))
@@ -213,24 +214,47 @@ def test_blocks_without_viscosity_have_no_part():
 
 
 @pytest.mark.parametrize(("element", "dim"), [("q1", 2), ("q2p1", 2), ("hex8", 3), ("hex27p1", 3)])
-@pytest.mark.parametrize("number", [50_000_000, -50_000_000, -1])
+@pytest.mark.parametrize("number", [2_000_000_000, 50_000_000, -50_000_000, -1])
 def test_numbers_that_lead_out_of_an_array_are_refused(element, dim, number):
+    """Where they are checked, and where they are used with a shorter array than they were checked for."""
     space = rectangle(element, (3, 3)) if dim == 2 else box(element, (2, 1, 1))
-    u, cells = np.zeros((space.size, dim)), space.cells
-    nodes = cells.nodes.copy()
-    nodes.flat[-1] = number
-    with pytest.raises(IndexError, match=f"node number outside 0 to {space.size - 1}"):
-        loops(dim).smallest_J(cells._replace(nodes=nodes), u)
-    _, B, n, *_ = cells.sizes
+    _, B, n, *_ = space.cells.sizes
+    u, ones = np.zeros((space.size, dim)), np.ones((B, LANES))
     places = np.zeros((B, n * (n + 1) // 2, dim * dim, LANES), np.int32)
-    places.flat[3] = number
-    ones = np.ones((B, LANES))
-    with pytest.raises(IndexError, match="place outside 0 to 4"):
-        loops(dim).add_tangent(cells, u, ones, ones, None, places, np.zeros(5))
+    for shape, end in (((B, n, LANES), space.size), (places.shape, 5)):
+        numbers = np.zeros(shape, np.int32)
+        numbers.flat[-1] = number
+        with pytest.raises(IndexError, match=f"a number outside 0 to {end - 1}"):
+            loops(dim).bounded(numbers, end)
+    longer = space.cells._replace(nodes=loops(dim).bounded(np.zeros((B, n, LANES), np.int32), space.size + 1))
+    with pytest.raises(IndexError, match=f"numbers up to {space.size} lead out of an array of {space.size}"):
+        loops(dim).smallest_J(longer, u)
+    with pytest.raises(IndexError, match="numbers up to 5 lead out of an array of 5"):
+        loops(dim).add_tangent(space.cells, u, ones, ones, None, loops(dim).bounded(places, 6), np.zeros(5))
 
 
-@pytest.mark.parametrize("sizes", [(9, -1, 4, 4, 0, 0), (9, 1, 4, -1, 0, 0), (9, 1, 4, 4, -1, 0)])
-def test_counts_below_none_are_refused(sizes):
+def test_numbers_that_nobody_checked_are_refused():
+    space = rectangle("q1", (3, 3))
+    u, ones, pattern = np.zeros((space.size, 2)), np.ones((2, LANES)), Pattern(space.nodes, 2)
+    checked = loops().bounded(numbers := blocked(pattern.places), pattern.zeros().size)
+    data = pattern.zeros()
+    loops().add_tangent(space.cells, u, ones, ones, None, checked, data)
+    numbers[:] = 2_000_000_000  # what was checked is a copy
+    loops().add_tangent(space.cells, u, ones, ones, None, checked, again := pattern.zeros())
+    np.testing.assert_array_equal(again, data)
+    for wrong in (numbers, None, checked.__class__):
+        with pytest.raises(ValueError, match="invalid PyCapsule"):
+            loops().add_tangent(space.cells, u, ones, ones, None, wrong, data)
+    fewer = loops().bounded(np.zeros(3, np.int32), 1)
+    with pytest.raises(ValueError, match="3 numbers; expected 640"):
+        loops().add_tangent(space.cells, u, ones, ones, None, fewer, data)
+
+
+@pytest.mark.parametrize(
+    "sizes", [(9, -1, 4, 4, 0, 0), (9, 1, 4, -1, 0, 0), (9, 1, 4, 4, -1, 0), (9, 2**61, 4, 4, 0, 0)]
+)
+def test_counts_that_no_space_has_are_refused(sizes):
+    """2^61 blocks have as many bytes as none."""
     space = rectangle("q1", (2, 2))
     with pytest.raises(ValueError, match="do not know"):
         loops().smallest_J(space.cells._replace(sizes=sizes), np.zeros((space.size, 2)))
