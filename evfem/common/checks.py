@@ -282,3 +282,14 @@ def check_fields(target: Any, prefix: str = "") -> None:
         with mistakes.of_a_part():
             set_frozen(target, **{key.field: key.rule["check"](prefix + key.name, value)})
     mistakes.report()
+
+
+class Checked:
+    """A frozen dataclass whose fields obey the rules of their annotations; sentences name them in the table
+    `_table`.
+    """
+
+    _table = ""
+
+    def __post_init__(self) -> None:
+        check_fields(self, self._table)

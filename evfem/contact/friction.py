@@ -32,7 +32,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Values, Within, check_fields, number, plain
+from evfem.common.checks import Checked, Values, Within, number, plain
 from evfem.protocols import FrictionLaw
 from evfem.tensor import derivative
 
@@ -67,7 +67,7 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
-class LoadIndexFriction:
+class LoadIndexFriction(Checked):
     """The force grows with a power of the load; the coefficient is that of the surface at one pressure.
 
     >>> law = LoadIndexFriction(pressure=0.01, index=0.7)
@@ -83,9 +83,6 @@ class LoadIndexFriction:
     kind = "load_index"
     timed = False
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
         lowest = LOWEST * self.pressure if self.lowest is None else self.lowest
@@ -93,7 +90,7 @@ class LoadIndexFriction:
 
 
 @dataclass(frozen=True)
-class AdhesiveFriction:
+class AdhesiveFriction(Checked):
     """Every place in real contact resists with a shear strength besides mu p; contact grows in proportion to
     the pressure until it is complete.
 
@@ -112,9 +109,6 @@ class AdhesiveFriction:
     kind = "adhesive"
     timed = False
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
         share = np.asarray(pressure) / (self.strength if self.full is None else self.full)
@@ -122,7 +116,7 @@ class AdhesiveFriction:
 
 
 @dataclass(frozen=True)
-class RateFriction:
+class RateFriction(Checked):
     """Friction of sliding: it falls from mu to `ratio` mu around `speed`, and goes with a power of the speed.
 
     >>> stribeck = RateFriction(speed=5.0, ratio=0.5)
@@ -142,9 +136,6 @@ class RateFriction:
     kind = "rate"
     timed = True
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""
         slowest = LOWEST * self.speed if self.slowest is None else self.slowest
@@ -154,7 +145,7 @@ class RateFriction:
 
 
 @dataclass(frozen=True)
-class AgeingFriction:
+class AgeingFriction(Checked):
     """A place that has just touched resists with a share of mu p; the rest comes with its real area of
     contact, of first order with the time, sliding or not.
 
@@ -167,9 +158,6 @@ class AgeingFriction:
     time: Annotated[float, _TIME, "time constant of the rest"] = 6.7
     kind = "ageing"
     timed = True
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
         """Largest shear traction in MPa."""

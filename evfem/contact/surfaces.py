@@ -20,7 +20,7 @@ from typing import Annotated, Any, Self
 
 import numpy as np
 
-from evfem.common.checks import Within, check_fields, instance, number, real, set_frozen
+from evfem.common.checks import Checked, Within, instance, number, real, set_frozen
 from evfem.common.tables import numbers, piecewise_linear, piecewise_slope, read_columns
 from evfem.common.views import changed
 from evfem.electrostatics.laws import FILM, Layer
@@ -63,7 +63,7 @@ Shift = Annotated[
 Insulator = Annotated[Layer | None, instance("Layer(thickness, eps_r), or None", Layer, type(None))]
 
 
-class RigidSurface:
+class RigidSurface(Checked):
     """What surfaces share; subclasses are frozen dataclasses with the fields `friction`, `y`,
     `insulator`.
     """
@@ -72,9 +72,7 @@ class RigidSurface:
     y: float | None
     insulator: Layer | None
     is_flat = False
-
-    def __post_init__(self) -> None:
-        check_fields(self, "surface.")
+    _table = "surface."
 
     @property
     def has_friction(self) -> bool:

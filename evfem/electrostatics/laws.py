@@ -35,7 +35,7 @@ from typing import Annotated, Any
 import numpy as np
 import numpy.typing as npt
 
-from evfem.common.checks import Values, Within, above, at_least, finite, number, plain
+from evfem.common.checks import Checked, Values, Within, above, at_least, finite, number, plain
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import ForceLaw
 from evfem.tensor import derivative
@@ -171,15 +171,11 @@ GapPermittivity = Annotated[
 ]
 
 
-def _check_medium(gap_eps_r: float) -> None:
-    at_least("gap_eps_r", gap_eps_r, 1.0, "the relative permittivity of the gap, at least 1")
-
-
 #: force laws by their names in a scene file
 FORCE_LAWS: dict[str, Any] = {}
 
 
-class NamedLaw:
+class NamedLaw(Checked):
     """A force law with a name in scene files, whose annotated fields are keys of [electrostatics]: a class
     `class Own(NamedLaw, name="own")` is all that one needs, here or in a module that has been imported.
     What derives from a law without a name is for Python alone.
@@ -209,9 +205,6 @@ class StrongTroxel(NamedLaw, name="strong_troxel"):
 
     gap_eps_r: GapPermittivity = 1.0
     of_a_field = True
-
-    def __post_init__(self) -> None:
-        _check_medium(self.gap_eps_r)
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be
@@ -276,9 +269,6 @@ class Kaczmarek(NamedLaw, name="kaczmarek"):
     """
 
     gap_eps_r: GapPermittivity = 1.0
-
-    def __post_init__(self) -> None:
-        _check_medium(self.gap_eps_r)
 
     def traction(self, gap: Values, voltage: Values, layers: Layers) -> Values:
         """Attraction in MPa for `gap` in mm, `voltage` in V; InputError where it would be

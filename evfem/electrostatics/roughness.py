@@ -29,7 +29,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import Values, Within, check_fields, number, plain, real
+from evfem.common.checks import Checked, Values, Within, check_fields, number, plain, real
 from evfem.errors import InputError
 from evfem.protocols import RoughnessLaw
 from evfem.tensor import derivative
@@ -45,7 +45,7 @@ OpenGap = Annotated[float, _OPEN, "at no pressure, where the law itself has no b
 
 
 @dataclass(frozen=True)
-class ConstantRoughness:
+class ConstantRoughness(Checked):
     """The same separation whatever the pressure.
 
     >>> ConstantRoughness(0.001).separation(np.array([0.0, 0.02])).tolist()
@@ -54,9 +54,6 @@ class ConstantRoughness:
 
     gap: Annotated[float, _GAP, "at every pressure"]
     law = "constant"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def separation(self, pressure: Values) -> Values:
         """Separation in mm at contact pressures in MPa."""
@@ -68,7 +65,7 @@ class ConstantRoughness:
 
 
 @dataclass(frozen=True)
-class PowerRoughness:
+class PowerRoughness(Checked):
     """The separation falls with the power -`exponent` of the contact pressure, from `open_gap` at none.
 
     >>> law = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.5, open_gap=0.006)
@@ -81,9 +78,6 @@ class PowerRoughness:
     exponent: Annotated[float, _EXPONENT, "gap (p / pressure)^-exponent"]
     open_gap: OpenGap
     law = "power"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def _tangent(self) -> tuple[float, float]:

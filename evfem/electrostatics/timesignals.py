@@ -27,6 +27,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import (
+    Checked,
     Values,
     Within,
     above,
@@ -75,7 +76,7 @@ Amplitude = Annotated[float, _AMPLITUDE, "of the sine or square wave"]
 
 
 @dataclass(frozen=True)
-class Sine:
+class Sine(Checked):
     """`bias` + `amplitude` sin(2 pi `frequency` t + `phase`).
 
     >>> Sine(frequency=50.0, amplitude=100.0, bias=20.0)(0.005)
@@ -88,9 +89,6 @@ class Sine:
     phase: Annotated[float, _PHASE, "at time 0"] = 0.0
     kind = "sine"
     crest = float(np.sqrt(2.0))
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @staticmethod
     def harmonics() -> tuple[Floats, Floats]:
@@ -123,7 +121,7 @@ class Sine:
 
 
 @dataclass(frozen=True)
-class Square:
+class Square(Checked):
     """+`amplitude` in the first half of each period and -`amplitude` in the second.
 
     >>> Square(frequency=50.0, amplitude=100.0)([0.0, 0.009, 0.01, 0.02]).tolist()
@@ -135,9 +133,6 @@ class Square:
     kind = "square"
     crest = 1.0
     harmonics = staticmethod(square_harmonics)
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     def powers(self) -> tuple[float, Floats, Floats]:
         """Effective voltage (V), orders and shares."""
@@ -165,7 +160,7 @@ class Square:
 
 
 @dataclass(frozen=True)
-class OpenCircuit:
+class OpenCircuit(Checked):
     """A direct voltage until the electrode is disconnected; then it keeps its charge, whatever that does to
     its voltage. For a resolved `Drive`.
 
@@ -177,9 +172,6 @@ class OpenCircuit:
     after: Annotated[float, START, "when the electrode is disconnected"] = 0.0
     highest_frequency = 0.0
     kind = "open_circuit"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def largest(self) -> float:

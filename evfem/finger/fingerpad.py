@@ -19,6 +19,7 @@ import numpy as np
 
 from evfem import data
 from evfem.common.checks import (
+    Checked,
     Within,
     check_fields,
     choice,
@@ -113,7 +114,7 @@ _REGIONS["check"] = _regions
 
 
 @dataclass(frozen=True)
-class Electrical:
+class Electrical(Checked):
     """The dielectric between the pad's surface and the conducting tissue below."""
 
     stratum_corneum_thickness: Annotated[
@@ -124,9 +125,7 @@ class Electrical:
     stratum_corneum_eps_r: Annotated[
         float, number("a relative permittivity, at least 1", Within(1.0, 1e9)), "relative permittivity"
     ] = 1650.0
-
-    def __post_init__(self) -> None:
-        check_fields(self, "finger.electrical.")
+    _table = "finger.electrical."
 
 
 @dataclass(frozen=True)

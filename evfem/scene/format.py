@@ -23,7 +23,7 @@ from evfem.electrostatics.timesignals import RATE, START, Sampled
 from evfem.errors import ABSENT, InputError, Mistakes
 from evfem.finger.fingerpad import Electrical, FingerPad
 from evfem.scene.keys import VERSION, at, columns, shown
-from evfem.scene.motion import MOTIONS
+from evfem.scene.motion import MOTIONS, VOLTAGE
 from evfem.scene.scene import (
     DEPTH,
     AirLayer,
@@ -190,11 +190,7 @@ class Electrostatics:
     """[electrostatics]: law, voltage and drive of a scene, and the insulator of its surface."""
 
     law: Annotated[str, among(FORCE_LAWS), "force law of the paper, eqs (2) to (5)"]
-    voltage: Annotated[
-        float | None,
-        number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V"),
-        "effective, across skin and insulator",
-    ] = None
+    voltage: Annotated[float | None, VOLTAGE, "effective, across skin and insulator"] = None
     amplitude: Annotated[
         float | None,
         number("a peak voltage in V, from 0 to 1e6", Within(0.0, 1e6), "V"),

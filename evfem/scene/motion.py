@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from evfem.common.checks import Within, check_fields, number, one_of, whole
+from evfem.common.checks import Checked, Within, check_fields, number, one_of, whole
 from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
@@ -22,7 +22,7 @@ _DISTANCE = number(
 )
 _SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True), "mm/s")
 _GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0), "mm")
-_VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
+VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
 _ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
 Steps = Annotated[int, whole(), "in how many equal parts"]
@@ -62,7 +62,7 @@ class Press:
 
 
 @dataclass(frozen=True)
-class Slide:
+class Slide(Checked):
     """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
@@ -83,9 +83,6 @@ class Slide:
     angle: Annotated[float, _ANGLE, "from +x, of a fingertip; 90 is along the finger"] = 0.0
     kind = "slide"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
     @property
     def way(self) -> tuple[float, float]:
         """How far it goes along x and along z, in mm; quarter turns are exact."""
@@ -97,7 +94,7 @@ class Slide:
 
 
 @dataclass(frozen=True)
-class Hover:
+class Hover(Checked):
     """Hold the bone so that the undeformed outline is off the surface: `indentation = -gap`.
 
     The tissue is free to move under the attraction. Going there takes no time.
@@ -107,25 +104,19 @@ class Hover:
     steps: Steps = 1
     kind = "hover"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class VoltageRamp:
+class VoltageRamp(Checked):
     """Take the voltage from its present value to another, in equal parts."""
 
-    voltage: Annotated[float, _VOLTAGE, "at the end, from the present one"]
+    voltage: Annotated[float, VOLTAGE, "at the end, from the present one"]
     steps: Steps = 10
     hold: Held = "indentation"
     kind = "voltage"
 
-    def __post_init__(self) -> None:
-        check_fields(self)
-
 
 @dataclass(frozen=True)
-class Wait:
+class Wait(Checked):
     """Stay where it is for some time: for a voltage that changes with time, and for tissue that creeps.
 
     >>> Wait(duration=0.1).steps
@@ -136,9 +127,6 @@ class Wait:
     steps: Steps = 100
     hold: Held = "indentation"
     kind = "wait"
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
 
 Motion = Press | Slide | Hover | VoltageRamp | Wait

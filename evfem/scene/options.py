@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import GONE, Within, check_fields, number, one_of, whole, yes_or_no
+from evfem.common.checks import GONE, Checked, Within, check_fields, number, one_of, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -83,7 +83,7 @@ class Solver:
 
 
 @dataclass(frozen=True)
-class Output:
+class Output(Checked):
     """Which fields are kept. What is left open `evfem run` chooses so that its files of fields stay small
     (`evfem.export.FieldFiles`).
     """
@@ -101,6 +101,3 @@ class Output:
     compression: Annotated[
         bool, yes_or_no(), "of the fields' files: a third of the size, slower to write"
     ] = False
-
-    def __post_init__(self) -> None:
-        check_fields(self)

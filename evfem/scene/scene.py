@@ -34,7 +34,7 @@ from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive
 from evfem.scene.fieldless import without_field
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
+from evfem.scene.motion import VOLTAGE, Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
@@ -233,8 +233,8 @@ def _check_electrostatics(scene: Scene) -> None:
         raise InputError("electrostatics.roughness_gap", quoted(scene.roughness_gap), allowed)
     _check_field(scene)
     if not isinstance(scene.voltage, SIGNALS):
-        allowed = "a voltage in V between -1e6 and 1e6, a VoltageProfile or a signal over time"
-        voltage = real("electrostatics.voltage", scene.voltage, allowed, lambda u: abs(u) <= 1e6)
+        allowed = f"{VOLTAGE['allowed']}, a VoltageProfile or a signal over time"
+        voltage = real("electrostatics.voltage", scene.voltage, allowed, VOLTAGE["test"])
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
         if scene.voltage != 0.0:

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import SEED, check_fields, one_of, real, set_frozen, whole
+from evfem.common.checks import SEED, Checked, one_of, real, set_frozen, whole
 from evfem.errors import ABSENT, InputError, quoted
 
 METHODS = ("latin_hypercube", "random")
@@ -96,7 +96,7 @@ _PARAMETERS = {"allowed": "a table [samples.parameters] of distributions", "chec
 
 
 @dataclass(frozen=True)
-class Samples:
+class Samples(Checked):
     """Values of every parameter, independent of each other.
 
     A latin hypercube (McKay, Beckman and Conover 1979, doi:10.2307/1268522) puts exactly one value of each
@@ -111,9 +111,7 @@ class Samples:
     count: Annotated[int, whole(MOST_SAMPLES), "number of samples"]
     seed: Annotated[int, SEED, "the same seed gives the same samples"]
     method: Annotated[str, one_of(*METHODS), "how they are drawn"] = METHODS[0]
-
-    def __post_init__(self) -> None:
-        check_fields(self, "samples.")
+    _table = "samples."
 
     def draw(self) -> dict[str, Floats]:
         """The values of every parameter, (count,) each, in the order of `parameters`."""

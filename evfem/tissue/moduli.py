@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from evfem.common.checks import Within, check_fields, number
+from evfem.common.checks import Checked, Within, number
 from evfem.errors import InputError
 
 POSITIVE = number("a positive number in MPa", Within(0.0, above=True), "MPa")
@@ -41,7 +41,7 @@ def bulk_modulus(mu: float, nu: float | None, bulk: float | None) -> float:
 
 
 @dataclass(frozen=True)
-class Isotropic:
+class Isotropic(Checked):
     """Parameters of the laws that are given by Young's modulus and Poisson's ratio at small
     strain.
     """
@@ -50,9 +50,6 @@ class Isotropic:
     nu: Poisson
     viscosity: Relaxation = None
     density: Density = 1e-9
-
-    def __post_init__(self) -> None:
-        check_fields(self)
 
     @property
     def mu(self) -> float:

@@ -148,7 +148,7 @@ def test_provenance_of_a_scene_that_no_file_can_hold_is_complete():
 
 def test_help_says_every_parameter_with_its_meaning_and_range():
     said = pydoc.plain(pydoc.render_doc(ev.Slide))
-    assert "class Slide(builtins.object)\n |  Slide(distance: float, steps: int = 100" in said
+    assert "\n |  Slide(distance: float, steps: int = 100" in said
     assert "- `speed`: needed with dynamics other than quasistatic (mm/s). Allowed: a speed in mm/s," in said
     told = 0
     for one in (getattr(ev, name) for name in ev.__all__):

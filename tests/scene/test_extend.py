@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.common.checks import Within, check_fields, number, plain
+from evfem.common.checks import Within, number, plain
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.laws import FORCE_LAWS, GapPermittivity, NamedLaw
 from evfem.electrostatics.spectrum import grouped
@@ -40,9 +40,6 @@ def softened():
     class Softened(NamedLaw, name="softened"):
         softening: Annotated[float, number("a length in mm, not negative", Within(0.0), "mm"), "of the gap"]
         gap_eps_r: GapPermittivity = 1.0
-
-        def __post_init__(self):
-            check_fields(self)
 
         def traction(self, gap, voltage, layers):
             far = np.asarray(gap) + self.softening + self.gap_eps_r * layers.reduced
