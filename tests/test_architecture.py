@@ -24,7 +24,7 @@ ROOMS = {
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
-        "hexahedron mesh symmetry archive faces solids quality formats vtu msh file",
+        "hexahedron mesh symmetry archive faces solids quality file",
     ),
     "tissue": (
         {"numpy", "scipy", "skfem"},

@@ -23,7 +23,6 @@ import numpy as np
 
 from evfem.common.storage import load_arrays
 from evfem.mesh import file as meshfile
-from evfem.mesh.vtu import read
 from evfem.scene.file import load
 from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS
 
@@ -128,14 +127,14 @@ def broken(out: Path) -> list[str]:
         "checkpoint.npz": lambda p: load_arrays(p, "checkpoint", CHECKPOINT_FORMAT),
         "summary.json": lambda p: json.loads(p.read_text()),
         "fields.pvd": lambda p: [
-            read((p.parent / e.attrib["file"]).read_bytes()) for e in ElementTree.parse(p).iter("DataSet")
+            meshfile.parts(p.parent / e.attrib["file"]) for e in ElementTree.parse(p).iter("DataSet")
         ],
     }
     found = []
     for path in sorted(out.iterdir()) if out.exists() else ():
         if path.name.startswith("."):
             continue
-        check = checks.get(path.name, lambda p: read(p.read_bytes()))
+        check = checks.get(path.name, meshfile.parts)
         try:
             check(path)
             whole = path.suffix != ".csv" or path.read_bytes().endswith(b"\n")
