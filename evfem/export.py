@@ -19,7 +19,6 @@ from evfem.common.arrays import Ints
 from evfem.common.storage import replacing, write_text
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.mesh import formats
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
 from evfem.simulation.result import CELL_FIELDS, POINT_FIELDS, Frame, Result, Row
@@ -172,8 +171,8 @@ def frame_in(path: str | Path, row: Row, mesh: Mesh) -> Frame:
 
     Raises ValueError for any other file.
     """
-    parts = formats.read(Path(path))
-    if parts.points.shape[0] != len(mesh.points) or [kind for kind, _ in parts.blocks] != [mesh.kind]:
+    parts = meshfile.parts(Path(path))
+    if len(parts.points) != len(mesh.points) or [block.type for block in parts.cells] != [mesh.kind]:
         raise ValueError(f"{path} on another mesh")
     nodal = {name: np.asarray(parts.point_data[name]) for name in ("displacement", *POINT_FIELDS)}
     of_cells = {name: np.asarray(parts.cell_data[name][0], dtype=float) for name in CELL_FIELDS}

@@ -1,11 +1,11 @@
 """The full field as files for ParaView."""
 
+import meshio
 import numpy as np
 import pytest
 
 import evfem as ev
 from evfem import fieldfiles
-from evfem.mesh import formats
 from evfem.simulation.model import make_model
 
 SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
@@ -13,9 +13,8 @@ SMOOTH = ev.FingerPad(resolution="coarse", ridges=False)
 
 def written(path):
     """Points (n, 2), cells (m, 4), potential (n,), field (m, 2), layer (m,)."""
-    parts = formats.read(path)
-    (kind, cells), data = parts.blocks[0], parts.cell_data
-    assert kind == "quad"
+    parts = meshio.read(path)
+    cells, data = parts.cells_dict["quad"], parts.cell_data
     field = np.asarray(data["electric_field"][0])
     assert not field[:, 2].any()
     return parts.points[:, :2], cells, parts.point_data["potential"], field[:, :2], data["layer"][0]

@@ -60,7 +60,6 @@ from evfem.finger.sizes import (
     check_skin,
 )
 from evfem.mesh import file as meshfile
-from evfem.mesh.formats import LARGEST
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
 from evfem.protocols import Material
@@ -99,7 +98,7 @@ RESOLUTIONS: Mapping[str, Divisions] = {
 
 _SCAN = str | dict[str, list[float]]
 _MESH = instance("the path of a mesh file", str, os.PathLike, Mesh)
-_MESH |= {"key": "mesh", "type": str, "file": LARGEST}
+_MESH |= {"key": "mesh", "type": str, "file": meshfile.LARGEST}
 _REGIONS: dict[str, Any] = {"allowed": "a table name = number"}
 
 

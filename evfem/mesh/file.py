@@ -5,6 +5,10 @@ Encoding of `.vtu` files: integer cell data `region`, point data `pad`, `bone`, 
 (`region:NAME` = number), so that no table is needed to read them back. Encoding of `.msh` files:
 physical groups of surfaces (regions) and of lines or points (sets of nodes), or of volumes and
 surfaces.
+
+Files are read by meshio, which knows no limits: `parts` bounds the file's size and turns all it
+raises into one reason. A small file that was made to fill the memory still may: see
+docs/commandline.md, "Nothing is trusted".
 """
 
 from __future__ import annotations
@@ -12,20 +16,27 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
+import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from evfem.common.arrays import Ints
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError
-from evfem.mesh import formats, msh
-from evfem.mesh.formats import LARGEST, Parts, Unreadable
 from evfem.mesh.mesh import CELLS, KINDS, Mesh
-from evfem.mesh.msh import PHYSICAL
 from evfem.mesh.quality import check
 
+if TYPE_CHECKING:
+    import meshio
+
+#: largest mesh file that is read, in bytes
+LARGEST = 128 * 2**20
+#: meshio's name of the numbers of physical groups
+PHYSICAL = "gmsh:physical"
 #: Prefix of the field data that carry the names of regions in a `.vtu` file.
 PREFIX = "region:"
 
@@ -42,8 +53,8 @@ _Names = dict[tuple[int, int], str]
 
 
 def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None) -> Mesh:
-    """The checked mesh, in mm, of a `.vtu` or `.msh` file of at most 128 MB, or of another that
-    meshio reads.
+    """The checked mesh, in mm, of a file of at most 128 MB that meshio reads: `.vtu`, `.msh` and
+    others.
 
     `regions` maps a name to its number in the cell data `region`; it is not needed for physical
     groups of gmsh or for files that `write` made. Nodes keep the numbers of the file, cells are
@@ -51,13 +62,11 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
     everything that cannot be a finger.
     """
     path = Path(path)
-    raw = _parts(path)
-    blocks = raw.blocks
-    names = raw.names
+    raw, names = _read(path)
     body = _body(raw)
-    solid = [k for k, (kind, cells) in enumerate(blocks) if _dimension(kind, body) >= body and len(cells)]
-    kind = _one_kind(path, [blocks[k][0] for k in solid])
-    cells = np.vstack([blocks[k][1] for k in solid]).astype(np.int64)
+    solid = [k for k, one in enumerate(raw.cells) if _dimension(one.type, body) >= body and len(one)]
+    kind = _one_kind(path, [raw.cells[k].type for k in solid])
+    cells = np.vstack([raw.cells[k].data for k in solid]).astype(np.int64)
     if names:
         region, region_names = _groups(path, raw, solid, names, body)
         sets = _group_sets(raw, names, body)
@@ -65,24 +74,75 @@ def read(path: str | os.PathLike[str], regions: Mapping[str, int] | None = None)
         region, region_names = _numbers(path, raw, solid, regions)
         sets = {}
     sets.update(_point_sets(path, raw))
-    points = raw.points if body == 3 else _plane(path, raw.points)
+    points = raw.points.astype(float) if body == 3 else _plane(path, raw.points)
     mesh = Mesh(points, cells, kind, region, region_names, sets)
     return check(mesh, str(path))
 
 
-def _parts(path: Path) -> Parts:
+def _read(path: Path) -> tuple[meshio.Mesh, _Names]:
     if not path.is_file():
         raise InputError("finger.mesh", str(path), "a mesh file that exists")
     try:
-        if path.stat().st_size > LARGEST:
-            raise Unreadable(f"more than {LARGEST // 2**20} MB")
-        return msh.read(path.read_bytes()) if path.suffix.lower() == ".msh" else formats.read(path)
-    except (Unreadable, MemoryError) as error:
-        reason = " ".join(str(error).split())[:200] or "not enough memory"
+        raw = parts(path)
+        return raw, _physical_names(path.read_bytes()) if path.suffix.lower() == ".msh" else {}
+    except ValueError as error:
         allowed = "a readable mesh file: .vtu, .msh with physical groups, or another format of meshio's"
-        raise InputError("finger.mesh", f"{path} ({reason})", allowed) from error
+        raise InputError("finger.mesh", f"{path} ({error})", allowed) from error
     except OSError as error:
         raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
+
+
+def parts(path: Path) -> meshio.Mesh:
+    """What meshio reads of a file: points, cells, data. Physical groups have positive numbers.
+
+    Raises ValueError with a reason on one line for whatever meshio cannot read, OSError when the
+    disk refuses.
+    """
+    if path.stat().st_size > LARGEST:
+        raise ValueError(f"more than {LARGEST // 2**20} MB")
+    with path.open("rb") as file:
+        start = file.read(1000)
+    if b"<!DOCTYPE" in start or b"<!ENTITY" in start or start.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise ValueError("a document type, or no UTF-8 text")
+    import meshio
+
+    if path.suffix.lower() not in meshio.extension_to_filetypes:
+        raise ValueError(f"meshio knows no format {path.suffix or 'without an ending'}")
+    said = io.StringIO()
+    try:
+        with warnings.catch_warnings(), contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            warnings.simplefilter("ignore")
+            warnings.filterwarnings("error", "string or file could not be read")  # no number
+            warnings.simplefilter("error", RuntimeWarning)  # numbers out of range
+            raw = meshio.read(path)
+        if raw.points.ndim != 2 or raw.points.shape[1] not in (2, 3):
+            raise ValueError("no points in the plane or in space")
+        for block in raw.cells:
+            if len(block) and not 0 <= np.min(block.data) <= np.max(block.data) < len(raw.points):
+                raise ValueError("cells of nodes that do not exist")
+    except (Exception, SystemExit) as error:  # its readers raise anything, and leave where the file is wrong
+        raise ValueError(_reason(error, said.getvalue())) from error
+    return raw
+
+
+def _reason(error: BaseException, said: str) -> str:
+    """Why meshio could not read a file, on one line."""
+    reason = said if isinstance(error, SystemExit) else str(error)
+    if isinstance(error, KeyError):
+        reason = f"unknown or missing: {reason}"
+    if PHYSICAL in reason:
+        reason = "version 4.1 with elements outside of physical groups: save without them, or as 2.2"
+    return " ".join(reason.split())[:200] or "damaged, or of a kind that meshio does not know"
+
+
+def _physical_names(content: bytes) -> _Names:
+    """(dimension, number) -> name: meshio keeps one group per name, but `nail` may be a region and
+    a boundary.
+    """
+    section = re.search(rb"\$PhysicalNames\s(.*?)\$EndPhysicalNames", content, re.DOTALL)
+    row = re.compile(rb'^\s*([0-3])\s+(\d{1,9})\s+"(.*)"\s*$', re.MULTILINE)
+    rows = row.findall(section[1]) if section else []
+    return {(int(dimension), int(number)): name.decode(errors="replace") for dimension, number, name in rows}
 
 
 def _one_kind(path: Path, kinds: list[str]) -> str:
@@ -95,11 +155,11 @@ def _one_kind(path: Path, kinds: list[str]) -> str:
     raise InputError("finger.mesh", given, allowed)
 
 
-def _body(raw: Parts) -> int:
+def _body(raw: meshio.Mesh) -> int:
     """Dimension of the body's cells, 2 or 3; cells below it are kept only for the nodes of a
     physical group.
     """
-    return max([2, *(CELLS[kind].dimension for kind, cells in raw.blocks if kind in CELLS and len(cells))])
+    return max([2, *(CELLS[one.type].dimension for one in raw.cells if one.type in CELLS and len(one))])
 
 
 def _dimension(kind: str, body: int) -> int:
@@ -121,9 +181,9 @@ def _plane(path: Path, points: np.ndarray) -> np.ndarray:
 
 
 def _groups(
-    path: Path, raw: Parts, solid: list[int], names: _Names, body: int
+    path: Path, raw: meshio.Mesh, solid: list[int], names: _Names, body: int
 ) -> tuple[Ints, dict[str, int]]:
-    tag = np.concatenate([raw.cell_data[PHYSICAL][k] for k in solid])
+    tag = np.concatenate([_tags(raw)[k] for k in solid])
     region_names = {name: number for (dimension, number), name in names.items() if dimension == body}
     lost = sorted(set(np.unique(tag).tolist()) - set(region_names.values()))
     if lost:
@@ -133,17 +193,27 @@ def _groups(
     return tag, {name: number for name, number in region_names.items() if number in present}
 
 
-def _group_sets(raw: Parts, names: _Names, body: int) -> dict[str, Ints]:
+def _group_sets(raw: meshio.Mesh, names: _Names, body: int) -> dict[str, Ints]:
     sets: dict[str, Ints] = {}
-    for (kind, cells), tag in zip(raw.blocks, raw.cell_data[PHYSICAL], strict=True):
-        for (d, number), name in names.items():
-            if d == _dimension(kind, body) < body and len(nodes := np.unique(cells[tag == number])):
+    for block, tag in zip(raw.cells, _tags(raw), strict=True):
+        dimension = _dimension(block.type, body)
+        for number in np.unique(tag).tolist() if dimension < body else []:
+            if name := names.get((dimension, number)):
+                nodes = block.data[tag == number]
                 sets[name] = np.union1d(sets.get(name, np.empty(0, np.int64)), nodes).astype(np.int64)
     return sets
 
 
+def _tags(raw: meshio.Mesh) -> list[Ints]:
+    """Numbers of physical groups, 0 for none; Gmsh gives negative ones to curves that run
+    backwards.
+    """
+    tags = raw.cell_data.get(PHYSICAL)
+    return [np.abs(tag) for tag in tags] if tags else [np.zeros(len(one), dtype=int) for one in raw.cells]
+
+
 def _numbers(
-    path: Path, raw: Parts, solid: list[int], regions: Mapping[str, int] | None
+    path: Path, raw: meshio.Mesh, solid: list[int], regions: Mapping[str, int] | None
 ) -> tuple[Ints, dict[str, int]]:
     if "region" not in raw.cell_data:
         raise InputError(
@@ -158,9 +228,9 @@ def _numbers(
     region = region.astype(np.int64)
     if regions is None:
         regions = {
-            name.removeprefix(PREFIX): int(number.flat[0])
+            name.removeprefix(PREFIX): int(np.ravel(number)[0])
             for name, number in raw.field_data.items()
-            if name.startswith(PREFIX) and number.size and np.isfinite(number).all()
+            if name.startswith(PREFIX) and np.size(number) and np.isfinite(number).all()
         }
     return region, _checked_names(path, region, regions)
 
@@ -188,7 +258,7 @@ def _checked_names(path: Path, region: Ints, regions: Mapping[str, int]) -> dict
     return dict(regions)
 
 
-def _point_sets(path: Path, raw: Parts) -> dict[str, Ints]:
+def _point_sets(path: Path, raw: meshio.Mesh) -> dict[str, Ints]:
     """`pad` and `bone` of any type, and every other point data that holds only the integers 0 and
     1.
     """

@@ -19,8 +19,7 @@ from evfem.mesh.hexahedron import EDGES, FACES, face_nodes
 
 
 class CellKind(NamedTuple):
-    """A kind of cell: dimension, numbers of corners and nodes, order, and its numbers in VTK and
-    in Gmsh.
+    """A kind of cell: dimension, numbers of corners and nodes, order.
 
     The local edges of a triangle or quad are (corner i, corner i+1[, mid-node i]).
     """
@@ -29,24 +28,22 @@ class CellKind(NamedTuple):
     corners: int
     nodes: int
     order: int
-    vtk: int
-    gmsh: int
 
 
-#: every kind of cell that the readers of mesh files know
+#: kinds of cells in mesh files, by meshio's names
 CELLS: Mapping[str, CellKind] = {
-    "vertex": CellKind(0, 1, 1, 1, vtk=1, gmsh=15),
-    "line": CellKind(1, 2, 2, 1, vtk=3, gmsh=1),
-    "line3": CellKind(1, 2, 3, 2, vtk=21, gmsh=8),
-    "triangle": CellKind(2, 3, 3, 1, vtk=5, gmsh=2),
-    "triangle6": CellKind(2, 3, 6, 2, vtk=22, gmsh=9),
-    "quad": CellKind(2, 4, 4, 1, vtk=9, gmsh=3),
-    "quad8": CellKind(2, 4, 8, 2, vtk=23, gmsh=16),
-    "quad9": CellKind(2, 4, 9, 2, vtk=28, gmsh=10),
-    "tetra": CellKind(3, 4, 4, 1, vtk=10, gmsh=4),
-    "hexahedron": CellKind(3, 8, 8, 1, vtk=12, gmsh=5),
-    "hexahedron20": CellKind(3, 8, 20, 2, vtk=25, gmsh=17),
-    "hexahedron27": CellKind(3, 8, 27, 2, vtk=29, gmsh=12),
+    "vertex": CellKind(0, 1, 1, 1),
+    "line": CellKind(1, 2, 2, 1),
+    "line3": CellKind(1, 2, 3, 2),
+    "triangle": CellKind(2, 3, 3, 1),
+    "triangle6": CellKind(2, 3, 6, 2),
+    "quad": CellKind(2, 4, 4, 1),
+    "quad8": CellKind(2, 4, 8, 2),
+    "quad9": CellKind(2, 4, 9, 2),
+    "tetra": CellKind(3, 4, 4, 1),
+    "hexahedron": CellKind(3, 8, 8, 1),
+    "hexahedron20": CellKind(3, 8, 20, 2),
+    "hexahedron27": CellKind(3, 8, 27, 2),
 }
 #: the kinds that a finger can be made of, in the plane and in space
 KINDS = ("quad", "quad9", "triangle", "triangle6", "hexahedron", "hexahedron27")

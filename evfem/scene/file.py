@@ -2,7 +2,7 @@
 file.
 
 Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps,
-csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.formats`). What is written
+csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.file`). What is written
 (`dump`) is in `evfem.scene.written`, which needs none of this.
 """
 

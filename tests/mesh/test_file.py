@@ -100,6 +100,9 @@ def test_version_four_gmsh_file_is_read(tmp_path):
     np.testing.assert_array_equal(*by_region)
     np.testing.assert_array_equal(read.node_sets["pad"], mesh.node_sets["pad"])
     np.testing.assert_array_equal(read.node_sets["bone"], mesh.node_sets["bone"])
+    path.write_text(path.read_text().replace(" 1 -4 0\n", " 0 0\n"))
+    with pytest.raises(InputError, match=r"outside of physical groups: save without them, or as 2\.2"):
+        meshfile.read(path)
 
 
 def version_four(file, names):
@@ -107,7 +110,7 @@ def version_four(file, names):
     entity.
     """
     box = "-9 -9 0 9 9 0"
-    lines = [f"{tag} {box} 1 {tag} 0" for d, tag in names if d == 1]
+    lines = [f"{tag} {box} 1 -{tag} 0" for d, tag in names if d == 1]  # curves that run backwards
     faces = [f"{tag} {box} 1 {tag} 0" for d, tag in names if d == 2]
     nodes = [f"{x:.17g} {y:.17g} 0" for x, y, _ in file.points]
     numbers = [str(i + 1) for i in range(len(nodes))]
@@ -125,6 +128,15 @@ def version_four(file, names):
     text += ["$Nodes", f"1 {len(nodes)} 1 {len(nodes)}", f"2 1 0 {len(nodes)}", *numbers, *nodes, "$EndNodes"]
     text += ["$Elements", f"4 {count} 1 {count}", *blocks, "$EndElements", ""]
     return "\n".join(text)
+
+
+def test_lines_and_vertices_only_carry_names(tmp_path):
+    parts = raw()
+    region = parts["cell_data"]["region"][0]
+    parts["cells"] = [("line", [[0, 1], [1, 2]]), *parts["cells"], ("vertex", [[4]])]
+    parts["cell_data"] = {"region": [np.zeros(2, int), region, np.zeros(1, int)]}
+    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
+    same(meshfile.read(tmp_path / "mesh.vtu", REGIONS), half_finger())
 
 
 def test_regions_may_be_named_by_the_user(tmp_path):

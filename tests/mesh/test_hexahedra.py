@@ -10,7 +10,6 @@ from tools.solids import SIDES, block
 import evfem as ev
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.mesh import msh
 from evfem.mesh.hexahedron import EDGES, FACES, MIRRORED, PLACES, face_nodes
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
@@ -109,17 +108,6 @@ def test_fingertips_pass_their_own_checks(tmp_path):
     assert finger.mesh(2).kind == "hexahedron27"
     with pytest.raises(InputError, match="hex27p1 on hexahedra"):
         finger.mesh(1)
-
-
-def test_gmsh_has_its_own_order_of_a_quadratic_hexahedron():
-    """Middles of edges and faces as Gmsh's manual draws them (Node ordering, Hexahedron27)."""
-    edges = [(0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)]
-    faces = [(0, 3, 2, 1), (0, 1, 5, 4), (0, 4, 7, 3), (1, 2, 6, 5), (2, 3, 7, 6), (4, 5, 6, 7)]
-    corner = PLACES[:8].astype(float)
-    middles = [corner[list(nodes)].mean(axis=0) for nodes in (*edges, *faces)]
-    gmsh = np.vstack([corner, middles, [[0, 0, 0]]])
-    np.testing.assert_array_equal(gmsh[msh.ORDER["hexahedron27"]], PLACES)
-    np.testing.assert_array_equal(gmsh[msh.ORDER["hexahedron20"]], PLACES[:20])
 
 
 def test_cells_with_twenty_nodes_are_refused_with_the_reason(tmp_path):
