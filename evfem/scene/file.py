@@ -77,8 +77,8 @@ def tables_of(key: str, text: str) -> dict[str, Any]:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise InputError(key, f"no valid TOML: {error}", f"a {key} in TOML") from error
-    if tables.get("version") != VERSION or isinstance(tables["version"], bool):
-        given = shown(tables["version"]) if "version" in tables else ABSENT
+    if type(version := tables.get("version", ABSENT)) is not int or version != VERSION:
+        given = ABSENT if version is ABSENT else shown(version)
         raise InputError("version", given, f"version = {VERSION}")
     return tables
 

@@ -301,6 +301,7 @@ WRONG = [
     (SHORT, "version = 1", "", "version", "version: missing; allowed: version = 1"),
     (SHORT, "version = 1", "version = 2", "version", "given 2"),
     (SHORT, "version = 1", "version = true", "version", "given true"),
+    (SHORT, "version = 1", "version = 1.0", "version", "given 1.0"),
     (SHORT, "version = 1", "version = 1\nspeed = 3", "speed", "an unknown key"),
     (SHORT, "[surface]", "[surfaces]", "surfaces", "an unknown key; allowed: surface? (version"),
     (SHORT, "[surface]\nkind = 'flat'", "", "surface", "missing; allowed:"),
