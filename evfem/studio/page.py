@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import tempfile
+from html import escape
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.common.checks import keys_of
 from evfem.common.tables import csv_text
+from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
 from evfem.errors import InputError
 from evfem.scene.file import dump
@@ -18,7 +21,7 @@ from evfem.studio.state import State, rows
 from evfem.textures.cleaning import Cleaning
 from evfem.textures.commands import ENDINGS
 from evfem.textures.estimate import estimate
-from evfem.textures.feeling import Rendering, playback, render, render_exact
+from evfem.textures.feeling import Device, Rendering, playback, render, render_exact
 from evfem.textures.importing import Source, friction_profile, from_csv, from_image, from_recording
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture
@@ -37,6 +40,21 @@ FILES = {
 }
 #: a rendering that loses more of the slide is warned of
 LOST = 0.02
+
+
+def with_choices(content: bytes) -> bytes:
+    """The page with the force laws and insulators to choose from; a law that needs parameters is none."""
+    laws = {name: name for name, law in FORCE_LAWS.items() if not any(key.required for key in keys_of(law))}
+    insulators = {name: f"{name}, {1e3 * one.thickness:g} um" for name, one in INSULATORS.items()}
+    for place, choices in ((b"<!-- laws -->", laws), (b"<!-- insulators -->", insulators)):
+        content = content.replace(place, "".join(map(_option, choices.items())).encode())
+    return content
+
+
+def _option(choice: tuple[str, str]) -> str:
+    name, text = map(escape, choice)
+    chosen = " selected" if name in (Device().law, Device().insulator) else ""
+    return f'<option value="{name}"{chosen}>{text}</option>'
 
 
 def answer(state: State) -> dict[str, Any]:

@@ -126,7 +126,8 @@ class Handler(BaseHTTPRequestHandler):
             self._send(page.text(_library()), "application/json")
         elif path in ASSETS:
             name, kind = ASSETS[path]
-            self._send((Path(__file__).parent / "assets" / name).read_bytes(), kind)
+            content = (Path(__file__).parent / "assets" / name).read_bytes()
+            self._send(page.with_choices(content) if path == "/" else content, kind)
         else:
             raise Refused(HTTPStatus.NOT_FOUND, "there is no such page")
 

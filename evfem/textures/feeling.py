@@ -25,7 +25,7 @@ from evfem.common.checks import Within, among, check_fields, number, one_of
 from evfem.contact.surfaces import Display
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.electrostatics.laws import FILM, FORCE_LAWS, TOUCHSCREEN, Layer, Layers
+from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
 from evfem.simulation.rendering import (
@@ -42,7 +42,6 @@ from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
-INSULATORS = {"film": FILM, "touchscreen": TOUCHSCREEN}
 #: of the plane finger: area per load (mm2/N), and the stratum corneum of Table 2
 AREA, SKIN = 112.0, Layer(0.38, 1650.0)
 

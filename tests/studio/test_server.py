@@ -14,6 +14,7 @@ import urllib.request
 import pytest
 
 from evfem import cli
+from evfem.electrostatics.laws import FORCE_LAWS, Kaczmarek
 from evfem.errors import InputError, StorageError
 from evfem.studio import runs
 from evfem.studio.server import ADDRESS, ASSETS, MOST_STATE, MOST_UPLOAD, Studio
@@ -73,6 +74,14 @@ def test_the_page_itself_is_answered(server):
     status, _, body = ask(server, "POST", "/answer", "{}", Origin=f"http://{ADDRESS}:{port}")
     assert status == 200
     assert json.loads(body)["source"] == "estimate"
+
+
+def test_the_page_offers_the_laws_and_insulators_that_there_are(server, monkeypatch):
+    monkeypatch.setitem(FORCE_LAWS, "own", Kaczmarek)
+    _, _, body = ask(server, "GET", "/")
+    assert b'<option value="kaczmarek" selected>kaczmarek</option>' in body
+    assert b'<option value="own">own</option>' in body
+    assert b'<option value="touchscreen">touchscreen, 1 um</option>' in body
 
 
 def test_only_this_machine_is_served(server):
