@@ -215,13 +215,10 @@ def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
 
 
 def _from_wav(path: Path) -> VoltageProfile:
-    try:
-        rate, scale, samples = wav.decoded(wav.read_bytes(path))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        given = f"{path}, cut off, of another kind or without the comment"
-        raise InputError("path", given, wav.ALLOWED) from None
+    allowed = f"a 16-bit mono WAV with evfem's comment ({wav.FORM}) in it"
+    rate, samples, scale = wav.read(path, "path", allowed)
+    if not scale or samples.dtype != np.int16:
+        raise InputError("path", f"{path}, of another kind or without the comment", allowed)
     if scale["carrier_Hz"] is not None:
         given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
         allowed = "a WAV without a carrier, or Sampled.from_wav: its samples are the voltage of the moment"
