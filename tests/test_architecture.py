@@ -36,7 +36,7 @@ ROOMS = {
         "outline lattice layers sizes scan section fingerpad blocks fingerprint solid fingertip",
     ),
     "electrostatics": (
-        {"numpy", "scipy", "skfem"},
+        {"numpy", "scipy", "skfem", "PIL"},
         "laws grading outlines bounds curves fieldmesh poisson rigid columncells columns meanpull "
         "dielectrics charges relaxation alternating roughness forces signals wav spectrum timesignals drive "
         "encoding hjif signalfile",

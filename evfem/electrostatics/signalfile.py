@@ -8,9 +8,8 @@ comment. Units: V, mm, mm/s, Hz.
 
 from __future__ import annotations
 
+import io
 import json
-import struct
-import zlib
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -237,11 +236,14 @@ def _from_wav(path: Path) -> VoltageProfile:
 
 
 def _map(profile: VoltageProfile, playback: Playback) -> bytes:
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
     columns = _number(profile, playback.pixel, MOST_COLUMNS, "columns")
     start = float(profile.position[0])
     middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
     share = np.minimum((profile(middle) / playback.full_scale) ** 2, 1.0)
-    row = b"\0" + np.rint(255.0 * share).astype(np.uint8).tobytes()  # 0: the row is not filtered
+    grey = np.rint(255.0 * share).astype(np.uint8)
     natural, largest = playback.friction or (None, None)
     scale = {
         "format": MAP_FORM,
@@ -252,14 +254,10 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
         "natural_friction": natural,
         "largest_friction": largest,
     }
-    per_metre = max(min(round(1000.0 / playback.pixel), 2**31 - 1), 1)
-    chunks = [
-        (b"IHDR", struct.pack(">IIBBBBB", columns, ROWS, 8, 0, 0, 0, 0)),
-        (b"pHYs", struct.pack(">IIB", per_metre, per_metre, 1)),
-        (b"tEXt", b"Software\0evfem"),
-        (b"tEXt", b"Comment\0" + json.dumps(scale).encode("ascii")),
-        (b"IDAT", zlib.compress(row * ROWS, 9)),
-        (b"IEND", b""),
-    ]
-    framed = (struct.pack(">I", len(c)) + n + c + struct.pack(">I", zlib.crc32(n + c)) for n, c in chunks)
-    return b"\x89PNG\r\n\x1a\n" + b"".join(framed)
+    text, file = PngInfo(), io.BytesIO()
+    text.add_text("Software", "evfem")
+    text.add_text("Comment", json.dumps(scale))
+    dots = min(max(25.4 / playback.pixel, 0.0254), 5e7)  # an inch; the file counts them in a metre
+    picture = Image.fromarray(np.tile(grey, (ROWS, 1)))
+    picture.save(file, "PNG", pnginfo=text, dpi=(dots, dots), compress_level=9)
+    return file.getvalue()
