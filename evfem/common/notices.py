@@ -9,19 +9,15 @@ standard error.
 from __future__ import annotations
 
 import logging
-import os
 import shutil
 import sys
 import textwrap
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from threading import Event, Thread
 from typing import Any, TextIO
 
 LOG = logging.getLogger("evfem")
-#: seconds before a status shows, and between its changes
-PATIENCE, EVERY = 1.0, 0.5
 
 
 def wrapped(text: str, stream: TextIO) -> str:
@@ -116,7 +112,9 @@ def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
     from tqdm.auto import tqdm
 
     form = "{percentage:3.0f}%|{bar}| {n_fmt}/{total_fmt} [{elapsed}, {remaining} left, {rate_fmt}{postfix}]"
-    return tqdm(total=total, initial=done, unit=unit, ncols=_columns(), bar_format=form)
+    # tqdm draws nothing in a terminal that says it is 0 columns wide; a notebook would take them for pixels
+    columns = None if "ipykernel" in sys.modules else shutil.get_terminal_size().columns
+    return tqdm(total=total, initial=done, unit=unit, ncols=columns, bar_format=form)
 
 
 def milestone(unit: str, done: int, total: int) -> None:
@@ -130,56 +128,27 @@ def drawable() -> bool:
     return sys.stderr.isatty() or "ipykernel" in sys.modules
 
 
-def _columns() -> int | None:
-    """None leaves the width to tqdm, which draws nothing in a terminal that says it is 0 columns
-    wide.
-    """
-    try:
-        known = os.get_terminal_size(sys.stderr.fileno()).columns > 0
-    except (OSError, ValueError, AttributeError):  # no terminal
-        return None
-    return None if known else shutil.get_terminal_size().columns
-
-
 class _Newest(logging.Handler):
-    """Remembers the newest notice."""
+    """Shows the newest notice behind a status."""
 
-    text = ""
+    def __init__(self, line: Any) -> None:
+        super().__init__()
+        self.line = line
 
     def emit(self, record: logging.LogRecord) -> None:
-        self.text = record.getMessage()
+        self.line.set_postfix_str(record.getMessage(), refresh=False)
+        self.line.update()
 
 
 @contextmanager
 def status(label: str) -> Iterator[None]:
-    """Inside, a terminal shows `label`, the seconds so far and the newest detail, after a second
-    of waiting.
-
-    Elsewhere nothing is shown.
-    """
+    """Inside, a terminal shows `label` and the newest detail. Elsewhere nothing is shown."""
     if not sys.stderr.isatty():
         yield
         return
-    newest, over = _Newest(), Event()
-    ticker = Thread(target=_tick, args=(label, newest, over), daemon=True)
-    with listening(newest, logging.DEBUG):
-        ticker.start()
-        try:
-            yield
-        finally:
-            over.set()
-            ticker.join()
-
-
-def _tick(label: str, newest: _Newest, over: Event) -> None:
     from tqdm import tqdm
 
-    if over.wait(PATIENCE):
-        return
-    form = "{desc} [{elapsed}]{postfix}"
-    with tqdm(desc=label, bar_format=form, leave=False, ncols=_columns(), file=sys.stderr) as line:
-        line.start_t -= PATIENCE
-        while True:
-            line.set_postfix_str(newest.text)
-            if over.wait(EVERY):
-                return
+    columns = shutil.get_terminal_size().columns
+    line = tqdm(desc=label, bar_format="{desc}{postfix}", leave=False, ncols=columns)
+    with line, listening(_Newest(line), logging.DEBUG):
+        yield

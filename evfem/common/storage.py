@@ -9,43 +9,21 @@ processes out of a folder.
 from __future__ import annotations
 
 import errno
+import math
 import os
-import re
-import struct
+import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
 from evfem.common.notices import LOG
 from evfem.errors import InputError, StorageError
 
-#: what reading a cut off, damaged or foreign archive can raise
-DAMAGE = (
-    zipfile.BadZipFile,
-    struct.error,
-    ValueError,
-    TypeError,
-    KeyError,
-    IndexError,
-    OverflowError,
-    EOFError,
-    NotImplementedError,
-    RuntimeError,
-    MemoryError,
-)
 #: largest archive that is read, in bytes, and the most arrays in it
 LARGEST_ARCHIVE, MOST_ARRAYS = 4 * 2**30, 10_000
-#: the only header of an array that is read: plain numbers, truth values or text, as numpy writes it. numpy's
-#: own reader would take it for Python, mend it and warn: too much to do with a file from anywhere
-HEADER = re.compile(
-    rb"\x93NUMPY\x01\x00..\{'descr': '([<>|][biufU]\d{1,9})', 'fortran_order': (True|False), "
-    rb"'shape': \(((?:\d{1,15}, ?)*\d{0,15})\), \} *\n",
-    re.DOTALL,
-)
 
 
 @contextmanager
@@ -117,7 +95,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 def _lock(folder: Path) -> int | None:
     """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no
-    locks.
+    locks. Own: filelock would be one more package, and a file in the folder.
     """
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
@@ -162,15 +140,13 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise InputError(name, "an array of Python objects", "numbers or text")
-    with replacing(path) as temporary, open(temporary, "wb") as file, zipfile.ZipFile(file, "w") as archive:
-        for name, array in arrays.items():
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                np.lib.format.write_array(member, array, allow_pickle=False)
+    with replacing(path) as temporary, open(temporary, "wb") as file:
+        np.savez(file, **dict(arrays))  # type: ignore[arg-type]  # no array is called allow_pickle
 
 
 def format_of(path: str | Path) -> str:
     """What the array `format` of such a file says; nothing where there is none to be read."""
-    with suppress(*DAMAGE, OSError), zipfile.ZipFile(path) as archive:
+    with suppress(Exception), zipfile.ZipFile(path) as archive:
         return str(_array(archive, archive.getinfo("format.npy")))
     return ""
 
@@ -191,12 +167,11 @@ def load_arrays(path: str | Path, key: str, form: str) -> dict[str, np.ndarray]:
             arrays = {info.filename.removesuffix(".npy"): _array(archive, info) for info in members}
     except FileNotFoundError as error:
         raise InputError(key, f"{path}, which does not exist", allowed) from error
-    except DAMAGE as error:
+    except Exception as error:  # whatever zipfile and numpy raise for a damaged file
+        # EINVAL: a directory of the archive that points outside the file
+        if isinstance(error, OSError) and error.errno not in (None, errno.EINVAL):
+            raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
         raise InputError(key, f"{path}, cut off or of another kind", allowed) from error
-    except OSError as error:
-        if error.errno == errno.EINVAL:  # a directory of the archive that points outside the file
-            raise InputError(key, f"{path}, cut off or of another kind", allowed) from error
-        raise StorageError(f"cannot read {path}: {error.strerror or error}") from error
     if "format" not in arrays or arrays["format"].ndim or str(arrays["format"]) != form:
         raise InputError(key, f"{path}, of another format", allowed)
     return arrays
@@ -206,19 +181,14 @@ def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> np.ndarray:
     """One array, its checksum compared."""
     if info.compress_type != zipfile.ZIP_STORED or info.compress_size != info.file_size:
         raise ValueError("compressed")
-    data = archive.read(info)
-    header = HEADER.match(data)
-    if header is None:
-        raise ValueError("no plain array")
-    dtype, shape = np.dtype(header[1].decode()), tuple(map(int, re.findall(rb"\d+", header[3])))
-    length = dtype.itemsize
-    for size in shape:
-        length *= size
-    if length != len(data) - header.end():
-        raise ValueError("not as long as its header says")
-    order: Literal["F", "C"] = "F" if header[2] == b"True" else "C"
-    array = np.ndarray(shape, dtype, data, header.end(), order=order)
-    return array.astype(dtype.newbyteorder("="))
+    with archive.open(info) as member, warnings.catch_warnings():
+        warnings.simplefilter("error")  # of headers that numpy mends
+        np.lib.format.read_magic(member)
+        shape, by_columns, dtype = np.lib.format.read_array_header_1_0(member)
+        data = member.read()
+    if dtype.kind not in "biufU" or math.prod(shape) * dtype.itemsize != len(data):
+        raise ValueError("no plain array, or not as long as its header says")
+    return np.ndarray(shape, dtype, data, order="F" if by_columns else "C").astype(dtype.newbyteorder("="))
 
 
 def _remove(path: Path) -> None:

@@ -214,13 +214,10 @@ def _wav(profile: VoltageProfile, playback: Playback) -> bytes:
 
 
 def _from_wav(path: Path) -> VoltageProfile:
-    try:
-        rate, scale, samples = wav.decoded(wav.read_bytes(path))
-    except ValueError as error:
-        if isinstance(error, InputError):
-            raise
-        given = f"{path}, cut off, of another kind or without the comment"
-        raise InputError("path", given, wav.ALLOWED) from None
+    allowed = f"a 16-bit mono WAV with evfem's comment ({wav.FORM}) in it"
+    rate, samples, scale = wav.read(path, "path", allowed)
+    if not scale or samples.dtype != np.int16:
+        raise InputError("path", f"{path}, of another kind or without the comment", allowed)
     if scale["carrier_Hz"] is not None:
         given = f"{path}, with a carrier of {str(scale['carrier_Hz'])[:20]} Hz"
         allowed = "a WAV without a carrier, or Sampled.from_wav: its samples are the voltage of the moment"
@@ -239,6 +236,9 @@ def _from_wav(path: Path) -> VoltageProfile:
 
 
 def _map(profile: VoltageProfile, playback: Playback) -> bytes:
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
     columns = _number(profile, playback.pixel, MOST_COLUMNS, "columns")
     start = float(profile.position[0])
     middle = _positions(columns, start + 0.5 * playback.pixel, playback.pixel)
@@ -254,14 +254,10 @@ def _map(profile: VoltageProfile, playback: Playback) -> bytes:
         "natural_friction": natural,
         "largest_friction": largest,
     }
-    from PIL import Image, PngImagePlugin
-
-    comments = PngImagePlugin.PngInfo()
-    comments.add_text("Software", "evfem")
-    comments.add_text("Comment", json.dumps(scale))
+    text, file = PngInfo(), io.BytesIO()
+    text.add_text("Software", "evfem")
+    text.add_text("Comment", json.dumps(scale))
+    dots = min(max(25.4 / playback.pixel, 0.0254), 5e7)  # an inch; the file counts them in a metre
     picture = Image.fromarray(np.tile(grey, (ROWS, 1)))
-    # a PNG counts whole pixels per metre in 31 bits, Pillow takes them per inch
-    dpi = 0.0254 * max(min(round(1000.0 / playback.pixel), 2**31 - 1), 1)
-    file = io.BytesIO()
-    picture.save(file, "PNG", dpi=(dpi, dpi), pnginfo=comments, optimize=True)
+    picture.save(file, "PNG", pnginfo=text, dpi=(dots, dots), compress_level=9)
     return file.getvalue()

@@ -376,20 +376,15 @@ class Sampled:
         Raises InputError for a missing, cut off or foreign file, for one without either full
         scale, and for more than 1,000,000 samples.
         """
-        allowed = "a WAV with one channel"
-        data = wav.read_bytes(Path(path), allowed)
-        try:
-            rate, shares = wav.shares(data)
-        except ValueError:
-            given = f"{path}, cut off, with several channels or of another kind"
-            raise InputError("path", given, allowed) from None
-        if shares.size > MOST_ROWS:
-            raise InputError("path", f"{path} with {shares.size} samples", f"at most {MOST_ROWS} of them")
-        volts = wav.full_scale(data) if full_scale is None else full_scale
-        if volts is None:
+        rate, samples, scale = wav.read(Path(path), "path")
+        if samples.size > MOST_ROWS:
+            raise InputError("path", f"{path} with {samples.size} samples", f"at most {MOST_ROWS} of them")
+        if full_scale is None and not scale:
             needed = "the voltage of the largest sample, in V, for a WAV that evfem did not write"
             raise InputError("full_scale", ABSENT, needed)
-        return cls(shares * above("full_scale", volts, 0.0, "a voltage in V above zero"), rate, start, repeat)
+        given = scale["full_scale_V"] if full_scale is None else full_scale
+        volts = above("full_scale", given, 0.0, "a voltage in V above zero")
+        return cls(volts * wav.shares(samples), rate, start, repeat)
 
     def to_csv(self, path: str | Path) -> None:
         """Write the file that `from_csv` reads back."""

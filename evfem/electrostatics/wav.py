@@ -1,9 +1,8 @@
-"""WAV files: chunks, and the comment in which evfem says what a sample means.
+"""WAV files, and the comment in which evfem says what a sample means.
 
-A WAV is a RIFF file: chunks of a name of four letters, a length and a content. evfem writes 16 bit,
-one channel, and in LIST/INFO/ICMT a JSON text with the volts of the largest sample, the speed, the
-first position and the carrier. Other WAVs are read too, of any width, where only the samples are
-asked for.
+evfem writes 16 bit, one channel, and in LIST/INFO/ICMT a JSON text with the volts of the largest
+sample, the speed, the first position and the carrier. scipy reads WAVs of any width; it knows no
+comments, which are therefore written and found here.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import io
 import json
 import struct
 import warnings
-from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -27,74 +26,14 @@ LARGEST_SAMPLE = 32_767
 MOST_SAMPLES = 50_000_000
 #: comment and headers of a file on top of its samples
 MOST_BYTES = 2 * MOST_SAMPLES + 1_000_000
-PCM, MONO, BITS = 1, 1, 16
-ALLOWED = f"a 16-bit mono WAV with evfem's comment ({FORM}) in it"
 
 
 def encoded(samples: Any, rate: int, scale: dict[str, Any]) -> bytes:
     """A WAV of 16-bit samples with the comment `scale`, which has the keys `KEYS`."""
     comment = json.dumps({"format": FORM, **scale}).encode("ascii") + b"\0"
-    width = MONO * BITS // 8
-    header = struct.pack("<HHIIHH", PCM, MONO, rate, rate * width, width, BITS)
+    header = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)
     body = _part(b"fmt ", header) + _part(b"LIST", b"INFO" + _part(b"ICMT", comment))
     return _part(b"RIFF", b"WAVE" + body + _part(b"data", samples.astype("<i2").tobytes()))
-
-
-def read_bytes(path: Path, allowed: str = ALLOWED) -> bytes:
-    """The bytes of a file that is not too long."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(MOST_BYTES + 1)
-    except OSError as error:
-        raise InputError("path", f"{path} ({error.strerror or error})", allowed) from None
-    if len(data) > MOST_BYTES:
-        raise InputError("path", f"{path}, which is too long", f"at most {MOST_SAMPLES} samples")
-    return data
-
-
-def decoded(data: bytes) -> tuple[int, dict[str, Any], Any]:
-    """Rate, what the comment says, and samples of a file that evfem wrote; ValueError for anything
-    else.
-    """
-    try:
-        parts = _parts_of(data)
-        kind, channels, rate, _, _, bits = struct.unpack_from("<HHIIHH", parts[b"fmt "])
-        if (kind, channels, bits) != (PCM, MONO, BITS) or rate == 0:
-            raise ValueError("another kind of WAV")
-        scale = _comment(parts)
-        samples = np.frombuffer(parts[b"data"], dtype="<i2")
-    except (KeyError, TypeError, struct.error, RecursionError) as error:
-        raise ValueError(str(error)) from error
-    if samples.size == 0:
-        raise ValueError("no samples")
-    return rate, scale, samples
-
-
-def full_scale(data: bytes) -> float | None:
-    """The volts of the largest sample that evfem's comment names; None without the comment."""
-    try:
-        return float(_comment(_parts_of(data))["full_scale_V"])
-    except (ValueError, KeyError, TypeError, struct.error, RecursionError):
-        return None
-
-
-def shares(data: bytes) -> tuple[int, Floats]:
-    """Rate (Hz) and samples (-1 to 1) of any WAV with one channel; ValueError for anything else."""
-    from scipy.io import wavfile
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # chunks that scipy does not know
-            rate, samples = wavfile.read(io.BytesIO(data))
-    except Exception as error:  # whatever scipy raises for a damaged file
-        raise ValueError(str(error)) from error
-    if samples.ndim != 1 or samples.size == 0 or rate <= 0:
-        raise ValueError("several channels, or no samples")
-    if samples.dtype.kind == "f":
-        return int(rate), samples.astype(float)
-    if samples.dtype.kind == "u":  # 8 bit, around 128
-        return int(rate), (samples.astype(float) - 128.0) / 127.0
-    return int(rate), samples / float(np.iinfo(samples.dtype).max)
 
 
 def _part(name: bytes, content: bytes) -> bytes:
@@ -102,31 +41,46 @@ def _part(name: bytes, content: bytes) -> bytes:
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
 
-def _parts(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """The chunks in `data`; ValueError for one that is longer than what is there."""
-    at = 0
-    while at + 8 <= len(data):
+def read(path: Path, key: str, allowed: str = "a WAV with one channel") -> tuple[int, Any, dict[str, Any]]:
+    """Rate (Hz), samples as they are stored, and what evfem's comment says, {} without one.
+
+    Raises InputError for a file that is missing, too long, cut off or of another kind.
+    """
+    from scipy.io import wavfile
+
+    try:
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
+    except OSError as error:
+        raise InputError(key, f"{path} ({error.strerror or error})", allowed) from None
+    if len(data) > MOST_BYTES:
+        raise InputError(key, f"{path}, which is too long", f"at most {MOST_SAMPLES} samples")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # chunks that scipy does not know
+            warnings.filterwarnings("error", "Reached EOF prematurely")
+            rate, samples = wavfile.read(io.BytesIO(data))
+    except Exception:  # whatever scipy raises for a damaged file
+        raise InputError(key, f"{path}, cut off or of another kind", allowed) from None
+    if samples.ndim != 1 or samples.size == 0 or rate <= 0:
+        raise InputError(key, f"{path}, with several channels or no samples", allowed)
+    return int(rate), samples, _comment(data)
+
+
+def _comment(data: bytes) -> dict[str, Any]:
+    with suppress(ValueError, KeyError, TypeError, struct.error, RecursionError):
+        at = data.index(b"ICMT")
         (size,) = struct.unpack_from("<I", data, at + 4)
-        content = data[at + 8 : at + 8 + size]
-        if len(content) < size:
-            raise ValueError("cut off")
-        yield data[at : at + 4], content
-        at += 8 + size + size % 2
+        scale = json.loads(data[at + 8 : at + 8 + size].rstrip(b"\0"))
+        if scale["format"] == FORM and set(scale) >= KEYS:
+            return dict(scale)
+    return {}
 
 
-def _parts_of(data: bytes) -> dict[bytes, bytes]:
-    """The chunks of a whole WAV by name."""
-    ((name, body),) = _parts(data)
-    if name != b"RIFF" or body[:4] != b"WAVE":
-        raise ValueError("not a WAV")
-    return dict(_parts(body[4:]))
-
-
-def _comment(parts: dict[bytes, bytes]) -> dict[str, Any]:
-    """What evfem's comment says; ValueError or KeyError without it."""
-    if parts[b"LIST"][:4] != b"INFO":
-        raise ValueError("another kind of WAV")
-    scale = json.loads(dict(_parts(parts[b"LIST"][4:]))[b"ICMT"].rstrip(b"\0"))
-    if scale["format"] != FORM or not set(scale) >= KEYS:
-        raise ValueError("another comment")
-    return scale
+def shares(samples: Any) -> Floats:
+    """Samples of any width as shares of the largest one, -1 to 1."""
+    if samples.dtype.kind == "f":
+        return np.asarray(samples, dtype=float)
+    if samples.dtype.kind == "u":  # 8 bit, around 128
+        return (samples.astype(float) - 128.0) / 127.0
+    return np.asarray(samples / float(np.iinfo(samples.dtype).max))

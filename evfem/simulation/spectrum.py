@@ -71,6 +71,7 @@ def spectrum(
     if not np.isfinite(values).all():
         raise InputError("column", f"{column}, which is not known in all rows", "a column of finite values")
     size, mean = values.size, values.mean()
+    # scipy.signal.periodogram would be as long, and its import takes half a second
     if window == "hann":
         values = mean + (values - mean) * (1.0 - np.cos(2.0 * np.pi * (np.arange(size) + 0.5) / size))
     amplitude = np.abs(np.fft.rfft(values)) * 2.0 / size

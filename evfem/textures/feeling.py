@@ -140,7 +140,10 @@ def _relative(found: Floats, wanted: Floats) -> float:
 
 
 def _amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
-    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window."""
+    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window.
+
+    scipy.signal.periodogram would be as long, and its import takes half a second.
+    """
     even = np.linspace(x[0], x[-1], x.size)
     values = np.interp(even, x, friction)
     window = 1.0 - np.cos(2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size)

@@ -103,7 +103,8 @@ def from_recording(path: str | Path, source: Source, speed: float) -> Texture:
     path = Path(path)
     above("speed", speed, 0.0, "a speed in mm/s above zero")
     if path.suffix.lower() == ".wav":
-        rate, samples = _wav(path)
+        whole, stored, _ = wav.read(path, "file")
+        rate, samples = float(whole), wav.shares(stored)
         notes = [f"Recorded at {rate:g} Hz, slid at {speed:g} mm/s."]
         frequency, amplitude = spectrum_of(samples, rate)
     else:
@@ -114,16 +115,6 @@ def from_recording(path: str | Path, source: Source, speed: float) -> Texture:
         amplitude = amplitude / (2.0 * np.pi * frequency) ** 2
     rows = _lines(frequency / speed, amplitude)
     return source.of(path, "recorded", rows, [*notes, "Rms amplitude set to 1."], "friction_spectrum")
-
-
-def _wav(path: Path) -> tuple[float, Floats]:
-    try:
-        rate, samples = wav.shares(wav.read_bytes(path, "a WAV with one channel"))
-    except InputError:
-        raise
-    except ValueError:
-        raise InputError("file", f"{path}, cut off or of another kind", "a WAV with one channel") from None
-    return float(rate), samples
 
 
 def _rate(time: Floats) -> float:
@@ -144,10 +135,10 @@ def spectrum_of(samples: Floats, rate: float) -> tuple[Floats, Floats]:
     size = min(samples.size // 2 * 2, 2048)
     if size < 8 or not np.ptp(samples) > 0.0:
         raise InputError("file", f"{samples.size} samples", "at least 8 samples that differ")
-    from scipy.signal import welch
+    from scipy.signal import welch  # half a second
 
-    frequency, density = welch(samples, rate, nperseg=size, detrend="constant")
-    return frequency[1:-1], np.sqrt(2.0 * density[1:-1] * rate / size)
+    frequency, density = welch(samples, rate, nperseg=size)
+    return frequency[1:-1], np.sqrt(2.0 * rate / size * density[1:-1])
 
 
 def _lines(frequency: Floats, amplitude: Floats) -> tuple[Floats, Floats]:
