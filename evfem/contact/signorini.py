@@ -32,7 +32,7 @@ Algorithm (`solve_contact`), a primal-dual active set::
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
         change all violated nodes; the worst one alone where these statuses have been met before,
-            and always after a third of the solves
+            and always after many solves; give up where these go round in a circle
 
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
 slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
@@ -56,7 +56,6 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 
 from __future__ import annotations
 
-from collections import Counter
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -163,7 +162,7 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     not end within `ACTIVE_SET_LIMIT` solves and one per node.
     """
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    met, violated = Counter[bytes](), np.zeros(0, dtype=np.int64)
+    met, alone, violated = set[bytes](), set[bytes](), np.zeros(0, dtype=np.int64)
     for solves in range(1, ACTIVE_SET_LIMIT + problem.size + 1):
         force, attraction_drop, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
@@ -175,11 +174,11 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
         violated = np.flatnonzero(wanted != status)
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        met[status.tobytes()] += 1
-        if met[status.tobytes()] > 2:
+        late, key = solves > ACTIVE_SET_LIMIT // 3, status.tobytes()
+        if late and key in alone:
             break
-        one = met[status.tobytes()] > 1
-        changed = violation.argmax() if one else violated
+        changed = violation.argmax() if late or key in met else violated
+        (alone if late else met).add(key)
         status = status.copy()
         status[changed] = wanted[changed]
     raise ContactNotSolved(f"{violated.size} of {problem.size} nodes keep changing")
