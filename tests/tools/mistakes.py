@@ -64,11 +64,11 @@ class Mistake:
                 yield path, text[: found.start()] + self.new + text[found.end() :]
 
     def _made_in_python(self, package: Path) -> Iterator[tuple[Path, str]]:
-        old, new = ast.dump(_expression(self.old)), self.new
+        old = ast.parse(self.old, mode="eval").body
         for path, function in functions(package).get(self.where, ()):
             for node in ast.walk(function):
-                if isinstance(node, ast.expr) and ast.dump(node) == old:
-                    yield path, _replaced(path.read_text(encoding="utf-8"), node, f"({new})")
+                if type(node) is type(old) and ast.dump(node) == ast.dump(old):
+                    yield path, replaced(path.read_text(encoding="utf-8"), node, f"({self.new})")
 
     @property
     def possible(self) -> bool:
@@ -76,11 +76,7 @@ class Mistake:
         return not self.where.endswith(".h") or shutil.which("cc") is not None
 
 
-def _expression(text: str) -> ast.expr:
-    return ast.parse(text, mode="eval").body
-
-
-def _replaced(text: str, node: ast.expr, new: str) -> str:
+def replaced(text: str, node: ast.expr, new: str) -> str:
     """A text with another expression in place of a node of its tree."""
     lines = text.encode().splitlines(keepends=True)
     assert node.end_lineno is not None

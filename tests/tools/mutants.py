@@ -35,155 +35,86 @@ from pathlib import Path
 from queue import SimpleQueue
 from tempfile import TemporaryDirectory
 
-from mistakes import CHECKOUT, LONGEST, Copy
+from mistakes import CHECKOUT, LONGEST, Copy, replaced
 
 ROOMS = ("tissue", "electrostatics", "contact", "solver", "simulation")
 #: pytest's status where all tests of a file have other marks
 NO_TESTS = 5
 #: seconds of tests after which an edit counts as not seen
 PATIENCE = 240.0
-ARITHMETIC: dict[type, tuple[str, str]] = {
-    ast.Add: ("+", "-"),
-    ast.Sub: ("-", "+"),
-    ast.Mult: ("*", "/"),
-    ast.Div: ("/", "*"),
-    ast.MatMult: ("@", "*"),
-}
-COMPARISONS: dict[type, tuple[str, str]] = {
-    ast.Lt: ("<", ">="),
-    ast.LtE: ("<=", ">"),
-    ast.Gt: (">", "<="),
-    ast.GtE: (">=", "<"),
-    ast.Eq: ("==", "!="),
-    ast.NotEq: ("!=", "=="),
-    ast.Is: ("is", "is not"),
-    ast.IsNot: ("is not", "is"),
-}
-LOGIC: dict[type, tuple[str, str]] = {ast.And: ("and", "or"), ast.Or: ("or", "and")}
+#: operators and comparisons by what they are exchanged for, either way
+PAIRS = [(ast.Add, ast.Sub), (ast.Mult, ast.Div), (ast.Lt, ast.GtE), (ast.Gt, ast.LtE), (ast.Eq, ast.NotEq)]
+PAIRS += [(ast.Is, ast.IsNot), (ast.And, ast.Or)]
+OTHER = {ast.MatMult: ast.Mult} | {a: b for pair in PAIRS for a, b in (pair, pair[::-1])}
 NAMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any"}
 #: what says nothing about the physics
-SILENT = (ast.Raise, ast.Assert, ast.JoinedStr, ast.AnnAssign)
+SILENT = (ast.Raise, ast.Assert, ast.JoinedStr)
+#: what is joined by the operators of numbers
+JOINED = ast.JoinedStr | ast.Tuple | ast.List
 
 
 @dataclass(frozen=True)
 class Edit:
-    """Text of a file from `begin` to `end` (offsets) becomes `new`; `line` counts from 1."""
+    """An expression of a file becomes `new`."""
 
     file: str
-    line: int
-    begin: int
-    end: int
+    node: ast.expr
     new: str
 
     def made_in(self, text: str) -> str:
         """The text with the edit."""
-        return text[: self.begin] + self.new + text[self.end :]
+        return replaced(text, self.node, self.new)
 
-    def told(self, text: str) -> str:
-        """The place, the line as it was and as it is."""
-        before, after = (one.splitlines()[self.line - 1].strip() for one in (text, self.made_in(text)))
-        return f"{self.file}:{self.line}: {before}  ->  {after}"
+    def told(self) -> str:
+        """The place, what stands there and what instead."""
+        return f"{self.file}:{self.node.lineno}: {ast.unparse(self.node)}  ->  {self.new}"
 
 
-class Places(ast.NodeVisitor):
-    """Every edit of one file."""
+def changed(node: ast.AST) -> ast.expr | None:
+    """The expression with another operator, comparison, number, truth value, minimum or maximum."""
+    match node:
+        case ast.BinOp(left=a, op=op, right=b) if type(op) in OTHER and not isinstance(a, JOINED):
+            return None if isinstance(b, JOINED) else ast.BinOp(a, OTHER[type(op)](), b)
+        case ast.Compare(left=a, ops=[op], comparators=b) if type(op) in OTHER:
+            return ast.Compare(a, [OTHER[type(op)]()], b)
+        case ast.BoolOp(op=op, values=[a, b]):
+            return ast.BoolOp(OTHER[type(op)](), [a, b])
+        case ast.UnaryOp(op=ast.USub() | ast.Not(), operand=a):
+            return a
+        case ast.Constant(value=bool(value)):
+            return ast.Constant(not value)
+        case ast.Constant(value=int(value)):
+            return ast.Constant(value + 1)
+        case ast.Constant(value=float(value)):
+            return ast.Constant(0.7 * value or 1.0)
+        case ast.Call(func=ast.Name(id=name)) if name in NAMES:
+            return ast.Call(ast.Name(NAMES[name]), node.args, node.keywords)
+        case ast.Call(func=ast.Attribute(value=a, attr=name)) if name in NAMES:
+            return ast.Call(ast.Attribute(a, NAMES[name]), node.args, node.keywords)
+    return None
 
-    def __init__(self, file: str, text: str) -> None:
-        self.file, self.text, self.edits = file, text, list[Edit]()
-        lengths = [len(line) for line in text.splitlines(keepends=True)]
-        self._begins = [sum(lengths[:number]) for number in range(len(lengths))]
-        self.visit(ast.parse(text))
 
-    def visit(self, node: ast.AST) -> None:
-        """Leave out what is silent, and annotations."""
-        if isinstance(node, ast.AnnAssign) and node.value is not None:
-            self.visit(node.value)
-        if not isinstance(node, SILENT):
-            super().visit(node)
-
-    def visit_ClassDef(self, node: ast.ClassDef) -> None:
-        for part in node.body:
-            self.visit(part)
-
-    def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
-        for part in (*node.args.defaults, *filter(None, node.args.kw_defaults), *node.body):
-            self.visit(part)
-
-    def visit_BinOp(self, node: ast.BinOp) -> None:
-        joined = ast.JoinedStr | ast.Tuple | ast.List
-        if not isinstance(node.left, joined) and not isinstance(node.right, joined):
-            self._between(node.left, node.right, ARITHMETIC.get(type(node.op)))
-        self.generic_visit(node)
-
-    def visit_Compare(self, node: ast.Compare) -> None:
-        if len(node.ops) == 1:
-            self._between(node.left, node.comparators[0], COMPARISONS.get(type(node.ops[0])))
-        self.generic_visit(node)
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> None:
-        if len(node.values) == 2:
-            self._between(*node.values, LOGIC[type(node.op)])
-        self.generic_visit(node)
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> None:
-        if isinstance(node.op, ast.USub | ast.Not):
-            begin = self._offset(node.lineno, node.col_offset)
-            self._add(node.lineno, begin, self._offset(node.operand.lineno, node.operand.col_offset), "")
-        self.generic_visit(node)
-
-    def visit_keyword(self, node: ast.keyword) -> None:
-        if node.arg != "strict":
-            self.generic_visit(node)
-
-    def visit_Constant(self, node: ast.Constant) -> None:
-        values = {bool: "not {}", int: "{} + 1", float: "0.7 * {}"}
-        if new := values.get(type(node.value)):
-            old = ast.get_source_segment(self.text, node) or ""
-            begin = self._offset(node.lineno, node.col_offset)
-            new = "1.0" if node.value == 0.0 and isinstance(node.value, float) else f"({new.format(old)})"
-            self._add(node.lineno, begin, begin + len(old), new)
-
-    def visit_Call(self, node: ast.Call) -> None:
-        name = node.func
-        word = name.attr if isinstance(name, ast.Attribute) else getattr(name, "id", "")
-        if word in NAMES:
-            end = self._offset(name.end_lineno or 0, name.end_col_offset or 0)
-            self._add(name.end_lineno or 0, end - len(word), end, NAMES[word])
-        self.generic_visit(node)
-
-    def _between(self, left: ast.expr, right: ast.expr, words: tuple[str, str] | None) -> None:
-        """Exchange an operator, whose text stands between two expressions."""
-        if words is None:
-            return
-        begin = self._offset(left.end_lineno or 0, left.end_col_offset or 0)
-        end = self._offset(right.lineno, right.col_offset)
-        at = self.text.find(words[0], begin, end)
-        if at >= 0:
-            line = self.text.count("\n", 0, at) + 1
-            self._add(line, at, at + len(words[0]), words[1])
-
-    def _add(self, line: int, begin: int, end: int, new: str) -> None:
-        self.edits.append(Edit(self.file, line, begin, end, new))
-
-    def _offset(self, line: int, column: int) -> int:
-        """Offset of a place; columns of the syntax tree count bytes."""
-        begin = self._begins[line - 1]
-        row = self.text[begin:].split("\n", 1)[0]
-        return begin + len(row.encode()[:column].decode())
+def places(node: ast.AST) -> Iterator[tuple[ast.expr, str]]:
+    """Every expression below a node that can be changed, and what it becomes; without what is silent."""
+    if (new := changed(node)) is not None:
+        assert isinstance(node, ast.expr)
+        yield node, f"({ast.unparse(new)})"
+    for name, value in ast.iter_fields(node):
+        if name in ("annotation", "returns", "decorator_list") or getattr(node, "arg", "") == "strict":
+            continue
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, ast.AST) and not isinstance(part, SILENT):
+                yield from places(part)
 
 
 def edits() -> list[Edit]:
-    """Every edit of the rooms that still is Python."""
+    """Every edit of the rooms."""
     found = []
     for room in ROOMS:
         for path in sorted((CHECKOUT / "evfem" / room).rglob("*.py")):
-            text = path.read_text(encoding="utf-8")
-            for edit in Places(path.relative_to(CHECKOUT / "evfem").as_posix(), text).edits:
-                try:
-                    ast.parse(edit.made_in(text))
-                except SyntaxError:
-                    continue
-                found.append(edit)
+            file = path.relative_to(CHECKOUT / "evfem").as_posix()
+            tree = ast.parse(path.read_text(encoding="utf-8"))
+            found += [Edit(file, node, new) for node, new in places(tree)]
     return found
 
 
@@ -214,7 +145,7 @@ class Runs:
         """The test files that run its line, those nearest first."""
         room, name = edit.file.split("/")[0], Path(edit.file).name
         mirror = f"{room}/test_{name}"
-        found = self._of_line.get((edit.file, edit.line)) or self._of_file[edit.file]
+        found = self._of_line.get((edit.file, edit.node.lineno)) or self._of_file[edit.file]
         return sorted(found, key=lambda test: (test != mirror, not test.startswith(room), self._sizes[test]))
 
 
@@ -256,7 +187,7 @@ def judge(edit: Edit, copies: SimpleQueue[Copy], runs: Runs) -> str:
     finally:
         copy.write(file, text)
         copies.put(copy)
-    return f"{edit.told(text)}\t{failed or 'survives'}\t{time.monotonic() - began:.0f} s"
+    return f"{edit.told()}\t{failed or 'survives'}\t{time.monotonic() - began:.0f} s"
 
 
 def lines(chosen: list[Edit], workers: int) -> Iterator[str]:
