@@ -45,7 +45,7 @@ BLOCK = re.compile(r"^(?:<!-- (?P<mark>.+?) -->\n)?^```(?P<kind>\w+)\n(?P<text>.
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 FORMS = "docs/howto/form.md"
 #: pages with so much to compute that `.ci/run` alone runs them
-LONG = {"gallery.md", "howto/element.md", "howto/field.md", "howto/fit.md", "howto/texture.md"}
+LONG = {"gallery.md", *(f"howto/{p}.md" for p in ("element", "field", "fit", "pictures", "rough", "texture"))}
 #: pages that are still to be filled to the width of the others
 UNFILLED = {"docs/theory.md", FORMS}
 #: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`
@@ -99,7 +99,7 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
         run(page, {None}, capsys)
 
 
-@pytest.mark.solver
+@pytest.mark.slow
 def test_blocks_that_take_long_without_pardiso_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     slow = [page for page in PAGES if "<!-- needs fast -->" in (DOCS / page).read_text(encoding="utf-8")]

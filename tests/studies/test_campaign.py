@@ -40,14 +40,14 @@ def drawn():
 
 
 def test_every_drawn_scene_is_valid_and_so_is_its_mirror_image(drawn):
-    for one in drawn[:150]:
+    for one in drawn[:50]:
         scene = tables.scene_of(one)
         assert tables.scene_of(tables.mirrored(one)).total_steps == scene.total_steps
         assert tables.scene_of(tables.with_half_steps(one)).total_steps == 2 * scene.total_steps
 
 
 def test_drawn_scenes_stay_within_the_stated_ranges(drawn):
-    for one in drawn[:200]:
+    for one in drawn[:50]:
         if "electrostatics" not in one:
             continue
         scene = tables.scene_of(one)
@@ -150,7 +150,7 @@ def test_a_mirror_image_of_the_mirror_image_is_the_scene(drawn):
 
 
 def test_a_mirrored_profile_is_as_high_on_the_other_side(drawn):
-    for one in drawn[:100]:
+    for one in drawn[:40]:
         surface, image = tables.scene_of(one).surface, tables.scene_of(tables.mirrored(one)).surface
         x = np.linspace(-5.0, 5.0, 37)
         np.testing.assert_allclose(image.height(-x), surface.height(x), rtol=0, atol=1e-12)

@@ -15,6 +15,8 @@ studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("e
 fig11, pressing = (importlib.import_module(f"{studies.__name__}.{name}") for name in ("fig11", "pressing"))
 PAD = pressing.Pad(resolution="coarse")
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def quick(tmp_path_factory):

@@ -4,6 +4,7 @@ import importlib
 import importlib.util
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -23,32 +24,37 @@ NAMES = ["section321", "laws", "fig05", "fig06", "fig07", "fig08", "fig09", "fig
 NAMES += ["frequency", "hypotheses"]
 
 
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """name -> the quick study of that name, and the folder that it has left; each is run once."""
+    folder = tmp_path_factory.mktemp("studies")
+    return cache(lambda name: (studies.run(name, quick=True, out=folder / name), folder / name))
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_study_leaves_numbers_curves_and_picture(name, tmp_path):
-    result = studies.run(name, quick=True, out=tmp_path / "new")
-    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
-        f"{name}.{e}" for e in ("csv", "json", "png")
-    ]
-    assert json.loads((tmp_path / "new" / f"{name}.json").read_text()) == json.loads(json.dumps(result))
+def test_study_leaves_numbers_curves_and_picture(name, study):
+    result, folder = study(name)
+    assert sorted(p.name for p in folder.iterdir()) == [f"{name}.{e}" for e in ("csv", "json", "png")]
+    assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(result))
     assert list(result) == ["study", "numbers", "paper", "assumptions", "provenance"]
     assert set(result["paper"]) <= set(result["numbers"])
     assert all(type(value) is float and np.isfinite(value) for value in result["numbers"].values())
-    lines = (tmp_path / "new" / f"{name}.csv").read_text().splitlines()
+    lines = (folder / f"{name}.csv").read_text().splitlines()
     assert lines[0] == "series,x,y,unit"
     assert all(line.count(",") == 3 for line in lines)
-    assert (tmp_path / "new" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_section321_thicknesses():
-    numbers = studies.run("section321", quick=True)["numbers"]
+def test_section321_thicknesses(study):
+    numbers = study("section321")[0]["numbers"]
     assert round(numbers["effective_thickness_um"], 3) == 2.746
     assert round(numbers["thickness_strong_troxel_mm"], 2) == 5.49
     assert round(numbers["thickness_kaczmarek_um"], 2) == 76.17
 
 
-def test_fig05_participants_by_an_independent_integral():
+def test_fig05_participants_by_an_independent_integral(study):
     # equation (8b) or (8a) with (24) for one participant, in plain x and y on a fine midpoint grid in angles
-    numbers = studies.run("fig05", quick=True)["numbers"]
+    numbers = study("fig05")[0]["numbers"]
     a, b, c = 18.20 / 2, 15.00 / 2, 28.40 / 2 * np.cos(np.pi / 6)  # participant ix
     t = (np.arange(1500) + 0.5) / 1500 * np.pi / 2
     gap = 0.25 + 2 * b - b * np.cos(t)[:, None] - b * np.cos(t)
@@ -66,8 +72,8 @@ def test_fig05_participants_by_an_independent_integral():
         assert numbers[f"fe.kaczmarek.{case}_mN_at_8mm"] < 8.0 * per_mm  # grooves are farther away
 
 
-def test_fig06_forces_and_areas():
-    numbers = studies.run("fig06", quick=True)["numbers"]
+def test_fig06_forces_and_areas(study):
+    numbers = study("fig06")[0]["numbers"]
     assert numbers["k_ratio"] == pytest.approx(281.25, abs=0.01)  # 1 / 0.003556 of the notes
     assert round(numbers["normal_force_at_0.25N_N"], 2) == 0.69
     assert (
@@ -75,32 +81,32 @@ def test_fig06_forces_and_areas():
     )  # from the other law's k: the paper's own fit
 
 
-def test_fig07_and_fig08_ranges():
-    numbers = studies.run("fig07", quick=True)["numbers"]
+def test_fig07_and_fig08_ranges(study):
+    numbers = study("fig07")[0]["numbers"]
     assert [round(numbers[f"kaczmarek.{end}_N"], 3) for end in ("min", "max")] == [0.036, 0.360]
-    numbers = studies.run("fig08", quick=True)["numbers"]
+    numbers = study("fig08")[0]["numbers"]
     assert round(numbers["kaczmarek.N_at_140V.dsc_0.1mm"], 2) == 0.24
     assert round(numbers["kaczmarek.N_at_140V.dsc_0.5mm"], 3) == 0.029
 
 
-def test_fig09_plate_by_hand():
+def test_fig09_plate_by_hand(study):
     # eps_0 A U^2 / (2 (0.25 + s)^2), s = 0.38/1650 + 0.09/3.35: 8.8541878e-12 * 20 * 4e6 / (2 * 0.27709598^2)
-    numbers = studies.run("fig09", quick=True)["numbers"]
+    numbers = study("fig09")[0]["numbers"]
     expected = 1e3 * 8.8541878e-12 * 20.0 * 4e6 / (2 * 0.277095975**2)
     assert numbers["strong_troxel.mN.A_20mm2.HVLD"] == pytest.approx(expected, rel=1e-7)
     assert numbers["kaczmarek.mN.A_20mm2.HVLD"] == pytest.approx(expected * 0.277095975 / 0.72, rel=1e-7)
 
 
-def test_fig10_is_the_paper_within_half_a_per_cent():
-    result = studies.run("fig10", quick=True)
+def test_fig10_is_the_paper_within_half_a_per_cent(study):
+    result = study("fig10")[0]
     for key, printed in result["paper"].items():
         assert result["numbers"][key] == pytest.approx(printed, rel=5e-3)
     thin, thick = (result["numbers"][f"strong_troxel.mN.dsc_{d}mm.HVLD"] for d in (0.27, 0.49))
     assert thin == pytest.approx(thick, rel=1e-3)  # (8a) does not see the stratum corneum
 
 
-def test_laws_says_what_theory_and_measurement_say():
-    numbers = studies.run("laws", quick=True)["numbers"]
+def test_laws_says_what_theory_and_measurement_say(study):
+    numbers = study("laws")[0]["numbers"]
     assert numbers["verdict.strong_troxel.over_electrostatics"] == pytest.approx(1.0, abs=0.03)
     assert numbers["verdict.kaczmarek.over_electrostatics"] == pytest.approx(0.46, abs=0.01)
     assert numbers["verdict.kaczmarek.median_over_measured.mean"] == pytest.approx(1.0, abs=0.1)
@@ -171,11 +177,11 @@ def test_every_folder_of_studies_is_packed_into_the_wheel():
     }
 
 
-def test_frequency_has_the_printed_pressures_and_the_ratio_of_the_waveforms():
+def test_frequency_has_the_printed_pressures_and_the_ratio_of_the_waveforms(study):
     """14022.5 and 10.4123 Pa at 1 Hz, 9540.57 Pa at 100 kHz; a square wave fluctuates 13 times as much as
     a sine at 15 Hz, and as much at about 190 Hz; the clutch's losses do not depend on the voltage.
     """
-    numbers = studies.run("frequency", quick=True)["numbers"]
+    numbers = study("frequency")[0]["numbers"]
     assert numbers["mean_Pa.leak_0.1_Hz"] == pytest.approx(14022.5, abs=0.05)
     assert numbers["mean_Pa.gabriel_dry.1_Hz"] == pytest.approx(10.4123, abs=5e-5)
     assert numbers["mean_Pa.gabriel_dry.100000_Hz"] == pytest.approx(9540.57, abs=5e-3)
@@ -186,9 +192,9 @@ def test_frequency_has_the_printed_pressures_and_the_ratio_of_the_waveforms():
     assert numbers["published.rauf.fast_over_slow_most"] < 0.655
 
 
-def test_hypotheses_bring_the_law_down_to_the_measured_median():
+def test_hypotheses_bring_the_law_down_to_the_measured_median(study):
     """The lifts by case, back in the law: medians of measured over computed force are (1 - share)^2."""
-    numbers = studies.run("hypotheses", quick=True)["numbers"]
+    numbers = study("hypotheses")[0]["numbers"]
     forces = importlib.import_module(f"{studies.__name__}.measured").participant_forces()
     for case, volts in zip(CASES, (2000.0, 2000.0, 1414.0), strict=True):
         share = numbers[f"lift.median_V.{case}"] / volts

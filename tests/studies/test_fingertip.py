@@ -12,12 +12,11 @@ from evfem.electrostatics.laws import Layers
 SKIN = ev.Layer(0.38, 1650.0)
 
 
-@pytest.mark.parametrize("name", ["i", "ii", "viii"])
-def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid(name):
+def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid():
     """Kaczmarek's pressure over the ellipse of the lower half, by Gauss's rule in polar coordinates:
     within 0.1 %. The stratum corneum is as thick as below the lowest point.
     """
-    finger = ev.Fingertip.participant(name, "coarse", ridges=False)
+    finger = ev.Fingertip.participant("ii", "coarse", ridges=False)
     a, b, c = 0.5 * finger.width, 0.5 * finger.height, 0.5 * finger.length
     x, w = np.polynomial.legendre.leggauss(400)
     radius, weight = 0.5 * (1.0 + x), 0.5 * w  # sin of the polar angle

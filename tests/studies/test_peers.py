@@ -38,6 +38,7 @@ def run(package, element, scene="A", level=0, cpu=1.0, factor=1.0):
     return numbers.Run(package, element, scene, level, cost | {"history": history})
 
 
+@pytest.mark.slow
 def test_quick_comparison_without_peers(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(hosts, "host", lambda name: sys.executable if name == "evfem" else None)
     result = studies.run("peers", quick=True, out=tmp_path)

@@ -42,6 +42,7 @@ def curves(path):
     }
 
 
+@pytest.mark.slow
 def test_fig12_has_the_promised_keys(rendering, folder):
     promised = ["transition.pearson", "transition.relative_l2", "transition.voltage_max_V"]
     promised += [f"sinusoid.{key}" for key in ("pearson", "relative_l2", "mu_min", "voltage_max_V")]
@@ -51,6 +52,7 @@ def test_fig12_has_the_promised_keys(rendering, folder):
     assert {f"fig12.{end}" for end in ("json", "csv", "png")} <= {path.name for path in folder.iterdir()}
 
 
+@pytest.mark.slow
 def test_fig12_step_needs_the_papers_voltage_and_thick_skin_falls_short(rendering):
     numbers = rendering["numbers"]
     assert numbers["transition.voltage_max_V"] == pytest.approx(1776.73, abs=0.01)
@@ -62,6 +64,7 @@ def test_fig12_step_needs_the_papers_voltage_and_thick_skin_falls_short(renderin
     assert found == pytest.approx(ratio, rel=0.05)
 
 
+@pytest.mark.slow
 def test_fig12_exact_encoding_reproduces_both_references(rendering):
     numbers = rendering["numbers"]
     assert numbers["inverse.transition.relative_l2"] < 1e-6
@@ -72,6 +75,7 @@ def test_fig12_exact_encoding_reproduces_both_references(rendering):
         assert numbers[f"inverse.{name}.relative_l2"] < 0.2 * numbers[f"{name}.relative_l2"]
 
 
+@pytest.mark.slow
 def test_fig12_texture_costs_more_than_its_friction(rendering, folder):
     numbers, curve = rendering["numbers"], curves(folder / "fig12.csv")
     # sliding over a texture and back to where it began dissipates at least friction times load times path

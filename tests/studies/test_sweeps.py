@@ -18,6 +18,8 @@ common, measured, people, uncertainty = (
     for name in ("common", "measured", "participants", "uncertainty")
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def participants(tmp_path_factory):
