@@ -140,8 +140,11 @@ def save_arrays(path: str | Path, arrays: Mapping[str, np.ndarray]) -> None:
     for name, array in arrays.items():
         if array.dtype.hasobject:
             raise InputError(name, "an array of Python objects", "numbers or text")
-    with replacing(path) as temporary, open(temporary, "wb") as file:
-        np.savez(file, **dict(arrays))  # type: ignore[arg-type]  # no array is called allow_pickle
+    # older versions of `np.savez` leave the archive open where the disk fills up
+    with replacing(path) as temporary, open(temporary, "wb") as file, zipfile.ZipFile(file, "w") as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                np.lib.format.write_array(member, array, allow_pickle=False)
 
 
 def format_of(path: str | Path) -> str:
