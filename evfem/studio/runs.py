@@ -39,12 +39,13 @@ def run(text: str, exact: bool, send: Callable[[dict[str, Any]], None]) -> None:
     with _place():
         worker = Worker(_work, text, exact)
         try:
-            line: dict[str, Any] = {}
+            ended = False  # signs of life may follow the last line while the process goes
             with suppress(EOFError):
                 while True:
                     line = worker.line.recv() if worker.line.poll(EVERY) else {"alive": True}
+                    ended = ended or not LAST.isdisjoint(line)
                     send(line)
-            if LAST.isdisjoint(line):
+            if not ended:
                 send({"error": "the run ended without a result; perhaps the memory was not enough"})
         finally:
             worker.end()

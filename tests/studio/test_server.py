@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 import urllib.request
 
 import pytest
@@ -147,6 +148,21 @@ def test_a_run_whose_process_dies_says_so(monkeypatch):
     monkeypatch.setattr(runs, "_work", os.abort)  # takes no arguments: the process ends at once
     runs.run("{}", False, lines.append)
     assert "without a result" in lines[-1]["error"]
+
+
+def _say_the_last_and_stay(line, text, exact):
+    """The work of a process that needs a while to go."""
+    line.send({"animation": ""})
+    time.sleep(0.3)
+
+
+def test_a_run_whose_process_goes_slowly_has_a_result(monkeypatch):
+    lines = []
+    monkeypatch.setattr(runs, "EVERY", 0.05)
+    monkeypatch.setattr(runs, "_work", _say_the_last_and_stay)
+    runs.run("{}", False, lines.append)
+    assert {"alive": True} in lines[lines.index({"animation": ""}) :]
+    assert not any("error" in line for line in lines)
 
 
 def test_no_more_than_two_runs_at_once(monkeypatch):
