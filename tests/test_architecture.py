@@ -37,7 +37,7 @@ ROOMS = {
     ),
     "electrostatics": (
         {"numpy", "scipy", "skfem", "PIL"},
-        "laws grading outlines bounds curves fieldmesh poisson rigid columncells columns meanpull "
+        "laws core outlines bounds curves fieldmesh poisson rigid columncells columns meanpull "
         "dielectrics charges relaxation alternating roughness forces signals wav spectrum timesignals drive "
         "encoding hjif signalfile",
     ),
@@ -54,7 +54,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics fieldless options scene keys written format schema file resolution drift "
+        "motion terms electrics fieldless options scene keys written format schema file resolution core drift "
         "partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (

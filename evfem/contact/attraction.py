@@ -34,6 +34,7 @@ from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
 from evfem.contact.pad import Pad, surface_state
 from evfem.contact.skin import Skin
+from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
 from evfem.tensor import derivative, mul, positive_part
@@ -145,6 +146,20 @@ class Attraction:
         potential = [on * self.law.potential(gap, voltage, self.layers) for gap, voltage in pairs]
         sideways = [self._sideways(*each) for each in zip(positions[..., 0], potential, strict=True)]
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
+
+    def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
+        """What a core of the law (`evfem.electrostatics.core`) withholds of the attraction of closed nodes,
+        and what it leaves of it, (P,) in MPa each; None without a core.
+        """
+        if not isinstance(self.law, Cored) or voltage == 0.0:
+            return None
+        found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
+        return found[0], found[1]
+
+    def begin(self, voltage: float | None) -> None:
+        """A part begins: where the voltage is its unknown, the core is that of the `voltage` (V) before."""
+        if isinstance(self.law, Cored):
+            self.law.hold(voltage)
 
     def tangent_factor(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None

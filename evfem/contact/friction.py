@@ -39,6 +39,8 @@ from evfem.tensor import derivative
 #: share of a law's own pressure and speed below which its power stays as it is, unless it is given: where
 #: friction rises without bound as the load vanishes, nodes at the edge of contact would wedge
 LOWEST = 0.01
+#: contact pressure from which on all that a core withholds counts, as a share of the core's own traction
+FULL = 0.05
 #: steps of differences of a law that drops imaginary parts: in MPa, of a coefficient, in mm/s
 PRESSURE_STEP, COEFFICIENT_STEP, SPEED_STEP = 1e-7, 1e-6, 1e-5
 _PRESSURE = number("a pressure in MPa, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "MPa")
@@ -169,6 +171,13 @@ KINDS = {
 }
 
 
+def with_core(pressure: Floats, withheld: Values, left: Values) -> Floats:
+    """What a core withholds of the pressure (MPa) of nodes under so much: all of it from the share `FULL` of
+    what it leaves on, so that a node that opens loses it continuously.
+    """
+    return np.asarray(withheld * np.clip(pressure / (FULL * np.asarray(left)), 0.0, 1.0))
+
+
 def _at_least(value: Values, least: float) -> Any:
     """The value, or `least` where it is below."""
     value = np.asarray(value)
@@ -178,7 +187,8 @@ def _at_least(value: Values, least: float) -> Any:
 @dataclass(frozen=True)
 class Slipping:
     """k nodes as a law sees them: contact forces (k,) in N/mm, tributary lengths (k,) in mm,
-    coefficients of the surface (k,), speeds (k,) in mm/s and ages (k,) in s.
+    coefficients of the surface (k,), speeds (k,) in mm/s and ages (k,) in s. Of the pressure that a core
+    of the attraction withholds (`Attraction.restored`), `withheld` and `left` (k,) in MPa.
     """
 
     normal: Floats
@@ -186,11 +196,14 @@ class Slipping:
     mu: Floats
     speed: Floats
     age: Floats
+    withheld: Floats | float = 0.0
+    left: Floats | float = 1.0
 
     @property
     def pressure(self) -> Floats:
-        """Contact pressure (k,) in MPa."""
-        return np.maximum(self.normal, 0.0) / self.length
+        """Contact pressure (k,) in MPa, with what a core withholds."""
+        p = np.maximum(self.normal, 0.0) / self.length
+        return p + with_core(p, self.withheld, self.left)
 
     def bound(self, law: FrictionLaw) -> Floats:
         """Largest shear forces (k,) in N/mm."""
@@ -198,15 +211,22 @@ class Slipping:
 
     def linearised(self, law: FrictionLaw) -> Linearised:
         """How they depend on contact force, speed and coefficient."""
-        p = self.pressure
+        normal = np.maximum(self.normal, 0.0)
         force = self.bound(law)
-        slope = self._derivative(law, "pressure")
-        offset = force - slope * p * self.length
+        slope = self._derivative(law, "pressure") * self._growth
+        offset = force - slope * normal
         over = offset < 0.0
-        slope = np.where(over, force / np.where(over, p * self.length, 1.0), slope)
+        slope = np.where(over, force / np.where(over, normal, 1.0), slope)
         by_speed = self._derivative(law, "speed") * self.length
         by_mu = self._derivative(law, "mu") * self.length
         return Linearised(slope, np.where(over, 0.0, offset), by_speed, by_mu)
+
+    @property
+    def _growth(self) -> Floats | float:
+        """Derivative of the pressure by what the contact force alone makes of it."""
+        full = FULL * np.asarray(self.left)
+        rising = np.maximum(self.normal, 0.0) / self.length < full
+        return 1.0 + np.where(rising, self.withheld / full, 0.0)
 
     def chord(self, law: FrictionLaw) -> Floats:
         """Growth of the largest shear forces from rest to their speeds, (k,) in N/mm per mm/s."""

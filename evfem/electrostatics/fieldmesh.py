@@ -20,8 +20,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.grading import graded, spread, spread_around
-from evfem.electrostatics.outlines import Outline, Run, corner_sizes, right_angle
+from evfem.electrostatics.outlines import (
+    Outline,
+    Run,
+    corner_sizes,
+    graded,
+    right_angle,
+    spread,
+    spread_around,
+)
 from evfem.errors import InputError
 
 #: how fast cells grow away from a corner, per length

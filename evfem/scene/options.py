@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import GONE, Checked, Within, check_fields, number, one_of, whole, yes_or_no
+from evfem.common.checks import GONE, Checked, Within, check_fields, number, one_of, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.elements import ELEMENTS, elements_on
@@ -14,6 +14,17 @@ DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 PRECISIONS = ("single", "double")
 _PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True), "N/mm3")
+#: cores of the attraction beside a length
+CORES = ("auto", "off")
+_CORE = '"auto", "off", or a length in mm, larger than 0, up to 1'
+
+
+def _core(key: str, value: object) -> float | str:
+    if isinstance(value, str) and value in CORES:
+        return value
+    return real(key, value, _CORE, Within(0.0, 1.0, above=True))
+
+
 _TOLERANCE = number("a relative residual from 1e-13 to 1e-3", Within(1e-13, 1e-3))
 
 
@@ -37,6 +48,11 @@ class Solver:
     strategy: Annotated[Strategy, {"allowed": "a table [solver.strategy]"}, "how hard steps are tried"] = (
         field(default_factory=Strategy)
     )
+    core: Annotated[
+        float | str,
+        {"allowed": _CORE, "check": _core},
+        "gap below which a line of the same work takes the place of a law too steep for the mesh",
+    ] = "auto"
     symmetry: InitVar[object] = None
 
     def __post_init__(self, symmetry: object) -> None:

@@ -20,6 +20,7 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
+from evfem.scene.core import core_of, too_long
 from evfem.scene.drift import drifting
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.parts import check_parts
@@ -141,13 +142,19 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    others = unresolved(scene, mesh), too_fast(scene), left_out(scene), *drifting(scene, mesh, moduli)
+    others = (
+        unresolved(scene, mesh),
+        too_fast(scene),
+        left_out(scene),
+        *drifting(scene, mesh, moduli),
+        *too_long(scene, mesh),
+    )
     locked = locking(element, scene.finger.materials, mesh.dim)
     terms = (
         _tissue(scene, mesh, moduli),
         _contact(scene),
         _friction(scene),
-        _electricity(scene),
+        _electricity(scene, mesh),
         *_field(scene, mesh),
         *_drive(scene),
         _time(scene),
@@ -225,7 +232,7 @@ def _friction(scene: Scene) -> Term:
     return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}")
 
 
-def _electricity(scene: Scene) -> Term:
+def _electricity(scene: Scene, mesh: Mesh) -> Term:
     if not scene.electrics.acts:
         return Term("electricity", False, "no law or no voltage")
     air = "with the air layer" if scene.air_layer else "only touching nodes"
@@ -234,7 +241,9 @@ def _electricity(scene: Scene) -> Term:
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
-    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}")
+    core = core_of(scene, mesh)
+    cored = "" if core is None else f"; {core}"
+    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{cored}")
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:

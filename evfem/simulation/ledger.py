@@ -53,9 +53,9 @@ class Ledger:
         position = model.equilibrium.positions(state.u)
         contact = model.equilibrium.contact_forces(state).sum(axis=0)
         attraction = state.attraction.sum(axis=0)
-        touching = state.status != OPEN
+        touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         real, extent = _extent(model, state, position, contact)
-        pressing = state.contact_force[:, 0]
+        pressing = state.contact_force[:, 0] + withheld
         return {
             "step": step,
             "motion_index": motion_index,
@@ -66,9 +66,9 @@ class Ledger:
             "voltage": state.voltage,
             "applied_force": float(0.0 - state.reaction[1]),  # 0.0 - x: no -0.0
             "applied_tangential_force": float(state.reaction[0]),
-            "normal_force": float(contact[1]),
+            "normal_force": float(contact[1] + withheld.sum()),
             "tangential_force": float(0.0 - contact[0]),
-            "electrostatic_force": float(0.0 - attraction[1]),
+            "electrostatic_force": float(withheld.sum() - attraction[1]),
             "electrostatic_force_x": float(attraction[0]),
             **extent,
             "min_gap": float(surface_state(model.surface, position).gap.min()),
@@ -121,7 +121,7 @@ def shares(model: Model, position: Floats) -> Floats:
 def frame_of(model: Model, state: State, row: Row) -> Frame:
     """Fields of a state, as they go to ParaView."""
     size, nodes = model.body.space.size, model.pad.nodes
-    position = model.equilibrium.positions(state.u)
+    position, withheld = model.equilibrium.positions(state.u), model.equilibrium.interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
 
     def on_pad(values: Any, off: float) -> Any:
@@ -137,9 +137,9 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         position=row["position"],
         displacement=state.u.copy(),
         gap=on_pad(surface.gap, np.nan),
-        contact_pressure=on_pad(state.contact_force[:, 0] / share, 0.0),
+        contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),
-        electrostatic_traction=on_pad(reduce(np.hypot, state.attraction.T) / share, 0.0),
+        electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / share, 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

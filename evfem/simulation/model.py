@@ -21,6 +21,7 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
+from evfem.scene.core import Core, core_of, electrics_of
 from evfem.scene.motion import Press
 from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
@@ -52,6 +53,7 @@ class Model:
     attraction: Attraction | None
     equilibrium: StepSolver
     first_gap: float
+    core: Core | None = None
 
     def bone(self, position: float, indentation: float, position_z: float = 0.0) -> Floats:
         """Translation of the bone (dim,) in mm."""
@@ -75,7 +77,8 @@ def make_model(scene: Scene) -> Model:
     space = make_space(mesh, element)
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
-    attraction = make_attraction(scene, mesh, pad, surface) if needed.has("electricity") else None
+    core = core_of(scene, mesh) if needed.has("tissue") else None
+    attraction = make_attraction(scene, mesh, pad, surface, core) if needed.has("electricity") else None
     solver, laws = scene.solver, scene.finger.materials
     terms = [
         make_term(space, term.form, term.on.name, isinstance(term.on, Boundary), laws.get(term.on.name))
@@ -90,13 +93,15 @@ def make_model(scene: Scene) -> Model:
         deepest = 0.0
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
-    if not isinstance(scene.friction_law, Coulomb):
+    if core is not None and attraction is not None:
+        interface.restored = attraction.restored
+    if core is not None or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
     equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
     if needed.has("tissue"):
         factorised = FactorisedBody(body, interface, attraction, limits)
         equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core)
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
@@ -126,15 +131,19 @@ def placed(surface: Any, outline_points: Floats) -> tuple[Any, float]:
     return surface, max(g0, 0.0)
 
 
-def make_attraction(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Attraction:
+def make_attraction(
+    scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any, core: Core | None = None
+) -> Attraction:
     """The attraction; the skin's layer is a given number or the local thickness of the mesh."""
-    electrics = scene.electrics.above(scene.finger.electrical, mesh, pad.nodes)
+    electrics = electrics_of(scene, mesh)
     if isinstance(scene.voltage, FollowForce):
         _check_quadratic(scene)
     law, layers = electrics.attraction
     rough, charging = roughness_of(scene.roughness_gap), None
     if scene.drive is not None and scene.drive.resolved:
         charging = Charging(electrics.sandwich, pad.nodes.size)
+    if core is not None:
+        law = core.law
     local = (law, layers, pad, surface, scene.direction, scene.air_layer, rough, charging)
     if scene.field == "local":
         return Attraction(*local)

@@ -365,9 +365,10 @@ class Run:
         }
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
-        return Result.from_rows(
-            self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
-        )
+        known = provenance(self.scene, self.model.mesh, solver)
+        if (core := self.model.core) is not None:
+            known["core"] = core.told
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, known)
 
     # -- checkpoints
 

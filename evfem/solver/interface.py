@@ -9,6 +9,7 @@ and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -24,7 +25,7 @@ from evfem.common.constants import (
     SMALLEST_FORCE,
 )
 from evfem.contact.condensed import Candidates, LinearContactStep
-from evfem.contact.friction import Slipping
+from evfem.contact.friction import Slipping, with_core
 from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
@@ -105,6 +106,14 @@ def steps_of_friction(surface: Any, short: float) -> Floats:
     return both[np.argsort(both[:, 0], kind="stable")]
 
 
+#: from a voltage (V) to `Attraction.restored`
+Restored = Callable[[float], tuple[Floats, Floats] | None]
+
+
+def nothing_restored(voltage: float) -> None:
+    """Of an attraction without a core."""
+
+
 class Interface:
     """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
 
@@ -127,6 +136,7 @@ class Interface:
         self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
         self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
         self.law: FrictionLaw | None = None
+        self.restored: Restored = nothing_restored
         self._returned = Returned(pad.nodes.size)
         self.duration = 0.0
         self.neighbourhood = NEIGHBOURS * self.length
@@ -226,7 +236,20 @@ class Interface:
         """These pad nodes (k,) as a law of friction sees them, with coefficients (k,) and slips (k,)."""
         speed = np.abs(slip) / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         length = self.shares(state)[nodes]
-        return Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        seen = Slipping(state.contact_force[nodes, 0], length, mu, speed, self.age(old)[nodes])
+        found = self.restored(state.voltage)
+        return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
+
+    def withheld(self, state: State) -> Floats:
+        """What a core of the attraction withholds of the pull on the closed pad nodes, and of what presses
+        them (P,) in N/mm.
+        """
+        found = self.restored(state.voltage)
+        if found is None:
+            return np.zeros(len(self.points))
+        share = self.shares(state)
+        pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
+        return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
     def lengths(self, x: Floats) -> Floats:
         """Tributary lengths of the pad nodes (P,) at x (P,), nowhere quite nothing, in mm."""

@@ -21,7 +21,7 @@ from evfem.contact.signorini import STICK
 from evfem.contact.skin import Skin
 from evfem.contact.spatial import SpatialCandidates, SpatialContactStep
 from evfem.protocols import FrictionLaw
-from evfem.solver.interface import Interface, Pins
+from evfem.solver.interface import Interface, Pins, nothing_restored
 from evfem.solver.state import State
 
 
@@ -38,6 +38,7 @@ class SkinInterface(Interface):
         self._facing = pad.facing(self.points)
         self.pins = Pins(np.zeros((0, 3)), pad.nodes.size)
         self.law: FrictionLaw | None = None
+        self.restored = nothing_restored
         self.duration = 0.0
         self.neighbourhood = 0.0
 

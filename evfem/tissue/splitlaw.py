@@ -38,6 +38,8 @@ from evfem.tissue.forms import Form
 
 #: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3
+#: stretch over which the stress of a law at rest is differenced
+STRETCH = 1e-4
 
 Stress = Callable[[Array, Array], tuple[Array, Array]]
 Turn = Callable[[float], tuple[Array, Array]]
@@ -187,6 +189,26 @@ def split(law: Any, dim: int = 2) -> SplitLaw:
         allowed = "a law of evfem, a form, or an object with a method P(F) or psi(F)"
         raise InputError("material", quoted(law), allowed)
     return cast(SplitLaw, UserLaw(law))
+
+
+def plane_modulus(law: SplitLaw, dim: int = 2) -> float:
+    """E / (1 - nu^2) in MPa at small strain, with which a half space answers a line load: 4 mu (1 - mu / M),
+    M being the stiffness against stretch without contraction.
+
+    >>> from evfem.tissue.laws import NeoHookean
+    >>> round(plane_modulus(NeoHookean(E=1.0, nu=0.3)), 7)
+    1.0989011
+    """
+    stress = []
+    for sign in (1.0, -1.0):
+        F, theta = identity(dim, 2).copy(), np.zeros((1, 1))
+        F[0, 0] += sign * STRETCH
+        stretched = law.volume_measure == "log"
+        theta += np.log1p(sign * STRETCH) if stretched else sign * STRETCH
+        S, q = law.split_stress(F, theta)
+        stress.append(float(np.mean(S[0, 0] + q / (F[0, 0] if stretched else 1.0))))
+    mu = law.shear_modulus
+    return 4.0 * mu * (1.0 - mu * 2.0 * STRETCH / (stress[0] - stress[1]))
 
 
 def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float | None = None) -> bool:
