@@ -35,10 +35,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from evfem.electrostatics.grading import graded
 
 import evfem as ev
 from evfem.electrostatics.columns import Columns
+from evfem.electrostatics.outlines import graded
 from evfem.electrostatics.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 

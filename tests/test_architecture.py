@@ -54,8 +54,8 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics fieldless options scene keys written format schema file resolution core drift "
-        "partchecks parts sense fieldchoice timescales spatial way plan",
+        "motion terms electrics fieldless options scene keys written format schema file resolution "
+        "core drift partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
