@@ -54,7 +54,7 @@ ROOMS = {
     ),
     "scene": (
         {"numpy", "tomli_w"},
-        "motion terms electrics fieldless options scene keys written format schema file resolution "
+        "motion terms electrics options scene keys written format schema file resolution "
         "core drift partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (

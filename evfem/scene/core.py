@@ -61,10 +61,10 @@ class Core:
     def __str__(self) -> str:
         return (
             f"at closing {self.ratio:.3g} times as steep as this mesh resolves: below "
-            f"{1e3 * self.length:.2g} um a line of the same work takes the law's place (work of adhesion {self.work:.2g} N/mm, exact "
-            f"beyond); an edge of contact is right to {EDGE * self.distance:.2g} mm, a load to 1 %, a "
-            'pull-off to 3 %; a finer mesh needs less, rough faces none; core = "off" gives the law itself '
-            "and answers that depend on the way"
+            f"{1e3 * self.length:.2g} um a line of the same work takes the law's place (work of adhesion "
+            f"{self.work:.2g} N/mm, exact beyond); an edge of contact is right to "
+            f"{EDGE * self.distance:.2g} mm, a load to 1 %, a pull-off to 3 %; a finer mesh needs less, "
+            'rough faces none; core = "off" gives the law itself and answers that depend on the way'
         )
 
 

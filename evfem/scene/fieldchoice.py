@@ -10,7 +10,7 @@ from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.contact.pad import make_pad
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.fieldless import without_field
+from evfem.scene.electrics import without_field
 from evfem.scene.motion import Hover
 from evfem.scene.scene import Scene
 

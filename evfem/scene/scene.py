@@ -32,8 +32,7 @@ from evfem.electrostatics.roughness import RoughnessGap
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
-from evfem.scene.electrics import Electrics, check_drive
-from evfem.scene.fieldless import without_field
+from evfem.scene.electrics import Electrics, check_drive, without_field
 from evfem.scene.motion import VOLTAGE, Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
