@@ -114,15 +114,25 @@ class Charging:
         """Charge of the electrode over eps_0 (V), as the insulator's displacement ends on it."""
         return float(np.sum(at.length * self.stack.fields(at.gap, at.voltage, at.charges)[2]))
 
-    def voltage_for(self, charge: float, gap: Floats, length: Floats) -> float:
-        """The voltage (V) at the end of the step with which the electrode has this charge over eps_0
-        (V): the charge is linear in it.
-        """
+    def capacity(self, at: Charged) -> float:
+        """By how much that charge grows with a volt at the end of the step: it is linear in it."""
         none, one = (
-            self.electrode_charge(Charged(self.after(gap, volts, length), volts, gap, length))
+            self.electrode_charge(Charged(self.after(at.gap, volts, at.length), volts, at.gap, at.length))
             for volts in (0.0, KILOVOLT)
         )
-        return KILOVOLT * (charge - none) / (one - none)
+        return (one - none) / KILOVOLT
+
+    def charge_slopes(self, at: Charged) -> tuple[Floats, Floats]:
+        """Derivatives of that charge by the gap and by the tributary length of every node (P,), of charges
+        that follow until the end of the step.
+        """
+        gap, seconds = at.gap + 1j * STEP, self.seconds
+        by_gap = self.stack.fields(gap, at.voltage, self.after(gap, at.voltage, at.length))[2].imag / STEP
+        # the charge that a node brings along does not grow with its length
+        before = self.old.voltage if seconds > 0.0 else at.voltage
+        fresh = self.stack.after(at.gap, self.none, before, at.voltage, seconds)
+        by_length = self.stack.fields(at.gap, at.voltage, fresh)[2]
+        return np.asarray(at.length * by_gap), np.broadcast_to(by_length, at.gap.shape)
 
     def energy_density(self, at: Charged) -> Floats:
         """Energy of the field in skin, gap and insulator of every node (P,), N mm per mm^2.

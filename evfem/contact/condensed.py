@@ -169,9 +169,20 @@ class CondensedTangent:
 
 
 @dataclass(frozen=True, eq=False)
+class Condition:
+    """A linear equation for an extra unknown: `row` (m,) times the displacements of candidates and bone, and
+    `share` (p,) times the unknowns of the step, this one last, shall be `wanted`.
+    """
+
+    row: Floats
+    share: Floats
+    wanted: float
+
+
+@dataclass(frozen=True, eq=False)
 class ExtraUnknown:
     """A number that a step has to find beside the displacements, and the force on the bone that
-    settles it.
+    settles it, or another `condition`.
 
     `push` (m,): condensed forces per unit of it; `axis`: the bone's component (0 x, 1 y, 2 z) whose
     force shall be `force` (N/mm).
@@ -180,6 +191,7 @@ class ExtraUnknown:
     push: Floats
     axis: int
     force: float
+    condition: Condition | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,21 +335,43 @@ class LinearContactStep:
         row, pivot, value = self._balance(rows, free)
         through = follower.transposed(row)
         row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
-        return ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, self._held(pivot, free), value)
+        return self._settling(local(axes, W[:, 1:]), local(axes, row.T).T, (pivot, value), free)
+
+    def _settling(
+        self, moved: Floats, row: Floats, equations: tuple[Floats, Floats], free: Floats
+    ) -> ExtraUnknowns:
+        """The unknowns with their equations, pivot and right-hand side."""
+        pivot, right = equations
+        own = np.flatnonzero([unknown.condition is not None for unknown in self.unknowns])
+        held = self._held(pivot, free)
+        held[own] = pivot[own]
+        return ExtraUnknowns(moved, row, held, right, own)
 
     def _balance(self, rows: Ints, free: Floats) -> tuple[Floats, Floats, Floats]:
-        """Forces on the bone along the unknowns' axes by forces on these rows of the candidates, by
-        the unknowns, and what is missing without both.
+        """What the unknowns' equations get by forces on these rows of the candidates, by the unknowns, and
+        what is missing without both.
         """
+        S, share, wanted, carried = self.equations
         dim = self.body.dim
-        axis = [unknown.axis - dim for unknown in self.unknowns]
-        S = self.body.schur[axis]
-        pushes = np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
-        wanted = np.array([unknown.force for unknown in self.unknowns])
-        row = self.body.bone_rows[[unknown.axis for unknown in self.unknowns]][:, rows]
-        pivot = S[:, :-dim] @ free[:, 1:] - pushes
-        value = self.residual[axis] + wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0]
-        return row, pivot, value
+        pivot = S[:, :-dim] @ free[:, 1:] + share
+        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0]
+        return carried[:, rows], pivot, value
+
+    @cached_property
+    def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Equations of the p unknowns: what displacements (p, m) and unknowns (p, p) add, their right-hand
+        sides (p,), and what forces on the candidates add (p, m - dim); the bone's balance along their axes,
+        or a condition.
+        """
+        axis = [unknown.axis - self.body.dim for unknown in self.unknowns]
+        S, carried = self.body.schur[axis], self.body.bone_rows[axis]
+        share = -np.stack([unknown.push[axis] for unknown in self.unknowns], axis=1)
+        wanted = self.residual[axis] + np.array([unknown.force for unknown in self.unknowns])
+        for i, unknown in enumerate(self.unknowns):
+            if (condition := unknown.condition) is not None:
+                S[i], share[i], wanted[i] = condition.row, condition.share, condition.wanted
+                carried[i] = condition.row[: -self.body.dim] @ self.body.compliance
+        return S, share, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
         """A body that nothing holds has a zero here, whose rounding may be negative: let it fall,

@@ -302,4 +302,7 @@ def _feedback(problem: DiscProblem, stiffness: Floats, status: Ints) -> float:
     """`feedback` where the nodes have these statuses (k,)."""
     free, stick = np.flatnonzero((status == OPEN) & (stiffness > 0.0)), 3 * np.flatnonzero(status == STICK)
     held = np.concatenate([3 * np.flatnonzero(status != OPEN), stick + 1, stick + 2])
-    return feedback(problem.compliance, problem.compliance, 3 * free, held, stiffness[free])
+    compliance = problem.compliance
+    if problem.extra_unknowns is not None:
+        compliance = compliance - problem.extra_unknowns.followed
+    return feedback(compliance, compliance, 3 * free, held, stiffness[free])

@@ -57,7 +57,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -81,13 +81,21 @@ class Unstable(ContactNotSolved):
 @dataclass(frozen=True)
 class ExtraUnknowns:
     """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations
-    that settle them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,).
+    that settle them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,). Those `conditioned` follow what
+    the body does even where its stability is asked for, as a voltage that keeps a charge.
     """
 
     columns: Floats
     rows: Floats
     pivot: Floats
     right: Floats
+    conditioned: Ints = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def followed(self) -> Floats:
+        """What the conditioned ones take from the compliance (2 k, 2 k)."""
+        some = self.conditioned
+        return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
 
 @dataclass(frozen=True)
@@ -223,7 +231,8 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
     stiffness, open_nodes = attraction.negative_stiffness, status == OPEN
     gaps = np.flatnonzero(open_nodes & (stiffness > 0.0))
     held = np.concatenate([np.flatnonzero(~open_nodes), problem.size + np.flatnonzero(status == STICK)])
-    return feedback(problem.compliance, problem.under_forces, gaps, held, stiffness[gaps])
+    taken: Any = 0.0 if problem.extra_unknowns is None else problem.extra_unknowns.followed
+    return feedback(problem.compliance - taken, problem.under_forces - taken, gaps, held, stiffness[gaps])
 
 
 def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:

@@ -21,7 +21,6 @@ from evfem.contact.attracted import AttractionStiffness
 from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.coulomb import SLIP, DiscProblem, DiscSolution
 from evfem.contact.disc import solve_attracted_disc
-from evfem.contact.signorini import ExtraUnknowns
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +127,7 @@ class SpatialContactStep(LinearContactStep):
             through = turning.transposed(row)
             row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
             moved, pushed = in_frames(axes, W[:, 1:]), in_frames(axes, row.T).T
-            extra = ExtraUnknowns(moved, pushed, self._held(pivot, free), value)
+            extra = self._settling(moved, pushed, (pivot, value), free)
         cohesion = None if known.cohesion is None else known.cohesion[near]
         problem = DiscProblem(start, compliance, known.friction[near], extra, cohesion=cohesion)
         attraction = AttractionStiffness(

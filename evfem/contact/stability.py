@@ -117,13 +117,14 @@ def _yielding(known: Candidates) -> Floats:
 def _bone(step: LinearContactStep) -> ExtraUnknowns:
     """What the bone's travel under a prescribed force does, and the balance that settles it."""
     rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
-    axis = np.array([unknown.axis for unknown in step.unknowns], dtype=np.int64)
-    none = np.zeros((len(step.body.schur), 0))
-    pushes = np.column_stack([none, *(unknown.push for unknown in step.unknowns)])
+    if not step.unknowns:
+        none = np.zeros((0, rows.size))
+        return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))
+    pushes = np.column_stack([unknown.push for unknown in step.unknowns])
     moved = step.body.compliance @ pushes[:-2]
-    pivot = step.body.schur[axis - 2, :-2] @ moved - pushes[axis - 2]
-    carried = local(axes, step.body.bone_rows[axis][:, rows].T).T
-    return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(axis.size))
+    S, share, wanted, carried = step.equations
+    pivot, carried = S[:, :-2] @ moved + share, local(axes, carried[:, rows].T).T
+    return ExtraUnknowns(local(axes, moved[rows]), carried, pivot, np.zeros(wanted.size))
 
 
 def _fastest(A: Floats, stiffness: Floats) -> tuple[float, Floats]:

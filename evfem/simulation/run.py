@@ -176,9 +176,9 @@ class Run:
         """
         voltage = self.scene.electrics.voltage
         if isinstance(voltage, ChargeControl):
-            return KeptCharge(0.0, NANO * voltage.charge_at(time) / eps_0)
+            return KeptCharge(NANO * voltage.charge_at(time) / eps_0)
         if isinstance(voltage, OpenCircuit) and begin >= voltage.after:
-            return KeptCharge(voltage.voltage)
+            return KeptCharge()
         return None
 
     # -- from motions to targets

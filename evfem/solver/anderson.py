@@ -70,7 +70,7 @@ class Anderson:
 
 
 def _vector(state: State) -> Floats:
-    squared = (state.voltage / KILOVOLT) ** 2
+    squared = np.copysign((state.voltage / KILOVOLT) ** 2, state.voltage)
     parts = (state.u, state.contact_force, state.bone, state.pressure)
     return np.concatenate([*(part.ravel() for part in parts), [squared]])
 
@@ -81,5 +81,6 @@ def _state(state: State, vector: Floats) -> State:
         begin, end = end, end + part.size
         parts.append(vector[begin:end].reshape(part.shape))
     u, force, bone, pressure = parts
-    voltage = KILOVOLT * float(np.sqrt(max(vector[-1], 0.0)))
+    squared = max(np.copysign(1.0, state.voltage) * vector[-1], 0.0)
+    voltage = float(np.copysign(KILOVOLT * np.sqrt(squared), state.voltage))
     return replace(state, u=u, contact_force=force, bone=bone, pressure=pressure, voltage=voltage)

@@ -12,11 +12,13 @@ control             known                        unknown                       e
 `Force`                                          travel of the bone            F_y = -force
 `Loose`             height of the bone           travel of the bone            F_y = 0, if touched
 `GivenVoltage`      voltage                                                    none
-`KeptCharge`        charge of the electrode      voltage                       found by the stepper
+`KeptCharge`        charge of the electrode      voltage                       Q = charge
+`GivenGap`          smallest gap of the pad      squared voltage               g = gap
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
-Attraction is proportional to the squared voltage, so that this unknown enters linearly. A control
+Without charges between the layers attraction is proportional to the squared voltage, so that this
+unknown enters linearly. A control
 of one's own (a spring behind the bone, a prescribed charge) is a class with the methods of
 `HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
 """
@@ -25,17 +27,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.condensed import CondensedTangent, ExtraUnknown, LinearContactStep, StepSolution
+from evfem.contact.condensed import (
+    CondensedTangent,
+    Condition,
+    ExtraUnknown,
+    LinearContactStep,
+    StepSolution,
+)
 from evfem.contact.signorini import STICK
 from evfem.solver.hand import Grip
 from evfem.solver.state import State
+from evfem.solver.voltage import Reading, Seen, electrode_charge, smallest_gap
 
+#: a voltage (V) that is none
+TINY = 1e-300
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
@@ -121,18 +132,23 @@ class Loose(Indentation):
 class VoltageProblem:
     """What a voltage control may ask for in one iteration: the present squared voltage (kV^2), a
     solved contact problem, and what one kV^2 more does: the state for the backward solve and the
-    condensed forces.
+    condensed forces. The same of any forces on the pad nodes (P, dim), `pushed`; of a number with a
+    gradient (P, dim) by their positions, `measured`, the condensed row and what the number gains while
+    the candidates stay, by the step's residual and by forces with such a state; and what is `seen`.
     """
 
     squared: float
     solve: Callable[[LinearContactStep], StepSolution]
     unit: Callable[[], tuple[Floats, Floats]]
+    pushed: Any = None
+    measured: Any = None
+    seen: Any = None
 
 
 @dataclass(frozen=True)
 class DrivenStep:
-    """A solved contact step, the change of the squared voltage (kV^2) in it, and the state for the
-    backward solve per kV^2 where it has changed.
+    """A solved contact step, the change of the unknown of the voltage in it (kV^2 or kV), and the state
+    for the backward solve per unit of it where it has changed.
     """
 
     solution: StepSolution
@@ -140,79 +156,144 @@ class DrivenStep:
     unit: Floats | float = 0.0
 
 
-class VoltageControl(Protocol):
-    """What the voltage is: prescribed, or settled by an equation between bounds."""
+class VoltageControl:
+    """What the voltage is: prescribed, or settled by an equation between bounds. As it stands here nothing
+    but `voltage` (V) settles it.
+    """
 
-    @property
-    def follows(self) -> bool:
-        """Whether an equation may settle the voltage."""
-
-    @property
-    def voltage(self) -> float:
-        """The prescribed voltage (V), or the largest allowed one."""
-
-    @property
-    def free(self) -> bool:
-        """Whether the voltage is an unknown of the present iteration."""
+    #: whether friction may settle the voltage; and whether it is an unknown of the present iteration
+    follows: Any = False
+    free: Any = False
+    #: the prescribed voltage (V), or the largest allowed one
+    voltage: float = 0.0
 
     def begin(self, old: State) -> None:
         """A step from `old` begins."""
 
     def guess(self, voltage: float) -> float:
         """Voltage at which the iterations of a step begin that comes from `voltage`."""
+        return voltage
 
     def missing(self, reaction: Floats) -> float:
-        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions
-        (2,).
+        """Force on the bone along x (N/mm) that the control's equation lacks at these reactions (2,)."""
+        return 0.0
+
+    def lacking(self, seen: Seen) -> float:
+        """Share that an equation lacks which is none of forces."""
+        return 0.0
+
+    def held(self, seen: Seen) -> float:
+        """The voltage (V) if the pad stays where it is."""
+        return self.voltage
+
+    def after(self, voltage: float, change: float) -> float:
+        """The voltage (V) after a change of its unknown in the unit of `DrivenStep`: its square, at least 0,
+        while its sign stays.
         """
+        squared = (voltage / KILOVOLT) ** 2 + change
+        return float(np.copysign(KILOVOLT * np.sqrt(max(squared, 0.0)), voltage))
 
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         """Contact, together with the voltage where it is an unknown."""
-
-    def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
-
-    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
-        """Another control where the step with this one failed (None) or has no sensible answer."""
-
-
-@dataclass(frozen=True)
-class GivenVoltage:
-    """The voltage is `voltage` (V)."""
-
-    voltage: float
-    free = follows = False
-
-    def begin(self, old: State) -> None:
-        pass
-
-    def guess(self, voltage: float) -> float:
-        return self.voltage
-
-    def missing(self, reaction: Floats) -> float:
-        return 0.0
-
-    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         return DrivenStep(drive.solve(step))
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
+        """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
         return True
 
-    def fallback(self, old: State, found: State | None) -> None:
+    def fallback(self, old: State, found: State | None) -> VoltageControl | None:
+        """Another control where the step with this one failed (None) or has no sensible answer."""
         return None
 
 
 @dataclass(frozen=True)
-class KeptCharge(GivenVoltage):
-    """The electrode has the `charge` over eps_0 (V), or None keeps the one that it had; `voltage` (V)
-    is that of its source, long ago. The stepper finds the voltage (`evfem.solver.stepping`).
+class GivenVoltage(VoltageControl):
+    """The voltage is `voltage` (V)."""
+
+    voltage: float
+
+    def guess(self, voltage: float) -> float:
+        return self.voltage
+
+
+class Met(VoltageControl):
+    """The voltage makes a number of the state what is wished: one more unknown, with the equation that the
+    number, linear in voltage and displacements, is that. The step is regular where a given voltage has no
+    equilibrium: under a given charge a plate's attraction does not change with its gap, and at a given gap
+    nothing of it does.
+    """
+
+    free = True
+
+    def read(self, seen: Seen) -> tuple[Reading, float]:
+        """The number as it is, and the wish."""
+        raise NotImplementedError
+
+    def unit(self, seen: Seen) -> Floats:
+        """Forces (P, dim) on the pad nodes per unit of the voltage's unknown."""
+        raise NotImplementedError
+
+    def unknown(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, Floats]:
+        """The unknown, and what its unit does to the backward solve."""
+        reading, wish = self.read(drive.seen)
+        saved, push = drive.pushed(self.unit(drive.seen))
+        row, still, own = drive.measured(reading.by_position, saved)
+        travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
+        share = np.array([*travels, reading.by_voltage + own])
+        return ExtraUnknown(push, 0, 0.0, Condition(row, share, wish - reading.value - still)), saved
+
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
+        unknown, saved = self.unknown(step, drive)
+        found = drive.solve(replace(step, unknowns=(*step.unknowns, unknown)))
+        return DrivenStep(found, float(found.extra[-1]), saved)
+
+
+@dataclass(frozen=True)
+class KeptCharge(Met):
+    """The electrode has the `charge` over eps_0 (V, in space V mm), or None keeps the one that it had. The
+    unknown is the voltage in kV, for the charge is linear in it.
     """
 
     charge: float | None = None
 
+    def read(self, seen: Seen) -> tuple[Reading, float]:
+        charging = seen.attraction.charging
+        kept = charging.electrode_charge(charging.old) if self.charge is None else self.charge
+        return electrode_charge(seen), kept
+
+    def unit(self, seen: Seen) -> Floats:
+        return seen.slope
+
+    def lacking(self, seen: Seen) -> float:
+        wanted = self.held(seen)
+        return abs(wanted - seen.voltage) / max(abs(wanted), abs(seen.voltage), TINY)
+
+    def held(self, seen: Seen) -> float:
+        reading, kept = self.read(seen)
+        return self.after(seen.voltage, (kept - reading.value) / reading.by_voltage)
+
+    def after(self, voltage: float, change: float) -> float:
+        return voltage + KILOVOLT * change
+
+
+@dataclass(frozen=True)
+class GivenGap(Met):
+    """The smallest gap of the deformed pad is `gap` (mm). The unknown is the squared voltage (kV^2)."""
+
+    gap: float
+
+    def read(self, seen: Seen) -> tuple[Reading, float]:
+        return smallest_gap(seen), self.gap
+
+    def unit(self, seen: Seen) -> Floats:
+        return seen.forces(KILOVOLT)
+
+    def lacking(self, seen: Seen) -> float:
+        return abs(smallest_gap(seen).value / self.gap - 1.0)
+
 
 @dataclass
-class FollowFriction:
+class FollowFriction(VoltageControl):
     """The voltage, from 0 to `voltage` (V), makes the bone's force along x `force` (N/mm).
 
     Friction hardly depends on the voltage of a pad that sticks: there the wish has no sensible
@@ -231,9 +312,6 @@ class FollowFriction:
 
     def begin(self, old: State) -> None:
         self._mode = AT_ZERO if old.voltage == 0.0 else UNKNOWN
-
-    def guess(self, voltage: float) -> float:
-        return voltage
 
     def missing(self, reaction: Floats) -> float:
         return float(self.force - reaction[0]) if self.free else 0.0

@@ -45,26 +45,27 @@ from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolutio
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, Verge, verge
 from evfem.solver.anderson import Anderson
-from evfem.solver.control import DrivenStep, Target, VoltageProblem
+from evfem.solver.control import Target, VoltageProblem
 from evfem.solver.findings import findings
 from evfem.solver.interface import Interface
 from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
 from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
 from evfem.solver.travel import Travel
+from evfem.solver.voltage import Seen
 from evfem.tissue.body import Body
 
 
 @dataclass(frozen=True, eq=False)
 class Update:
     """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2)
-    in mm, the squared voltage in kV^2; and the fraction of it that may be taken.
+    in mm, the unknown of the voltage; and the fraction of it that may be taken.
     """
 
     contact: StepSolution
     bone: Floats
     u: Floats
-    squared: float
+    driven: float
     fraction: float
 
 
@@ -161,7 +162,7 @@ class FactorisedBody:
         if target.hand is not None:
             missing.append(target.hand.unbalanced(float(state.bone[0]), reaction))
         free = max(np.abs(forces[:-dim]).max(), sums, *np.abs(missing))
-        return float(free / largest)
+        return max(float(free / largest), target.drive.lacking(self._seen(state)))
 
     def _rounding(self, state: State) -> float:
         """Forces (N/mm) below which the balance is rounding: of displacements that contain the
@@ -242,7 +243,7 @@ class FactorisedBody:
         factor = self.linearisation.factor
         saved, residual = factor.forward(-balance.seen(self.linearisation.made_at(state)))
         step = self._contact_step(old, state, target, residual)
-        driven = self._driven(step, state, target)
+        driven = target.drive.solve(step, self._problem(saved, state))
         found, bone = self.travel.limited(step, driven.solution, state, target)
         if driven.change:
             saved = saved + driven.change * driven.unit
@@ -284,22 +285,28 @@ class FactorisedBody:
         self._scaled_down = found.reduced
         return found
 
-    def _driven(self, step: LinearContactStep, state: State, target: Target) -> DrivenStep:
-        """Contact as the voltage control wants it, with the attraction of one kV^2 at its
-        disposal.
+    def _seen(self, state: State) -> Seen:
+        return Seen.of(self.attraction, self.interface, state, self.linearisation.touching)
+
+    def _problem(self, saved: Floats, state: State) -> VoltageProblem:
+        """What a voltage control has at its disposal; `saved` is the residual's state for the backward
+        solve.
         """
+        factor, seen, nodes = self.linearisation.factor, self._seen(state), self.pad.nodes
 
-        def unit() -> tuple[Floats, Floats]:
-            assert self.attraction is not None
+        def pushed(forces: Floats) -> tuple[Floats, Floats]:
             nodal = np.zeros_like(state.u)
-            touching = self.linearisation.touching
-            position = self.interface.resting(state)
-            pressing = state.contact_force[:, 0]
-            nodal[self.pad.nodes] = self.attraction.forces(position, KILOVOLT, touching, pressing)
-            return self.linearisation.factor.forward(self.body.reduce(nodal))
+            nodal[nodes] = forces
+            return factor.forward(self.body.reduce(nodal))
 
-        squared = (state.voltage / KILOVOLT) ** 2
-        return target.drive.solve(step, VoltageProblem(squared, self._solve, unit))
+        def measured(gradient: Floats, unit: Floats) -> tuple[Floats, float, float]:
+            row = pushed(gradient)[1]
+            moved = [self.body.expand(factor.backward(each, np.zeros(row.size))) for each in (saved, unit)]
+            still, own = (float(np.sum(gradient * each[nodes])) for each in moved)
+            return row, still, own
+
+        squared, unit = (state.voltage / KILOVOLT) ** 2, lambda: pushed(seen.forces(KILOVOLT))
+        return VoltageProblem(squared, self._solve, unit, pushed, measured, seen)
 
     def _moved(self, state: State, target: Target, update: Update) -> State:
         """The iterate after the fraction of an update that may be taken."""
@@ -308,9 +315,8 @@ class FactorisedBody:
         force[c], status[c] = update.contact.force, update.contact.status
         whole = fraction == 1.0 and not target.height.free and target.hand is None
         voltage = state.voltage
-        if update.squared:
-            squared = (voltage / KILOVOLT) ** 2 + fraction * update.squared
-            voltage = KILOVOLT * float(np.sqrt(max(squared, 0.0)))
+        if update.driven:
+            voltage = target.drive.after(voltage, fraction * update.driven)
         return replace(
             state,
             u=state.u + fraction * update.u,

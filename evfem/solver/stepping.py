@@ -31,15 +31,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.contact.attraction import Attraction
-from evfem.contact.charging import Charging
-from evfem.solver.control import GivenVoltage, KeptCharge, Target
+from evfem.solver.control import Target
 from evfem.solver.equilibrium import StepSolver
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
-from evfem.solver.voltage import VoltageSearch
 from evfem.tissue.body import Body
 
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
@@ -283,33 +280,9 @@ class Stepper:
         pressing = state.contact_force[:, 0]
         old = attraction.charged(interface.resting(state), state.voltage, pressing, state.charges)
         attraction.charging.begin(old, target.duration)
-        if isinstance(target.drive, KeptCharge):
-            return self._disconnected(state, target, attraction, attraction.charging)
         new = self._coupled(state, target, start)
         end = attraction.charged(interface.resting(new), new.voltage, new.contact_force[:, 0])
         return replace(new, charges=end.charges)
-
-    def _disconnected(
-        self, state: State, target: Target, attraction: Attraction, charging: Charging
-    ) -> State:
-        """Equilibria under voltages that bring the electrode's charge to what is prescribed or was,
-        until the voltage no longer changes.
-        """
-        equilibrium, search = self.equilibrium, VoltageSearch(state.voltage, self.equilibrium.tolerance)
-        assert isinstance(target.drive, KeptCharge)
-        charge = target.drive.charge
-        if charge is None:
-            charge = charging.electrode_charge(charging.old)
-        for _ in range(STAGGERED_LIMIT):
-            voltage = search.voltage
-            new = self._coupled(state, replace(target, drive=GivenVoltage(voltage)))
-            place, pressing = equilibrium.interface.resting(new), new.contact_force[:, 0]
-            end = attraction.charged(place, voltage, pressing)
-            if search.settles(charging.voltage_for(charge, end.gap, end.length)):
-                return replace(new, charges=end.charges)
-            if search.jumps:
-                break
-        raise StepFailed("the voltage of a given charge does not settle", equilibrium.record.residuals)
 
     def _coupled(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium: all at once, or mechanics under attraction found beforehand."""
@@ -318,8 +291,9 @@ class Stepper:
         if at_once or equilibrium.attraction is None:
             return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
-            frozen = equilibrium.attraction_at(state, state, target.drive.voltage)
-            return equilibrium.step(state, target, frozen)
+            held = equilibrium.as_held(state, state, target)
+            new = equilibrium.step(state, held, equilibrium.attraction_at(state, state, held.drive.voltage))
+            return replace(new, voltage=equilibrium.as_held(state, new, target).drive.voltage)
         try:
             if not self.together:
                 return self._settled(state, target)
@@ -339,10 +313,11 @@ class Stepper:
         equilibrium, new = self.equilibrium, state
         changes: list[float] = []
         while len(changes) < STAGGERED_LIMIT and not stuck(changes):
-            frozen = equilibrium.attraction_at(state, new, target.drive.voltage)
+            held = equilibrium.as_held(state, new, target)
+            frozen = equilibrium.attraction_at(state, new, held.drive.voltage)
             changes.append(float(np.abs(frozen - new.attraction).max()))
             done, allowed = len(changes) > 1, max(np.abs(new.reaction).max(), SMALLEST_FORCE)
             if done and changes[-1] <= equilibrium.tolerance * allowed:
-                return new
-            new = equilibrium.step(state, target, frozen, start=new if done else None)
+                return replace(new, voltage=held.drive.voltage)
+            new = equilibrium.step(state, held, frozen, start=new if done else None)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

@@ -1,73 +1,84 @@
-"""The voltage that a given charge of the electrode takes.
-
-Under a voltage u the pad settles, and then the charge would take the voltage w(u), which falls while
-u rises, as the pad comes closer. Sought is w(u) = u::
-
-    u <- w(u) while that settles fast
-    else by the secant of what the last two lacked, w - u
-    else, if that leaves the interval between the highest voltage that was too low and the lowest
-        that was too high, its middle
-
-A pad that snaps at a voltage between these two has no equilibrium in between: the search ends where
-they are close and what they lack is not.
+"""What the voltage may be asked to bring about (`evfem.solver.control.Met`), and how that changes with
+voltage and pad.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-#: a change of the voltage that is rounding (relative), and a voltage that is none (V)
-ROUNDING, TINY = 1e-14, 1e-300
-#: a change that is more than this share of the one before is slow
-SLOWLY = 0.1
-#: voltages closer than this share of themselves between which what a charge takes jumps by more
-JUMP = 1e-3
+from evfem.common.arrays import Floats
+from evfem.common.constants import KILOVOLT
+from evfem.contact.pad import SurfaceState, surface_state
+from evfem.solver.interface import Interface
+from evfem.solver.state import State
 
 
-@dataclass
-class VoltageSearch:
-    """The search from a first `voltage` (V) on, to the relative `tolerance` of the equilibria.
-
-    >>> search = VoltageSearch(0.0, 1e-8)
-    >>> while not search.settles(100.0 - 3.0 * search.voltage):
-    ...     pass
-    >>> round(search.voltage, 6)
-    25.0
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the attraction sees of a state: positions (P, dim), voltage (V), contact forces along the normal
+    (P,), and who touched when the step began (P,).
     """
 
+    attraction: Any
+    position: Floats
     voltage: float
-    tolerance: float
-    change: float = np.inf
-    last: tuple[float, float] | None = None
-    low: float = -np.inf
-    high: float = np.inf
+    pressing: Floats
+    touching: Any
 
-    def settles(self, found: float) -> bool:
-        """Whether the charge takes the voltage, `found` (V), that there was; if not, sets the next one.
-        As far as the equilibria are exact, to rounding where nothing deforms.
-        """
-        voltage, lacking, before = self.voltage, found - self.voltage, self.change
-        self.change = abs(lacking) / max(abs(found), TINY)
-        if self.change <= ROUNDING or (self.change <= self.tolerance and self.change > SLOWLY * before):
-            return True
-        if lacking > 0.0:
-            self.low = max(self.low, voltage)
-        else:
-            self.high = min(self.high, voltage)
-        following = found
-        if self.last is not None and self.change > SLOWLY * before and lacking != self.last[1]:
-            following = voltage - lacking * (voltage - self.last[0]) / (lacking - self.last[1])
-        if not self.low < following < self.high:
-            following = 0.5 * (self.low + self.high) if np.isfinite(self.high - self.low) else found
-        self.last, self.voltage = (voltage, lacking), following
-        return False
+    @classmethod
+    def of(cls, attraction: Any, interface: Interface, state: State, touching: Any) -> Seen:
+        """Of `state`, in a step that began with these nodes `touching` (P,)."""
+        position, pressing = interface.resting(state), state.contact_force[:, 0]
+        return cls(attraction, position, state.voltage, pressing, touching)
+
+    def forces(self, voltage: float) -> Floats:
+        """Attraction (P, dim) of the pad nodes under a voltage (V)."""
+        return self.attraction.forces(self.position, voltage, self.touching, self.pressing)
 
     @property
-    def jumps(self) -> bool:
-        """Whether equilibria at nearly the same voltage ask for different ones."""
-        if not np.isfinite(self.high - self.low):
-            return False
-        near = self.high - self.low <= JUMP * max(abs(self.low), abs(self.high))
-        return bool(near and self.change > JUMP)
+    def slope(self) -> Floats:
+        """By how much the attraction (P, dim) grows with a kV: it is quadratic in the voltage."""
+        more, less = (self.forces(self.voltage + change) for change in (KILOVOLT, -KILOVOLT))
+        return 0.5 * (more - less)
+
+    @property
+    def surface(self) -> SurfaceState:
+        """The surface below the pad nodes."""
+        return surface_state(self.attraction.surface, self.position)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A number that a state has, with its derivatives by a kV and by the positions (P, dim)."""
+
+    value: float
+    by_voltage: float
+    by_position: Floats
+
+
+def electrode_charge(seen: Seen) -> Reading:
+    """Charge of the electrode over eps_0 (V, in space V mm): its derivative by the gap of a touching node is
+    left out.
+    """
+    charging, surface = seen.attraction.charging, seen.surface
+    assert charging is not None
+    at = seen.attraction.charged(seen.position, seen.voltage, seen.pressing)
+    by_gap, by_length = charging.charge_slopes(at)
+    by_gap = np.where(surface.gap > 0.0, by_gap, 0.0)
+    by_position = np.zeros_like(seen.position)
+    by_position[:, 0], by_position[:, 1] = -by_gap * surface.slope, by_gap
+    of, moved, value = seen.attraction.pad.tributary_gradient(seen.position)
+    by_position += np.bincount(moved, by_length[of] * value, by_position.size).reshape(by_position.shape)
+    return Reading(charging.electrode_charge(at), KILOVOLT * charging.capacity(at), by_position)
+
+
+def smallest_gap(seen: Seen) -> Reading:
+    """The smallest vertical gap of the pad (mm)."""
+    surface = seen.surface
+    least = int(np.argmin(surface.gap))
+    by_position = np.zeros_like(seen.position)
+    by_position[least, :2] = -surface.slope[least], 1.0
+    return Reading(float(surface.gap[least]), 0.0, by_position)
