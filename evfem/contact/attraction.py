@@ -156,11 +156,6 @@ class Attraction:
         found = np.broadcast_arrays(*self.law.withheld(voltage, self.layers), np.zeros(self.pad.nodes.size))
         return found[0], found[1]
 
-    def begin(self, voltage: float | None) -> None:
-        """A part begins: where the voltage is its unknown, the core is that of the `voltage` (V) before."""
-        if isinstance(self.law, Cored):
-            self.law.hold(voltage)
-
     def tangent_factor(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Any:

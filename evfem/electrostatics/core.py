@@ -56,14 +56,7 @@ class Cored:
     def __init__(self, law: ForceLaw, closed: Values, steepest: Values, length: float | None = None) -> None:
         self.law, self.closed = law, np.asarray(closed, dtype=float)
         self.steepest, self.length = np.asarray(steepest, dtype=float), length
-        #: the voltage (V) whose core counts for all, while the voltage is an unknown
-        self.held: float | None = None
         self._known: tuple[Any, ...] = (None, None, None)
-
-    def hold(self, voltage: float | None) -> None:
-        """The core of this voltage (V) counts for all, or again each voltage's own."""
-        if voltage != self.held:
-            self.held, self._known = voltage, (None, None, None)
 
     def line(self, voltage: Values, layers: Any) -> Line:
         """The core at a voltage (V)."""
@@ -72,7 +65,7 @@ class Cored:
         return self._known[2]
 
     def _line(self, voltage: Values, layers: Any) -> Line:
-        long = self._length(voltage if self.held is None else self.held, layers)
+        long = self._length(voltage, layers)
         end = self.closed + long
         ends = np.asarray(self.law.traction(end, voltage, layers))
         rest = self._work(end, voltage, layers) - long * ends
@@ -107,10 +100,13 @@ class Cored:
         potential: Any = getattr(self.law, "potential", None)
         if potential is not None:
             return np.asarray(potential(end, voltage, layers) - potential(self.closed, voltage, layers))
-        root = 0.5 * (1.0 + _AT)[:, None]  # gaps go with the cube: the law is steepest at closed faces
-        way = np.atleast_1d(end - self.closed)
-        p = np.asarray(self.law.traction(self.closed + way * root**3, voltage, layers))
-        return np.asarray(np.sum(0.5 * _SHARE[:, None] * 3.0 * root**2 * p, axis=0) * way).reshape(end.shape)
+        # gaps go with the cube: the law is steepest at closed faces
+        root, way = 0.5 * (1.0 + _AT), np.asarray(end - self.closed)
+        at = (
+            0.5 * share * 3.0 * r**2 * self.law.traction(self.closed + way * r**3, voltage, layers)
+            for r, share in zip(root, _SHARE, strict=True)
+        )
+        return np.asarray(sum(at) * way)
 
     def adhesion(self, voltage: float, layers: Any) -> Floats:
         """Work of adhesion (N/mm), from closed faces to beyond all reach."""

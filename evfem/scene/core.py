@@ -14,9 +14,7 @@ What is left are the errors of a cohesive zone that a few nodes resolve: the edg
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -24,6 +22,7 @@ from evfem.common.arrays import Floats
 from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import roughness_of
+from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import Electrics
 from evfem.scene.motion import Hover
@@ -33,18 +32,21 @@ from evfem.tissue.splitlaw import plane_modulus, split
 
 #: slope times node distance over the plane modulus that a mesh resolves
 RESOLVED = 1 / 6
-#: the lowest nodes, of which a plan speaks: above the lowest one by at most this share of the finger's height
-LOWEST = 1e-6
+#: nodes where the finger touches first, of which a plan speaks, and those that decide whether there is a
+#: core: above the lowest one by at most these shares of the finger's height
+FIRST, LOW = 1e-6, 0.05
 #: error of an edge of contact in node distances
 EDGE = 1.5
-#: a core longer than this share of a hovering gap, or of a texture's depth, changes what is seen of them
-TOO_LONG = 0.5
+#: a core is no longer than this share of a hovering gap, for pull-in is to see the law; nor should it be of
+#: a texture's depth
+SEEN = 0.5
 
 
 @dataclass(frozen=True)
 class Core:
     """The law with its core. Where the finger touches first: the slope of the law over that which the mesh
-    resolves, the core's `length` and the `distance` of nodes in mm; and the `work` of adhesion in N/mm.
+    resolves, the core's `length` and the `distance` of nodes in mm; the `work` of adhesion in N/mm; and
+    whether it `fits` below the gap of a finger that hovers.
     """
 
     law: Cored
@@ -52,6 +54,7 @@ class Core:
     length: float
     distance: float
     work: float
+    fits: bool
 
     @property
     def told(self) -> dict[str, float]:
@@ -59,10 +62,15 @@ class Core:
         return {"length": self.length, "slope": self.ratio * RESOLVED, "edge": EDGE * self.distance}
 
     def __str__(self) -> str:
+        steep = f"at closing {self.ratio:.3g} times as steep as this mesh resolves"
+        if not self.fits:
+            return (
+                f"{steep}, and a line of the same work would reach {self.length:.2g} mm, beyond half of the "
+                "hovering gap: the law itself, whose contact depends on mesh and way after landing"
+            )
         return (
-            f"at closing {self.ratio:.3g} times as steep as this mesh resolves: below "
-            f"{1e3 * self.length:.2g} um a line of the same work takes the law's place (work of adhesion "
-            f"{self.work:.2g} N/mm, exact beyond); an edge of contact is right to "
+            f"{steep}: below {1e3 * self.length:.2g} um a line of the same work takes the law's place (work "
+            f"of adhesion {self.work:.2g} N/mm, exact beyond); an edge of contact is right to "
             f"{EDGE * self.distance:.2g} mm, a load to 1 %, a pull-off to 3 %; a finer mesh needs less, "
             'rough faces none; core = "off" gives the law itself and answers that depend on the way'
         )
@@ -76,31 +84,33 @@ def electrics_of(scene: Scene, mesh: Mesh) -> Electrics:
 
 def core_of(scene: Scene, mesh: Mesh) -> Core | None:
     """The core of a scene's attraction, or None where it needs none or can have none: where only touching
-    nodes carry force the work is none, and charges that flow and the full field have laws of their own.
+    nodes carry force the work is none, charges that flow and the full field have laws of their own, and a
+    voltage that is found asks for forces that go with its square.
     """
     wanted, voltage = scene.solver.core, scene.electrics.largest_voltage
     charged = scene.drive is not None and scene.drive.resolved
-    has_none = charged or not scene.air_layer or scene.field != "local"
-    if wanted == "off" or not scene.electrics.acts or has_none:
+    has_none = charged or not scene.air_layer or isinstance(scene.voltage, FollowForce)
+    if wanted == "off" or not scene.electrics.acts or has_none or _full(scene, mesh):
         return None
     electrics, rough = electrics_of(scene, mesh), roughness_of(scene.roughness_gap)
     law, layers = electrics.attraction
     closed = 0.0 if rough is None else float(rough.separation(0.0))
-    stiffness, distance, first = _local(scene, mesh)
+    stiffness, distance, height = _local(scene, mesh)
+    first = height <= height.min() + FIRST * np.ptp(mesh.points[:, 1])
+    low = (height <= height.min() + LOW * np.ptp(mesh.points[:, 1])) & (stiffness > 0.0)
     slope = -np.broadcast_to(traction_derivative(law, closed, voltage, layers), stiffness.shape)
-    if isinstance(wanted, str) and not (slope > RESOLVED * stiffness)[stiffness > 0.0].any():
+    if isinstance(wanted, str) and not (slope > RESOLVED * stiffness)[low].any():
         return None
     cored = Cored(law, closed, RESOLVED * stiffness, None if isinstance(wanted, str) else wanted)
     length = np.max((cored.line(voltage, layers).end - closed)[first])
     ratio = np.max(slope[first] / (RESOLVED * stiffness[first]))
     work = np.max(cored.adhesion(voltage, layers))
-    return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work))
+    fits = not isinstance(wanted, str) or float(length) <= SEEN * _gap(scene)
+    return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work), fits)
 
 
-def _local(scene: Scene, mesh: Mesh) -> tuple[Floats, Floats, Any]:
-    """E*/h (MPa/mm) and h (mm) at each node of the pad (P,), of the softest and largest cell there; and
-    which nodes are lowest.
-    """
+def _local(scene: Scene, mesh: Mesh) -> tuple[Floats, Floats, Floats]:
+    """Of each node of the pad (P,) the least E*/h (MPa/mm), the largest h (mm) and its height (mm)."""
     sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
     on_pad = np.isin(sides, np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad")))
     cell, side = np.nonzero(on_pad.all(axis=2))
@@ -111,27 +121,36 @@ def _local(scene: Scene, mesh: Mesh) -> tuple[Floats, Floats, Any]:
     for name, law in scene.finger.materials.items():
         modulus[mesh.region_names[name]] = max(plane_modulus(split(law, mesh.dim), mesh.dim), 0.0)
     stiffness, distance = np.full(nodes.size, np.inf), np.zeros(nodes.size)
-    of = place.reshape(len(cell), -1).T
-    for nodes_of in of:
-        np.minimum.at(stiffness, nodes_of, modulus[mesh.region[cell]] / longest)
-        np.maximum.at(distance, nodes_of, longest)
-    height = mesh.points[nodes, 1]
-    return stiffness, distance, height <= height.min() + LOWEST * np.ptp(mesh.points[:, 1])
+    for each in place.reshape(len(cell), -1).T:
+        np.minimum.at(stiffness, each, modulus[mesh.region[cell]] / longest)
+        np.maximum.at(distance, each, longest)
+    return stiffness, distance, mesh.points[nodes, 1]
 
 
-def too_long(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """A sentence for a core that is long beside a hovering gap or the depth of a texture."""
-    core = core_of(scene, mesh)
-    if core is None:
-        return
+def _full(scene: Scene, mesh: Mesh) -> bool:
+    """Whether the attraction is that of the full field."""
+    if scene.field == "local":
+        return False
+    from evfem.scene.fieldchoice import chosen_field
+
+    return chosen_field(scene, mesh).full
+
+
+def _gap(scene: Scene) -> float:
+    """The smallest gap (mm) at which a finger hovers; inf if none does."""
     gaps = [motion.gap for motion in scene.motion if isinstance(motion, Hover) and motion.gap > 0.0]
-    surface: Any = scene.ground
-    lengths = {"hovering gap": min(gaps, default=np.inf)}
-    if not surface.is_flat:
-        lengths["depth of the texture"] = float(np.ptp(surface.height(way(scene, mesh, core.distance))))
-    for name, length in lengths.items():
-        if core.length > TOO_LONG * length > 0.0:
-            yield (
-                f"the attraction is changed below {core.length:.2g} mm, more than half of the {name} of "
-                f"{length:.2g} mm: the mesh is too coarse for this voltage there"
-            )
+    return min(gaps, default=np.inf)
+
+
+def unseen(scene: Scene, mesh: Mesh) -> str | None:
+    """A sentence for a core that is long beside the depth of a texture, else None."""
+    core, surface = core_of(scene, mesh), scene.ground
+    if core is None or not core.fits or surface.is_flat:
+        return None
+    depth = float(np.ptp(surface.height(way(scene, mesh, core.distance))))
+    if core.length <= SEEN * depth or depth == 0.0:
+        return None
+    return (
+        f"the attraction is changed below {core.length:.2g} mm, more than half of the texture's depth of "
+        f"{depth:.2g} mm: the mesh is too coarse for this voltage there"
+    )

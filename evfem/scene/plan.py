@@ -20,7 +20,7 @@ from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
-from evfem.scene.core import core_of, too_long
+from evfem.scene.core import core_of, unseen
 from evfem.scene.drift import drifting
 from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.parts import check_parts
@@ -142,13 +142,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    others = (
-        unresolved(scene, mesh),
-        too_fast(scene),
-        left_out(scene),
-        *drifting(scene, mesh, moduli),
-        *too_long(scene, mesh),
-    )
+    others = unresolved(scene, mesh), too_fast(scene), left_out(scene), unseen(scene, mesh)
     locked = locking(element, scene.finger.materials, mesh.dim)
     terms = (
         _tissue(scene, mesh, moduli),
@@ -171,7 +165,12 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, mesh, terms),
-        warnings=(*doubts(scene, mesh, moduli), *locked, *(text for text in others if text is not None)),
+        warnings=(
+            *doubts(scene, mesh, moduli),
+            *locked,
+            *(text for text in others if text),
+            *drifting(scene, mesh, moduli),
+        ),
     )
 
 

@@ -78,6 +78,7 @@ def make_model(scene: Scene) -> Model:
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
     core = core_of(scene, mesh) if needed.has("tissue") else None
+    core = core if core is not None and core.fits else None
     attraction = make_attraction(scene, mesh, pad, surface, core) if needed.has("electricity") else None
     solver, laws = scene.solver, scene.finger.materials
     terms = [

@@ -190,8 +190,6 @@ class Equilibrium(Statics):
         target = target.begun(old)
         self.interface.begin(old, target.duration)
         target.drive.begin(old)
-        if self.attraction is not None:
-            self.attraction.begin(old.voltage if target.drive.follows else None)
         state = self.body.begin(old, target, frozen is not None, start)
         residuals: list[float] = []
         self.record.residuals, changed = residuals, 0

@@ -20,6 +20,7 @@ from evfem.electrostatics.roughness import (
 from evfem.errors import InputError
 from evfem.scene.file import dump, loads
 from evfem.scene.motion import Press, Slide
+from evfem.scene.options import Solver
 from evfem.scene.plan import plan
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.run import simulate
@@ -115,7 +116,7 @@ def touchscreen(rough, coupling="monolithic"):
     surface, output = Display(TOUCHSCREEN), Output(every=4)
     return Scene(
         benchmark_finger(), surface, StrongTroxel(), 100.0, MOTION,
-        coupling=coupling, output=output, roughness_gap=rough,
+        coupling=coupling, output=output, roughness_gap=rough, solver=Solver(core="off"),
     )  # fmt: skip
 
 

@@ -106,6 +106,7 @@ NEVER = {
     "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
     "finger.ridge_scan": "a measured outline, which no generator can draw",
+    "solver.core": "off gives answers that depend on the way, a length changes what is asked for",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
 }
 

@@ -1,0 +1,126 @@
+"""Strong attraction on meshes that do not resolve it: one state by every way, and that of JKR."""
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.mesh.mesh import Mesh
+
+#: a block 50 x 25 mm whose underside is x^2 / 100, of E = 0.1 MPa and nu = 0.3
+E_STAR, RADIUS = 0.1 / 0.91, 50.0
+SCALE = np.pi * E_STAR / (4.0 * RADIUS)
+#: work of adhesion (N/mm) with which the half width without a load is 1 mm
+WORK = np.pi * E_STAR / (32.0 * RADIUS**2)
+GAP = 5e-5
+VOLTAGE = float(np.sqrt(2.0 * GAP * WORK / ev.eps_0))
+SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
+
+
+def graded(begin, end, first):
+    """Places that grow by 15 % a cell from `first` on."""
+    places = [0.0]
+    while places[-1] < end - begin:
+        places.append(places[-1] + first)
+        first *= 1.15
+    return begin + np.array(places) * (end - begin) / places[-1]
+
+
+def block(distance):
+    """The block, its nodes `distance` (mm) apart within 2.4 mm of its middle."""
+    even = 2.0 * distance * np.arange(round(1.2 / distance) + 1)
+    right = np.concatenate([even, graded(even[-1], 25.0, 2.0 * distance)[1:]])
+    x = np.concatenate([-right[:0:-1], right])
+    x, y = np.meshgrid(x, graded(0.0, 25.0, 2.0 * distance))
+    rows, columns = x.shape
+    low = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    cells = np.stack([low, low + 1, low + columns + 1, low + columns], axis=1)
+    sets = {"pad": np.arange(columns), "bone": np.arange(columns) + columns * (rows - 1)}
+    points = np.column_stack([x.ravel(), (y + x**2 / (2.0 * RADIUS) * (1.0 - y / 25.0)).ravel()])
+    return Mesh(points, cells, "quad", np.zeros(len(cells), dtype=int), {"block": 0}, sets)
+
+
+def simulated(motion, voltage, **solver):
+    law = {"block": ev.LinearElastic(E=0.1, nu=0.3)}
+    finger = ev.MeshedFinger(block(0.1), law, electrical=SKIN)
+    display = ev.Display(ev.Layer(GAP - 1e-7, 1.0), friction=0.0)  # and the skin
+    return ev.simulate(
+        ev.Scene(finger, display, ev.StrongTroxel(), voltage, motion, solver=ev.Solver(**solver))
+    )
+
+
+WAYS = {
+    "voltage first": ([ev.Press(indentation=0.02, steps=3)], VOLTAGE),
+    "voltage last": ([ev.Press(indentation=0.02, steps=2), ev.VoltageRamp(VOLTAGE, steps=3)], 0.0),
+    "over-pressed": ([ev.Press(indentation=0.03, steps=3), ev.Press(indentation=0.02, steps=3)], VOLTAGE),
+}
+
+
+def test_every_way_leads_to_the_state_of_johnson_kendall_and_roberts():
+    """P = C (a^2 - sqrt(a A^3)) at half width a, with A = 1 mm; the law itself ends between -5 and .44 C."""
+    found = [simulated(*way) for way in WAYS.values()]
+    loads = np.array([one.applied_force[-1] for one in found])
+    widths = np.array([one.contact_width[-1] for one in found])
+    np.testing.assert_allclose(loads, loads[0], rtol=1e-7)
+    np.testing.assert_allclose(widths, widths[0], rtol=1e-7)
+    said = found[0].provenance["core"]
+    assert said["length"] == pytest.approx(np.sqrt(2.0 * WORK * 0.1 * 6.0 / E_STAR) - GAP, rel=1e-3)
+    wide = np.linspace(1.0, 2.0, 1001)
+    of_theory = np.interp(loads[0] / SCALE, wide**2 - np.sqrt(wide), wide)
+    assert 0.5 * widths[0] == pytest.approx(of_theory, abs=0.5 * said["edge"])
+
+
+def test_a_block_is_pulled_off_at_the_load_of_the_theory():
+    """3 (1/16)^(2/3) C: 0.472470 C."""
+    motion = [ev.Press(indentation=0.0, steps=1), ev.Press(indentation=-0.03, steps=30)]
+    pulled = simulated(motion, VOLTAGE)
+    assert pulled.contact_width[-1] == 0.0
+    assert -pulled.applied_force.min() / SCALE == pytest.approx(0.472470, rel=0.03)
+
+
+def pressed(friction=0.0, core="auto", law=None, voltage=100.0, **options):
+    finger = ev.FingerPad(ridges=False, resolution="coarse")
+    display = ev.Display(ev.TOUCHSCREEN, friction=friction)
+    motion = options.pop("motion", [ev.Press(force=0.05, steps=3)])
+    solver = ev.Solver(core=core)
+    scene = ev.Scene(finger, display, law or ev.StrongTroxel(), voltage, motion, solver=solver, **options)
+    return ev.simulate(scene)
+
+
+def test_friction_and_reported_forces_have_the_true_pressure_of_closed_nodes():
+    """In full slip friction is mu times the normal force, and that the load and the attraction."""
+    motion = [ev.Press(force=0.05, steps=3), ev.Slide(1.0, steps=4, hold="force")]
+    slid = pressed(0.03, motion=motion)
+    normal, friction = slid.normal_force[-1], slid.tangential_force[-1]
+    assert friction == pytest.approx(0.03 * normal, rel=1e-7)
+    assert normal == pytest.approx(0.05 + slid.electrostatic_force[-1], rel=1e-7)
+    closed = ev.StrongTroxel().traction(0.0, 100.0, ev.Layers.of(ev.Layer(0.38, 1650.0), ev.TOUCHSCREEN))
+    assert slid.electrostatic_force[-1] == pytest.approx(closed * slid.real_contact_width[-1], rel=0.1)
+    frame = slid.frames[-1]
+    inside = frame.contact_pressure > 0.5 * frame.contact_pressure.max()
+    np.testing.assert_allclose(frame.electrostatic_traction[inside], closed, rtol=1e-6)
+
+
+def test_what_the_mesh_resolves_and_what_is_switched_off_is_the_law_itself():
+    weak = [pressed(law=ev.Kaczmarek(), voltage=50.0, core=core) for core in ("auto", "off")]
+    assert weak[0].applied_force.tolist() == weak[1].applied_force.tolist()
+    assert "core" not in weak[0].provenance
+    assert "core" not in pressed(core="off").provenance
+    assert pressed(core=0.004).provenance["core"]["length"] == pytest.approx(0.004)
+    for given in ("on", 0.0, 2.0):
+        with pytest.raises(ev.InputError, match="core"):
+            ev.Solver(core=given)
+
+
+def test_a_core_that_would_reach_a_hovering_gap_is_refused_by_the_plan():
+    near, far = (
+        ev.Scene(
+            ev.FingerPad(ridges=False, resolution="coarse"),
+            ev.Display(ev.TOUCHSCREEN),
+            ev.StrongTroxel(),
+            100.0,
+            [ev.Hover(gap=gap), ev.Press(indentation=0.1)],
+        )
+        for gap in (0.01, 0.1)
+    )
+    assert "the law itself" in str(ev.plan(near))
+    assert "of adhesion" in " ".join(str(ev.plan(far)).split())
