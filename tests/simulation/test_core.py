@@ -88,7 +88,7 @@ def pressed(friction=0.0, core="auto", law=None, voltage=100.0, **options):
 
 def test_friction_and_reported_forces_have_the_true_pressure_of_closed_nodes():
     """In full slip friction is mu times the normal force, and that the load and the attraction."""
-    motion = [ev.Press(force=0.05, steps=3), ev.Slide(1.0, steps=4, hold="force")]
+    motion = [ev.Press(force=0.05, steps=3), ev.Slide(3.0, steps=6, hold="force")]
     slid = pressed(0.03, motion=motion)
     normal, friction = slid.normal_force[-1], slid.tangential_force[-1]
     assert friction == pytest.approx(0.03 * normal, rel=1e-7)
