@@ -33,6 +33,7 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
+from evfem.simulation.doubtful import doubtful
 from evfem.simulation.failure import advice
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
@@ -365,9 +366,9 @@ class Run:
         }
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
-        return Result.from_rows(
-            self.rows, self.frames, self.model.mesh, provenance(self.scene, self.model.mesh, solver)
-        )
+        about = provenance(self.scene, self.model.mesh, solver)
+        about["warnings"] = doubtful(self.scene, self.rows)
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, about)
 
     # -- checkpoints
 

@@ -8,8 +8,9 @@ from tools.domes import DISPLAY, Dome, dome, dome_scene
 import evfem as ev
 from evfem.common.constants import SMALLEST_J
 from evfem.contact.coulomb import SLIP
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import SPATIAL, WIDTHS
-from evfem.simulation.result import Checkpoint, load
+from evfem.simulation.result import load
 from evfem.simulation.run import simulate
 
 PRESS = ev.Press(indentation=0.3, steps=2)
