@@ -21,11 +21,10 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
-from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import doubts, hover_share, locking
+from evfem.scene.sense import doubts, locking
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
@@ -37,8 +36,6 @@ from evfem.tissue.laws import split
 from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
-#: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
-RIGID_BELOW = 1e-4
 #: columns of a printed plan, at most
 WIDTH = 79
 
@@ -175,39 +172,8 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
     deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
-    share = rigid_share(scene, mesh)
-    if share is not None and share < RIGID_BELOW:
-        return Term(
-            "tissue", False, f"hovering: deforming would change the attraction by less than {share:.1e}"
-        )
-    return Term(
-        "tissue",
-        True,
-        f"{laws}, {'plane strain' if mesh.dim == 2 else 'three dimensions'}{deep}, {stiffness}"
-        + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
-    )
-
-
-def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
-    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None
-    where it must deform.
-    """
-    hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
-    if (
-        not hovers
-        or not all(isinstance(motion, (Hover, VoltageRamp, Wait)) for motion in scene.motion)
-        or scene.forms
-    ):
-        return None
-    gap = min(motion.gap for motion in hovers)
-    if (
-        gap == 0.0
-        or not isinstance(scene.motion[0], Hover)
-        or scene.law is None
-        or scene.finger.electrical is None
-    ):
-        return None
-    return hover_share(scene, mesh, gap)
+    where = "plane strain" if mesh.dim == 2 else "three dimensions"
+    return Term("tissue", True, f"{laws}, {where}{deep}, {stiffness}")
 
 
 def _contact(scene: Scene) -> Term:
@@ -311,8 +277,6 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
 
 def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...]:
     needed: dict[str, Any] = {term.name: term.needed for term in terms}
-    if not needed["tissue"]:
-        return ("the attraction is summed over the rigid outline",)
     backend = (
         "PARDISO (symmetric, Schur complement)"
         if find_spec("pypardiso")

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
@@ -36,8 +35,6 @@ BREAKDOWN = 300.0
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
-#: change of the attraction by the deformation below which a hovering pad does not come down
-STAYS_UP = 0.1
 #: lengths (mm) that a motion may have, and distance of the places at which a profile's height is looked at
 TRAVEL, WAY_STEP = ("indentation", "distance", "gap"), 0.02
 
@@ -136,30 +133,13 @@ def _target(press: Press) -> float:
 
 
 def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
-    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch does not come down."""
-    if gap < 0.0:
+    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch surely does not come down:
+    nothing attracts or loads it.
+    """
+    if gap < 0.0 or scene.electrics.acts or scene.forms:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
         gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
-        if gap <= 0.0:
-            return False
-    if not scene.electrics.acts:
-        return True
-    return gap > 0.0 and hover_share(scene, mesh, gap) < STAYS_UP
-
-
-def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
-    """Upper estimate of the relative change of the attraction by the deformation of a hovering
-    pad.
-
-    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln
-    p)/dg, of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the
-    smallest gap.
-    """
-    assert scene.law is not None
-    layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
-    traction = float(np.max(scene.law.traction(gap, scene.electrics.largest_voltage, layers)))
-    softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
-    depth = float(np.ptp(mesh.points[:, 1]))
-    return traction * depth / softest * 2.0 / gap
+        return gap > 0.0
+    return True

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.scene.motion import Press
+from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 
@@ -22,11 +22,20 @@ BORNE = 1.0
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
     """A sentence for everything that the rows of a scene's run say of their own worth."""
-    return [*_crushed(scene, rows), *_dissipated(scene, rows)] if rows else []
+    return [*_missed(scene, rows), *_crushed(scene, rows), *_dissipated(scene, rows)] if rows else []
 
 
 def _column(rows: Sequence[Row], name: str) -> Floats:
     return np.array([row[name] for row in rows], dtype=float)
+
+
+def _missed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """Slides that touch nothing, unless on the way to where the finger is pressed."""
+    for i, motion in enumerate(scene.motion):
+        forces = [row["normal_force"] for row in rows if row["motion_index"] == i]
+        later = any(isinstance(one, Press) for one in scene.motion[i:])
+        if isinstance(motion, Slide) and forces and not any(forces) and not later:
+            yield f"motion {i}, a slide, never touched"
 
 
 def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:

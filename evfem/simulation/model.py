@@ -26,7 +26,7 @@ from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
-from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.spatial import SkinInterface
@@ -50,7 +50,7 @@ class Model:
     pad: Pad | Skin
     surface: Any
     attraction: Attraction | None
-    equilibrium: StepSolver
+    equilibrium: Equilibrium
     first_gap: float
 
     def bone(self, position: float, indentation: float, position_z: float = 0.0) -> Floats:
@@ -70,8 +70,7 @@ def make_model(scene: Scene) -> Model:
     needed = plan_on(scene, mesh, element)
     for warning in needed.warnings:
         notices.warn(warning)
-    if needed.has("tissue"):
-        check_memory(mesh)
+    check_memory(mesh)
     space = make_space(mesh, element)
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
@@ -92,10 +91,8 @@ def make_model(scene: Scene) -> Model:
     interface = make_interface(scene, mesh, pad, surface)
     if not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
-    equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
-    if needed.has("tissue"):
-        factorised = FactorisedBody(body, interface, attraction, limits)
-        equilibrium = Equilibrium(factorised, interface, attraction, limits)
+    factorised = FactorisedBody(body, interface, attraction, limits)
+    equilibrium = Equilibrium(factorised, interface, attraction, limits)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap)
 
 

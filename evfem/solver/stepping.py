@@ -34,7 +34,7 @@ from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
 from evfem.solver.control import GivenVoltage, KeptCharge, Target
-from evfem.solver.equilibrium import StepSolver
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -104,7 +104,7 @@ class Stepper:
     is at most `allowed`, and `path_error` the largest accepted.
     """
 
-    equilibrium: StepSolver
+    equilibrium: Equilibrium
     coupling: str = "monolithic"
     substep: float = 1.0
     cuts: int = 0
