@@ -95,6 +95,17 @@ _SHAPES: dict[str, tuple[str, ...]] = {
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", "stresses"), "J": ("E",)}
 
 
+def _component(name: str) -> Any:
+    """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
+
+    def found(result: Result) -> Floats:
+        if name in result.in_space:
+            return result.in_space[name]
+        return result[name.removesuffix("_x")] if name.endswith("_x") else np.zeros_like(result.position)
+
+    return property(found, doc=f"{SPATIAL[name][1]}; in the plane all is along x")
+
+
 @dataclass(frozen=True, eq=False)
 class Result(History):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the
@@ -106,7 +117,9 @@ class Result(History):
     the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
-    (`SPATIAL`): `position_z`, `tangential_force_z` and the contact areas.
+    (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
+    `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
+    angle (+x before the first), positive where a finger slides by a positive distance.
     """
 
     frames: list[Frame]
@@ -139,15 +152,11 @@ class Result(History):
         """A column by its name."""
         return self.in_space[name] if name in self.in_space else super().__getitem__(name)
 
-    @property
-    def position_z(self) -> Floats:
-        """z of the bone (mm); that of a finger in the plane stays 0."""
-        return self.in_space.get("position_z", np.zeros_like(self.position))
-
-    @property
-    def tangential_force_z(self) -> Floats:
-        """Sum of the contact forces against +z; none on a finger in the plane."""
-        return self.in_space.get("tangential_force_z", np.zeros_like(self.position))
+    position_z = _component("position_z")
+    tangential_force_x = _component("tangential_force_x")
+    tangential_force_z = _component("tangential_force_z")
+    applied_tangential_force_x = _component("applied_tangential_force_x")
+    applied_tangential_force_z = _component("applied_tangential_force_z")
 
     @property
     def units(self) -> Mapping[str, str]:
