@@ -24,7 +24,7 @@ from evfem.scene.drift import drifting
 from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import doubts, locking
+from evfem.scene.sense import doubts, locking, touching_traction
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
@@ -200,7 +200,9 @@ def _electricity(scene: Scene) -> Term:
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
-    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}")
+    traction = touching_traction(scene)
+    pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches"
+    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}")
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
@@ -31,6 +32,8 @@ TIMES_TABLE_2, SOFTEST, HARD = 1e4, 1e3, 2e4
 LOCKED = 1e5
 #: field (V/um) that breaks any solid down
 BREAKDOWN = 300.0
+#: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
+PRESSED = 0.02
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
@@ -44,7 +47,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     shear moduli (MPa) of the materials.
     """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())))
-    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_hovering(scene, mesh))
+    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_unbearable(scene), *_hovering(scene, mesh))
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
@@ -111,6 +114,34 @@ def _breakdown(scene: Scene) -> Iterator[str]:
                 f"{voltage:g} V make a field of {field:.3g} V/um in the {name}, and any solid breaks down "
                 f"above {BREAKDOWN:g} V/um: voltages are in V, thicknesses in mm"
             )
+
+
+def touching_traction(scene: Scene) -> float | None:
+    """Attraction (MPa) of touching skin at the largest voltage by the law's closed form, as far as that is
+    known: not under a charge, or a friction force that sets the voltage. Rough faces are as far apart as
+    under `PRESSED`.
+    """
+    if not scene.electrics.acts or isinstance(scene.voltage, (FollowForce, ChargeControl)):
+        return None
+    law, layers = scene.electrics.attraction
+    rough = roughness_of(scene.roughness_gap)
+    gap = 0.0 if rough is None else float(rough.separation(PRESSED))
+    return float(np.max(law.traction(gap, scene.electrics.largest_voltage, layers)))
+
+
+def _unbearable(scene: Scene) -> Iterator[str]:
+    """An attraction of touching skin beyond what any load presses it with, where a fingertip is pressed;
+    of a mesh, which may be anything, the run's own forces tell.
+    """
+    pressed = any(isinstance(motion, Press) and _target(motion) > 0.0 for motion in scene.motion)
+    if isinstance(scene.finger, MeshedFinger) or not pressed:
+        return
+    traction = touching_traction(scene)
+    if traction is not None and traction > PRESSED:
+        yield (
+            f"at {scene.electrics.largest_voltage:g} V touching skin is attracted with {traction:.3g} MPa, "
+            f"and a load presses a fingertip with up to {PRESSED:g} MPa: the attraction exceeds the load"
+        )
 
 
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
