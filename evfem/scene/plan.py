@@ -24,7 +24,7 @@ from evfem.scene.drift import drifting
 from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import doubts, locking, touching_traction
+from evfem.scene.sense import doubts, locking, touching_traction, weakens
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
@@ -188,7 +188,10 @@ def _friction(scene: Scene) -> Term:
     if isinstance(law, Coulomb):
         return Term("friction", True, "Coulomb")
     timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
-    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}")
+    falling = ""
+    if scene.solver.dynamics != "inertial" and weakens(scene):
+        falling = "; it falls with the speed: tissue without mass may jump, dynamics = inertial follows it"
+    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}{falling}")
 
 
 def _electricity(scene: Scene) -> Term:

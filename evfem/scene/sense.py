@@ -144,6 +144,19 @@ def _unbearable(scene: Scene) -> Iterator[str]:
         )
 
 
+def weakens(scene: Scene) -> bool:
+    """Whether friction falls with the speed somewhere up to ten times the fastest motion's: a node that is
+    let go is faster than the bone.
+    """
+    law, fastest = scene.friction_law, max(getattr(one, "speed", None) or 0.0 for one in scene.motion)
+    if not (scene.has_friction and getattr(law, "timed", False)):
+        return False
+    speed = fastest * np.concatenate([[0.0], np.logspace(-4.0, 1.0, 101)])
+    pressure, friction, age = (np.full(speed.size, value) for value in (PRESSED, 0.5, 1.0))
+    bound = np.asarray(law.bound(pressure, friction, speed, age))
+    return bool((np.diff(bound) < -1e-9 * np.abs(bound).max()).any())
+
+
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Slides after the last press that do not touch: before it, the bone may be on its way."""
     presses = [i for i, m in enumerate(scene.motion) if isinstance(m, Press) and _target(m) > 0.0]

@@ -328,9 +328,9 @@ class Run:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
             said = advice(self.scene, self.model, error)
-            raise NotConverged(request.step, error.residuals, said, self.result()) from error
+            raise NotConverged(request.step, error.residuals, said, self.result()) from None
         except Unresolved as error:
-            raise NotConverged(request.step, [], str(error), self.result()) from error
+            raise NotConverged(request.step, [], str(error), self.result()) from None
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps
