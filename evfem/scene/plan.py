@@ -22,7 +22,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
 from evfem.scene.parts import check_parts
-from evfem.scene.resolution import too_fast, unresolved
+from evfem.scene.resolution import oscillating, too_fast, unresolved
 from evfem.scene.scene import Scene
 from evfem.scene.sense import doubts, locking, touching_traction, weakens
 from evfem.scene.spatial import check_space, memory
@@ -138,7 +138,13 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
     moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    others = unresolved(scene, mesh), too_fast(scene), left_out(scene), *drifting(scene, mesh, moduli)
+    others = (
+        unresolved(scene, mesh),
+        too_fast(scene),
+        left_out(scene),
+        *oscillating(scene, mesh),
+        *drifting(scene, mesh, moduli),
+    )
     locked = locking(element, scene.finger.materials, mesh.dim)
     terms = (
         _tissue(scene, mesh, moduli),

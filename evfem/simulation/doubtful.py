@@ -1,6 +1,4 @@
-"""What the rows of a run say that may make its numbers mean something else, a sentence each:
-`Result.warnings`.
-"""
+"""What a run shows that may make its numbers mean something else, a sentence each: `Result.warnings`."""
 
 from __future__ import annotations
 
@@ -8,16 +6,46 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from evfem.common.arrays import Floats
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.pad import surface_state
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
+from evfem.simulation.model import Model
 
 #: share of the energy of motions that take time that their finite steps may dissipate
 DISSIPATED = 0.05
 #: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
 #: centimetre (algometers), and the crests of its ridges carry twice the mean
 BORNE = 1.0
+
+
+#: penetration that is told, relative to the size of the finger
+SUNK = 1e-6
+
+
+def outside(model: Model) -> Ints:
+    """Nodes of the finger's boundary that no contact holds: all but those of `pad` that may touch."""
+    mesh, pad = model.mesh, model.pad
+    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    return np.setdiff1d(facets, pad.nodes[pad.free])
+
+
+def deepest(model: Model, nodes: Ints, u: Floats) -> Floats:
+    """How deep (mm) these nodes are inside the surface at most, and the number of the one that is: (2,)."""
+    gap = surface_state(model.surface, (model.mesh.points + u)[nodes]).gap
+    return np.array([-gap.min(), nodes[gap.argmin()]], dtype=float) if gap.size else np.zeros(2)
+
+
+def through(model: Model, sunk: Floats) -> Iterator[str]:
+    """A boundary outside `pad` that went through the surface; `sunk` is the `deepest` of a run."""
+    points = model.mesh.points
+    if sunk[0] > SUNK * float(np.ptp(points, axis=0).max()):
+        place = ", ".join(f"{x + 0.0:.4g}" for x in points[int(sunk[1])])
+        yield (
+            f"the boundary outside `pad` passed through the surface, by {sunk[0]:.3g} mm at ({place}) of the "
+            "undeformed mesh: nothing holds it there, and contact forces are too small; extend `pad`"
+        )
 
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:

@@ -229,3 +229,30 @@ def test_an_attraction_beyond_the_load_is_told_by_plan_run_and_sweep(tmp_path, c
         points = ev.sweep(ev.Sweep(tables, grid), workers=1).rows
     assert [(row["status"], told in row["message"]) for row in points] == [("done", True), ("done", False)]
     assert points[1]["message"] == ""
+
+
+# -- steps longer than what swings -----------------------------------------------------------------------
+
+
+def test_steps_longer_than_the_period_of_hand_or_tissue_are_told():
+    """The hand's 2 pi sqrt(m / k), of a tissue 2 mm thick 4 h sqrt(rho / G); beyond critical damping neither
+    swings, and where no mass moves the tissue does not.
+    """
+    stiffness, mass, modulus = 0.01, 1e-6, 0.1 / 2.8
+    periods = {"hand": 2.0 * np.pi * np.sqrt(mass / stiffness), "tissue": 4.0 * 2.0 * np.sqrt(1e-9 / modulus)}
+
+    def told(step, damping=0.0, viscosity=0.0, dynamics="inertial"):
+        law = ev.NeoHookean(E=0.1, nu=0.4, viscosity=viscosity)
+        hand = ev.Hand(stiffness, damping, mass)
+        motion = [PRESS, ev.Slide(1.0, steps=2, speed=0.5 / step)]
+        asked = scene(law, *motion, hand=hand, solver=ev.Solver(dynamics=dynamics))
+        return [one for one in plan(asked).warnings if "by itself swings" in one]
+
+    assert told(0.99 * periods["tissue"]) == []
+    (said,) = told(1.01 * periods["tissue"])
+    assert f"the tissue by itself swings with a period of {periods['tissue']:.3g} s" in said
+    both = told(1.01 * periods["hand"])
+    assert f"the hand by itself swings with a period of {periods['hand']:.3g} s" in both[0]
+    assert len(both) == 2
+    assert told(1.0, damping=2.01 * np.sqrt(stiffness * mass), viscosity=1e-3) == []
+    assert len(told(1.0, viscosity=1e-9, dynamics="viscous")) == 1
