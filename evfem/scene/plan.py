@@ -129,7 +129,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     """The plan of a scene whose mesh is already there; raises InputError for parts that no run
     could use.
     """
-    check_parts(scene)
+    check_parts(scene, mesh.dim)
     check_space(scene, mesh)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
@@ -137,7 +137,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
                 "finger.mesh", f"no nodes on `{name}`", "point data or physical groups `pad` and `bone`"
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
-    moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
+    moduli = {name: split(law, mesh.dim).shear_modulus for name, law in scene.finger.materials.items()}
     others = (
         unresolved(scene, mesh),
         too_fast(scene),
@@ -302,7 +302,8 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
     ]
     if mesh.dim == 3:
         lines.append(f"direct solver: {memory(mesh)}")
-    stiff = [name for name, law in scene.finger.materials.items() if nearly_incompressible(split(law))]
+    laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
+    stiff = [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]
     if stiff:
         lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

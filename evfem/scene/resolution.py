@@ -133,9 +133,9 @@ def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
         yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)
     if scene.solver.dynamics != "inertial":
         return
-    law = min(scene.finger.materials.values(), key=lambda one: split(one).shear_modulus)
+    law = min(scene.finger.materials.values(), key=lambda one: split(one, mesh.dim).shear_modulus)
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
-    speed = math.sqrt(split(law).shear_modulus / getattr(law, "density", 1e-9))
+    speed = math.sqrt(split(law, mesh.dim).shear_modulus / getattr(law, "density", 1e-9))
     period, own = 4.0 * abs(bone - pad) / speed, getattr(law, "viscosity", None)
     viscosity = scene.finger.viscosity if own is None else own
     if period > math.pi * viscosity:  # Kelvin and Voigt's tissue has the damping ratio omega tau / 2

@@ -56,7 +56,7 @@ def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[st
     """
     if ELEMENTS[element][2] != "point":
         return
-    locked = [name for name, law in materials.items() if nearly_incompressible(split(law), dim, LOCKED)]
+    locked = [name for name, law in materials.items() if nearly_incompressible(split(law, dim), dim, LOCKED)]
     if locked:
         cells = "p2 triangles lock" if element == "p2" else f"{element} cells lock"
         other = "quadrilaterals with q2p1" if element == "p2" else "q2p1 or q1_fbar"

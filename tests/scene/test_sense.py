@@ -153,8 +153,8 @@ def test_a_slide_over_hills_touches_if_they_are_higher_than_the_gap():
 
 def sentences(shipped):
     mesh, _ = scene_mesh(shipped)
-    check_parts(shipped)
-    moduli = {name: split(law).shear_modulus for name, law in shipped.finger.materials.items()}
+    check_parts(shipped, mesh.dim)
+    moduli = {name: split(law, mesh.dim).shear_modulus for name, law in shipped.finger.materials.items()}
     return doubts(shipped, mesh, moduli)
 
 

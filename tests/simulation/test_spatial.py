@@ -207,3 +207,37 @@ def test_a_hovering_fingertip_is_pulled_as_another_code_says():
     result = simulate(ev.Scene(finger, DISPLAY, law=ev.Kaczmarek(), voltage=2000.0, motion=hover))
     assert_allclose(1e3 * result.electrostatic_force, [1.672, 2.858], rtol=2e-3)
     assert_allclose(result.applied_force, -result.electrostatic_force, rtol=1e-6)
+
+
+@ev.form
+def neo_hookean(u, v, w):
+    """With mu = 0.02 and lambda = 0.1 MPa, for three dimensions alone."""
+    F = ev.grad(u) + np.eye(3)[:, :, None, None]
+    return 0.02 * ev.ddot(F, ev.grad(v)) + (0.1 * u.theta - 0.02) * v.theta
+
+
+class InSpace:
+    """The same law, of one's own in the split form, for three dimensions alone."""
+
+    volume_measure, shear_modulus, viscosity, density = "log", 0.02, None, 1e-9
+    _law = ev.NeoHookean(E=0.02 * (0.3 + 0.04) / 0.12, nu=0.1 / 0.24)
+
+    def __getattr__(self, name):
+        if name not in ("split_energy", "split_stress", "split_tangent", "split_sigma_zz"):
+            raise AttributeError(name)
+
+        def of(F, theta):
+            assert len(F) == 3
+            return getattr(self._law, name)(F, theta)
+
+        return of
+
+
+@pytest.mark.parametrize("law", [neo_hookean, InSpace()], ids=["form", "split law"])
+def test_a_material_of_ones_own_for_space_is_tried_there(law):
+    """The form of a neo-Hookean law has its forces."""
+    still = {"law": None, "voltage": 0.0}
+    wanted = simulate(dome_scene(PRESS, finger=Dome(law=InSpace._law), **still))
+    scene = dome_scene(PRESS, finger=Dome(law=law), **still)
+    assert "shear modulus 0.02 MPa" in str(ev.plan(scene))
+    assert_allclose(simulate(scene).normal_force, wanted.normal_force, rtol=1e-6)
