@@ -173,7 +173,7 @@ class FormLaw:
         return np.full(theta.shape, np.nan)
 
 
-def split(law: Any, dim: int) -> SplitLaw:
+def split(law: Any, dim: int = 2) -> SplitLaw:
     """The law itself if it has the split form, else a `FormLaw` around a form, in `dim` dimensions
     at the origin, or a `UserLaw` around `P(F)` or `psi(F)`.
 

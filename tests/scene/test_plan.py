@@ -78,6 +78,19 @@ def test_the_largest_voltage_of_any_source_counts():
     assert not plan(hovering(voltage=0.0)).has("electricity")
 
 
+def test_a_voltage_over_time_acts_whatever_it_says_of_itself():
+    class Modest:
+        largest, highest_frequency = 0.0, 1.0
+
+        def __call__(self, time):
+            return 100.0 + 0.0 * np.asarray(time)
+
+    run = {"motion": [ev.Wait(0.1, steps=2)]}
+    modest, plain = (ev.simulate(hovering(voltage=voltage, **run)) for voltage in (Modest(), 100.0))
+    np.testing.assert_allclose(modest.electrostatic_force, plain.electrostatic_force, rtol=1e-9)
+    assert plain.electrostatic_force[-1] > 0.0
+
+
 def test_numbers_are_those_of_the_mesh():
     """40 by 2 quads of nine nodes: 81 by 5 nodes, the upper 81 move as one, the lower 81 may
     touch.
