@@ -81,7 +81,7 @@ from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
 from evfem.simulation import rendering as rendering
 from evfem.simulation import result as result
-from evfem.simulation.result import Checkpoint as Checkpoint
+from evfem.simulation.checkpoint import Checkpoint as Checkpoint
 from evfem.simulation.result import Frame as Frame
 from evfem.simulation.result import Result as Result
 from evfem.simulation.run import simulate as simulate

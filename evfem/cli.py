@@ -242,14 +242,16 @@ def _finish(folder: RunFolder, result: object) -> int:
 
 
 def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
-    """Print the table of a run, how far it came, and where its results are."""
-    from evfem.runfolder import table
+    """Print the table of a run, what its result warns of, how far it came, and where its results are."""
+    from evfem.runfolder import SUMMARY, table
     from evfem.simulation.history import DRIFT, load_drift
 
     if rows:
         print(table(rows, depth=scene.depth))
     if (drift := load_drift(rows)) > DRIFT:
         print(f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it')
+    for warning in json.loads((path / SUMMARY).read_text(encoding="utf-8")).get("warnings", []):
+        print(f"warning: {warning}")
     seconds = sum(float(row["seconds"]) for row in rows)
     print(f"{len(rows)} of {scene.total_steps} steps in {seconds:.1f} s; results in {path}", flush=True)
     return DONE

@@ -53,7 +53,8 @@ def _run(path: Path) -> Found:
 
 
 def _archive(path: Path) -> Found:
-    from evfem.simulation.result import CHECKPOINT_FORMAT, RESULT_FORMAT
+    from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
+    from evfem.simulation.result import RESULT_FORMAT
     from evfem.simulation.result import load as load_result
 
     form = format_of(path)

@@ -26,6 +26,8 @@ from evfem.errors import InputError
 from evfem.export import FieldFiles, ParaViewSeries, frame_in
 from evfem.mesh.mesh import Mesh
 from evfem.scene.scene import Scene
+from evfem.simulation.checkpoint import ANOTHER, Checkpoint
+from evfem.simulation.doubtful import doubtful
 from evfem.simulation.history import (
     UNITS,
     WHOLE_UNITS,
@@ -35,7 +37,7 @@ from evfem.simulation.history import (
     over_depth,
     read_rows,
 )
-from evfem.simulation.result import ANOTHER, Checkpoint, Frame, Result, Row, Saved, provenance
+from evfem.simulation.result import Frame, Result, Row, Saved, provenance
 
 #: bytes of fields that are said before they are written
 WORTH_TELLING = 100_000_000
@@ -169,7 +171,8 @@ class RunFolder:
     def _of_rows(self) -> Result:
         """The result that the rows so far make: without fields, and without what the solver did."""
         assert self.mesh is not None
-        return Result.from_rows(self.rows, [], self.mesh, provenance(self.scene, self.mesh, {}))
+        about = provenance(self.scene, self.mesh, {}) | {"warnings": doubtful(self.scene, self.rows)}
+        return Result.from_rows(self.rows, [], self.mesh, about)
 
     def _write_summary(self, result: Result) -> dict[str, Any]:
         summary = result.summary()

@@ -74,8 +74,7 @@ def slide(finger: Any, angle: float, slides: tuple[float, ...] = SLIDES, parts: 
     motion += [ev.Slide(one, steps=parts, angle=angle, hold="force") for one in slides]
     display = ev.Display(friction=FRICTION)
     result = ev.simulate(ev.Scene(finger, display, ev.Kaczmarek(), VOLTAGE, motion))
-    name = "tangential_force" if angle == 0.0 else "tangential_force_z"
-    force = result[name][PRESSED:]
+    force = result.tangential_force[PRESSED:]
     distance = result["position" if angle == 0.0 else "position_z"][PRESSED:]
     at = int(np.argmin(np.abs(distance - slides[0])))
     stiffness = float((force[at] - force[0]) / slides[0])

@@ -59,7 +59,7 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy", "threadpoolctl"},
-        "provenance history result spectrum model works ledger checkpoint failure run rendering",
+        "provenance history result spectrum model doubtful works ledger checkpoint failure run rendering",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},

@@ -21,8 +21,9 @@ from evfem import export, runfolder
 from evfem.common import storage
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
+from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
 from evfem.simulation.history import csv_header
-from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS, Saved
+from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 
 pytestmark = pytest.mark.solver

@@ -13,7 +13,7 @@ from evfem.common.storage import save_arrays
 from evfem.electrostatics.signalfile import Playback, write_signal
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.simulation.result import Checkpoint
+from evfem.simulation.checkpoint import Checkpoint
 
 PRESS = f"{SQUARE_SCENE}\n[[motion]]\nkind = 'press'\nindentation = 0.1\nsteps = 2\n"
 SWEEP = "version = 1\nscene = 'square.toml'\n[grid]\nsurface.friction = [0.1, 0.2]\n"

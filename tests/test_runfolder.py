@@ -20,8 +20,9 @@ from evfem.export import FieldFiles
 from evfem.finger.fingerpad import FingerPad
 from evfem.runfolder import RunFolder, saved
 from evfem.scene.scene import Output, default_scene
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import csv_line
-from evfem.simulation.result import Checkpoint, Result
+from evfem.simulation.result import Result
 from evfem.sweeps import folder
 
 SCENE = default_scene()

@@ -43,20 +43,22 @@ ENERGIES = {
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
 LETTER, HIGH = 0.085, 12.0
-OVER = ("step", "position", "time", "indentation", "voltage", "applied_force")
+OVER = ("step", "position", "position_z", "time", "indentation", "voltage", "applied_force")
 
 
 def abscissa(result: Result) -> str:
     """The column that a picture is drawn over: what all motions change, the time if the finger
     waits, else the step.
 
-    Presses are drawn over the indentation, slides over the position, voltage ramps over the
-    voltage.
+    Presses are drawn over the indentation, slides over the position (along the finger over
+    `position_z`), voltage ramps over the voltage.
     """
     kinds = set(result.motion)
     wished = {"press": "indentation", "voltage": "voltage"}
     name = wished.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"
-    if _changes(getattr(result, name)):
+    if name == "position" and result.in_space and not np.ptp(result.position):
+        name = "position_z"
+    if _changes(result[name]):
         return name
     return "time" if "wait" in kinds else "step"
 
@@ -106,8 +108,9 @@ def checked_over(over: str | None, result: Result) -> str:
     """The name of the abscissa."""
     if over is None:
         return abscissa(result)
-    if over not in OVER:
-        raise InputError("over", quoted(over), " | ".join(OVER))
+    allowed = [name for name in OVER if name in result.columns]
+    if over not in allowed:
+        raise InputError("over", quoted(over), " | ".join(allowed))
     return over
 
 

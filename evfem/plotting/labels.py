@@ -25,7 +25,12 @@ KINDS = {
     "pressure": "pressure",
 }
 #: columns with a name of their own in a picture
-TEXTS = {"position": "position of the bone", "seconds": "computing time", "min_gap": "smallest gap"}
+TEXTS = {
+    "position": "position of the bone",
+    "position_z": "z of the bone",
+    "seconds": "computing time",
+    "min_gap": "smallest gap",
+}
 #: fields of a frame: unit if it is not MPa, and name where the underscores alone do not make one
 FIELD_UNITS = {"displacement": "mm", "gap": "mm", "contact_status": "", "J": ""}
 FIELD_TEXTS = {"von_mises": "von Mises stress", "J": "volume ratio J"}

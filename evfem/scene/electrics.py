@@ -110,8 +110,8 @@ class Electrics:
 
     @property
     def acts(self) -> bool:
-        """Whether anything attracts."""
-        return self.law is not None and self.largest_voltage != 0.0
+        """Whether anything attracts; a voltage over time may, whatever it says its `largest` is."""
+        return self.law is not None and (self.largest_voltage != 0.0 or isinstance(self.voltage, TimeSignal))
 
     @cached_property
     def attraction(self) -> tuple[Any, Layers]:

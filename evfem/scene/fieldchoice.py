@@ -11,7 +11,7 @@ from evfem.contact.pad import make_pad
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import without_field
-from evfem.scene.motion import Hover
+from evfem.scene.motion import Hover, Press, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 
 #: `field = "auto"` solves for the field where the column law's energy may be too small by more than this
@@ -27,8 +27,8 @@ class FieldChoice:
 
 
 def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
-    """The choice of a scene whose `field` is not `local`, from the bounds at first touch, or at the
-    smallest gap of a finger that only hovers.
+    """The choice of a scene whose `field` is not `local`, from the bounds at first touch, unless the
+    finger only hovers, and at every height of the bone above it, the worst of which counts.
     """
     if mesh.dim == 3:
         if scene.field == "full":
@@ -37,7 +37,9 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
     against = without_field(scene)
     if against is not None:
         return FieldChoice(False, f"column by column: {against[0]} goes with no field")
-    bounds, gap = field_bounds(scene, mesh)
+    bounds, gap = max(
+        ((field_bounds(scene, mesh, gap), gap) for gap in _gaps(scene)), key=lambda one: one[0].spread
+    )
     share = f"{100.0 * bounds.spread:.2g} %"
     where = "at first touch" if gap == 0.0 else f"at a gap of {gap:g} mm"
     text = f"column by column the energy {where} is at most {share} too small"
@@ -48,14 +50,18 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
     return FieldChoice(full, f"{'solved for' if full else 'not solved for'}: {text}")
 
 
-def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
-    """Bounds of the undeformed pad's capacitance at the smallest gap (mm) that is certain, and that
-    gap.
-    """
+def _gaps(scene: Scene) -> list[float]:
+    """Gaps (mm) of the undeformed pad where motions end: 0 and those above, without 0 if it only hovers."""
+    hovers = [motion.gap for motion in scene.motion if isinstance(motion, Hover)]
+    lifts = [-(one.indentation or 0.0) for one in scene.motion if isinstance(one, Press)]
+    always = len(hovers) == sum(not isinstance(one, VoltageRamp | Wait) for one in scene.motion) > 0
+    return sorted({*hovers, *(gap for gap in lifts if gap > 0.0), *(() if always else (0.0,))})
+
+
+def field_bounds(scene: Scene, mesh: Mesh, gap: float) -> Bounds:
+    """Bounds of the undeformed pad's capacitance at a gap (mm)."""
     pad = make_pad(mesh)
     position = mesh.points[pad.nodes]
-    hovers = [motion.gap for motion in scene.motion if isinstance(motion, Hover)]
-    gap = min(hovers) if len(hovers) == len(scene.motion) else 0.0
     line = in_line(pad, facing(pad, position))
     ground = scene.ground.height(position[:, 0])
     height = position[:, 1] - ground
@@ -64,4 +70,4 @@ def field_bounds(scene: Scene, mesh: Mesh) -> tuple[Bounds, float]:
     reduced = np.asarray(skin.thickness) / skin.eps_r
     above = height - height.min() + gap
     levels = np.stack([ground, ground + above])[:, line]
-    return certificate(position[line, 0], levels, insulator, reduced[line], electrics.gap_eps_r), gap
+    return certificate(position[line, 0], levels, insulator, reduced[line], electrics.gap_eps_r)

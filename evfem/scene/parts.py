@@ -56,18 +56,18 @@ MOMENTS = 100
 HIGHEST_VOLTAGE = 5e5
 
 
-def check_parts(scene: Scene) -> None:
-    """Raise InputError for a part of the user's that no run could use, and for a voltage out of all
-    reason.
+def check_parts(scene: Scene, dim: int) -> None:
+    """Raise InputError for a part of the user's that no run in `dim` dimensions could use, and for a
+    voltage out of all reason.
     """
     with_terms = {term.on.name for term in scene.forms}
     for name, law in scene.finger.materials.items():
         key = f"finger.materials.{name}"
         if isinstance(law, Form) or _is_own(law):
-            _check_material(key, law)
+            _check_material(key, law, dim)
         # a form may depend on the place, and a term may be what makes a region stiff
         if _is_own(law) and name not in with_terms:
-            _check_stiffness(key, law)
+            _check_stiffness(key, law, dim)
     if _is_own(scene.surface):
         check_surface(scene)
     if _is_own(scene.friction_law):
@@ -86,15 +86,15 @@ def _is_own(part: Any) -> bool:
     return not type(part).__module__.startswith("evfem.")
 
 
-def _check_material(key: str, law: Any) -> None:
+def _check_material(key: str, law: Any, dim: int) -> None:
     methods = {name: getattr(law, name) for name in ("P", "psi") if hasattr(law, name)}
     # static methods need no object
     if isinstance(law, type) and any(isfunction(getattr_static(law, name)) for name in methods):
         raise InputError(key, f"the class {law.__name__}", "an object of it")
     if isinstance(law, (Form, SplitLaw)):
-        form = split(law)
+        form = split(law, dim)
         try:
-            at = np.eye(2)[..., None, None]
+            at = np.eye(dim)[..., None, None]
             rest = evaluated(key, "its stress", lambda F: _whole_stress(form, F), at)
         except InputError:
             if isinstance(law, Form):  # what a form must not use is said where it is integrated
@@ -111,17 +111,17 @@ def _check_material(key: str, law: Any) -> None:
             raise InputError(key, given, f"an array of shape {expected}, with a value for every point")
     name, method = next(iter(methods.items()), ("", law))  # P where there are both
     if not name:
-        split(law)  # says what a material is
+        split(law, dim)  # says what a material is
     _check_complex(key, f"{name}(F)", method, F[..., 1:, :])
     P = np.asarray(method(F)) if name == "P" else complex_step(method, F, rank=2)
     _check_rest(key, P[..., 0, 0], float(np.abs(P[..., 1, 0] - P[..., 0, 0]).max()) / STRAIN)
 
 
-def _check_stiffness(key: str, law: Any) -> None:
+def _check_stiffness(key: str, law: Any, dim: int) -> None:
     """Whether a user's material resists shear and widening at rest."""
     F = np.eye(3)[..., None, None] + STRAIN_STEP * WAYS
     if isinstance(law, SplitLaw):
-        P = evaluated(key, "its stress", lambda F: _split_stress(law, F), F[:2, :2])
+        P = evaluated(key, "its stress", lambda F: _split_stress(law, F), F[:dim, :dim])
     elif hasattr(law, "P"):
         P = np.asarray(law.P(F))
     else:
@@ -137,8 +137,8 @@ def _check_stiffness(key: str, law: Any) -> None:
 def _split_stress(law: SplitLaw, F: Array) -> Array:
     """First Piola-Kirchhoff stress of a law in the split form whose volume change is that of F."""
     if law.volume_measure == "trace":
-        S, q = law.split_stress(F, trace(F) - 2.0)
-        return S + q * np.eye(2)[..., None, None]
+        S, q = law.split_stress(F, trace(F) - len(F))
+        return S + q * np.eye(len(F))[..., None, None]
     S, q = law.split_stress(F, np.log(det(F)))
     return S + q * transpose(inv(F))
 

@@ -22,11 +22,10 @@ from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.core import core_of, unseen
 from evfem.scene.drift import drifting
-from evfem.scene.motion import Hover, VoltageRamp, Wait
 from evfem.scene.parts import check_parts
-from evfem.scene.resolution import too_fast, unresolved
+from evfem.scene.resolution import oscillating, too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import doubts, hover_share, locking
+from evfem.scene.sense import doubts, locking, touching_traction, weakens
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.scene.timescales import left_out, time_scales
@@ -38,8 +37,6 @@ from evfem.tissue.laws import split
 from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 
-#: a hovering finger counts as rigid when its deformation would change the attraction by less than this share
-RIGID_BELOW = 1e-4
 #: columns of a printed plan, at most
 WIDTH = 79
 
@@ -133,7 +130,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
     """The plan of a scene whose mesh is already there; raises InputError for parts that no run
     could use.
     """
-    check_parts(scene)
+    check_parts(scene, mesh.dim)
     check_space(scene, mesh)
     for name in ("pad", "bone"):
         if not len(mesh.node_sets.get(name, ())):
@@ -141,8 +138,15 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
                 "finger.mesh", f"no nodes on `{name}`", "point data or physical groups `pad` and `bone`"
             )
     bone, pad = mesh.node_sets["bone"], mesh.node_sets["pad"]
-    moduli = {name: split(law).shear_modulus for name, law in scene.finger.materials.items()}
-    others = unresolved(scene, mesh), too_fast(scene), left_out(scene), unseen(scene, mesh)
+    moduli = {name: split(law, mesh.dim).shear_modulus for name, law in scene.finger.materials.items()}
+    others = (
+        unresolved(scene, mesh),
+        too_fast(scene),
+        left_out(scene),
+        unseen(scene, mesh),
+        *oscillating(scene, mesh),
+        *drifting(scene, mesh, moduli),
+    )
     locked = locking(element, scene.finger.materials, mesh.dim)
     terms = (
         _tissue(scene, mesh, moduli),
@@ -181,39 +185,8 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
     soft, hard = (f"{modulus:.3g}" for modulus in (min(moduli.values()), max(moduli.values())))
     stiffness = f"shear modulus {soft} MPa" if soft == hard else f"shear moduli {soft} to {hard} MPa"
     deep = "" if scene.depth is None else f" over {scene.depth:g} mm of depth"
-    share = rigid_share(scene, mesh)
-    if share is not None and share < RIGID_BELOW:
-        return Term(
-            "tissue", False, f"hovering: deforming would change the attraction by less than {share:.1e}"
-        )
-    return Term(
-        "tissue",
-        True,
-        f"{laws}, {'plane strain' if mesh.dim == 2 else 'three dimensions'}{deep}, {stiffness}"
-        + ("" if share is None else f" (rigid would err by up to {share:.1e})"),
-    )
-
-
-def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
-    """Upper estimate of the relative change of the attraction if a hovering pad may deform; None
-    where it must deform.
-    """
-    hovers = [motion for motion in scene.motion if isinstance(motion, Hover)]
-    if (
-        not hovers
-        or not all(isinstance(motion, (Hover, VoltageRamp, Wait)) for motion in scene.motion)
-        or scene.forms
-    ):
-        return None
-    gap = min(motion.gap for motion in hovers)
-    if (
-        gap == 0.0
-        or not isinstance(scene.motion[0], Hover)
-        or scene.law is None
-        or scene.finger.electrical is None
-    ):
-        return None
-    return hover_share(scene, mesh, gap)
+    where = "plane strain" if mesh.dim == 2 else "three dimensions"
+    return Term("tissue", True, f"{laws}, {where}{deep}, {stiffness}")
 
 
 def _contact(scene: Scene) -> Term:
@@ -228,7 +201,10 @@ def _friction(scene: Scene) -> Term:
     if isinstance(law, Coulomb):
         return Term("friction", True, "Coulomb")
     timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
-    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}")
+    falling = ""
+    if scene.solver.dynamics != "inertial" and weakens(scene):
+        falling = "; it falls with the speed: tissue without mass may jump, dynamics = inertial follows it"
+    return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}{falling}")
 
 
 def _electricity(scene: Scene, mesh: Mesh) -> Term:
@@ -240,9 +216,10 @@ def _electricity(scene: Scene, mesh: Mesh) -> Term:
         f", voltage over time to {signal.highest_frequency:g} Hz" if isinstance(signal, TimeSignal) else ""
     )
     how = f"{type(scene.law).__name__}, {air}, {scene.direction} traction, {scene.coupling} coupling"
-    core = core_of(scene, mesh)
+    traction, core = touching_traction(scene), core_of(scene, mesh)
+    pull = "" if traction is None else f", up to {traction:.2g} MPa where it touches"
     cored = "" if core is None else f"; {core}"
-    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{cored}")
+    return Term("electricity", True, f"{how}{over_time}{_roughness(scene)}{pull}{cored}")
 
 
 def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
@@ -319,8 +296,6 @@ def _law_name(law: Any, region: str, mesh: Mesh) -> str:
 
 def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...]:
     needed: dict[str, Any] = {term.name: term.needed for term in terms}
-    if not needed["tissue"]:
-        return ("the attraction is summed over the rigid outline",)
     backend = (
         "PARDISO (symmetric, Schur complement)"
         if find_spec("pypardiso")
@@ -335,7 +310,8 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
     ]
     if mesh.dim == 3:
         lines.append(f"direct solver: {memory(mesh)}")
-    stiff = [name for name, law in scene.finger.materials.items() if nearly_incompressible(split(law))]
+    laws = {name: split(law, mesh.dim) for name, law in scene.finger.materials.items()}
+    stiff = [name for name, law in laws.items() if nearly_incompressible(law, mesh.dim)]
     if stiff:
         lines.append(f"pressure an unknown of the iterations, as {', '.join(stiff)} hardly changes volume")
     unsymmetric = [name for name in ("friction", "electricity") if needed[name]]

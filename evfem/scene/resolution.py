@@ -1,5 +1,5 @@
 """Whether the pad's nodes are close enough together to feel a profile, and the profile smooth
-enough; and whether the steps are short enough to follow a voltage over time.
+enough; and whether the steps are short enough to follow a voltage over time, a hand and the tissue.
 
 Between n nodes per wave a sine is up to 1 - cos(pi / n) of its amplitude higher than the line from
 node to node: five nodes miss a fifth.
@@ -8,6 +8,7 @@ node to node: five nodes miss a fifth.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import Motion, Slide, Wait
 from evfem.scene.scene import Scene
+from evfem.tissue.laws import split
 
 #: share of a profile's height that may lie between two neighbouring nodes and be missed by both
 MISSED = 0.2
@@ -106,13 +108,46 @@ def too_fast(scene: Scene) -> str | None:
     return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{_instead(signal)}"
 
 
+def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
+    """A sentence for the hand and for the tissue if a motion's steps are longer than their period.
+
+    The hand's is that of its mass on its spring, the tissue's the slowest of a layer of the softest
+    material between pad and bone in shear, 4 h sqrt(rho / G), about; damped beyond their critical
+    damping neither has one.
+    """
+    steps = [_seconds(motion) / motion.steps for motion in scene.motion]
+    longest = max(range(len(steps)), key=lambda i: steps[i])
+    for what, period in _periods(scene, mesh):
+        if steps[longest] > period:
+            yield (
+                f"motion {longest} has steps of {steps[longest]:.3g} s, and {what} by itself swings with a "
+                f"period of {period:.3g} s: they damp that away; take at least {PER_PERIOD:g} in a period, "
+                f"{math.ceil(PER_PERIOD * _seconds(scene.motion[longest]) / period)} in all, to follow it"
+            )
+
+
+def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
+    """Periods (s) of what swings by itself."""
+    hand = scene.hand
+    if hand is not None and hand.damping < 2.0 * math.sqrt(hand.stiffness * hand.mass):
+        yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)
+    if scene.solver.dynamics != "inertial":
+        return
+    law = min(scene.finger.materials.values(), key=lambda one: split(one, mesh.dim).shear_modulus)
+    bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
+    speed = math.sqrt(split(law, mesh.dim).shear_modulus / getattr(law, "density", 1e-9))
+    period, own = 4.0 * abs(bone - pad) / speed, getattr(law, "viscosity", None)
+    viscosity = scene.finger.viscosity if own is None else own
+    if period > math.pi * viscosity:  # Kelvin and Voigt's tissue has the damping ratio omega tau / 2
+        yield "the tissue", period
+
+
 def _seconds(motion: Motion) -> float:
-    """Seconds that a slide or wait takes."""
+    """Seconds that a slide, a press from first touch or a wait takes."""
     if isinstance(motion, Wait):
         return motion.duration
-    if isinstance(motion, Slide) and motion.speed is not None:
-        return abs(motion.distance) / motion.speed
-    return 0.0
+    way = getattr(motion, "distance", None) or getattr(motion, "indentation", None) or 0.0
+    return abs(way) / speed if (speed := getattr(motion, "speed", None)) else 0.0
 
 
 def _instead(signal: TimeSignal) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.laws import Layers
+from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
@@ -32,12 +32,12 @@ TIMES_TABLE_2, SOFTEST, HARD = 1e4, 1e3, 2e4
 LOCKED = 1e5
 #: field (V/um) that breaks any solid down
 BREAKDOWN = 300.0
+#: mean contact pressure (MPa) of a fingertip under 1 N: 1 N over some 50 mm2 that touch
+PRESSED = 0.02
 #: travel of the bone over the width of the finger, and thickness of the stratum corneum (mm), at least
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
-#: change of the attraction by the deformation below which a hovering pad does not come down
-STAYS_UP = 0.1
 #: lengths (mm) that a motion may have, and distance of the places at which a profile's height is looked at
 TRAVEL, WAY_STEP = ("indentation", "distance", "gap"), 0.02
 
@@ -47,7 +47,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     shear moduli (MPa) of the materials.
     """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())))
-    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_hovering(scene, mesh))
+    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_unbearable(scene), *_hovering(scene, mesh))
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
@@ -56,7 +56,7 @@ def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[st
     """
     if ELEMENTS[element][2] != "point":
         return
-    locked = [name for name, law in materials.items() if nearly_incompressible(split(law), dim, LOCKED)]
+    locked = [name for name, law in materials.items() if nearly_incompressible(split(law, dim), dim, LOCKED)]
     if locked:
         cells = "p2 triangles lock" if element == "p2" else f"{element} cells lock"
         other = "quadrilaterals with q2p1" if element == "p2" else "q2p1 or q1_fbar"
@@ -116,6 +116,47 @@ def _breakdown(scene: Scene) -> Iterator[str]:
             )
 
 
+def touching_traction(scene: Scene) -> float | None:
+    """Attraction (MPa) of touching skin at the largest voltage by the law's closed form, as far as that is
+    known: not under a charge, or a friction force that sets the voltage. Rough faces are as far apart as
+    under `PRESSED`.
+    """
+    if not scene.electrics.acts or isinstance(scene.voltage, (FollowForce, ChargeControl)):
+        return None
+    law, layers = scene.electrics.attraction
+    rough = roughness_of(scene.roughness_gap)
+    gap = 0.0 if rough is None else float(rough.separation(PRESSED))
+    return float(np.max(law.traction(gap, scene.electrics.largest_voltage, layers)))
+
+
+def _unbearable(scene: Scene) -> Iterator[str]:
+    """An attraction of touching skin beyond what any load presses it with, where a fingertip is pressed;
+    of a mesh, which may be anything, the run's own forces tell.
+    """
+    pressed = any(isinstance(motion, Press) and _target(motion) > 0.0 for motion in scene.motion)
+    if isinstance(scene.finger, MeshedFinger) or not pressed:
+        return
+    traction = touching_traction(scene)
+    if traction is not None and traction > PRESSED:
+        yield (
+            f"at {scene.electrics.largest_voltage:g} V touching skin is attracted with {traction:.3g} MPa, "
+            f"and a load presses a fingertip with up to {PRESSED:g} MPa: the attraction exceeds the load"
+        )
+
+
+def weakens(scene: Scene) -> bool:
+    """Whether friction falls with the speed somewhere up to ten times the fastest motion's: a node that is
+    let go is faster than the bone.
+    """
+    law, fastest = scene.friction_law, max(getattr(one, "speed", None) or 0.0 for one in scene.motion)
+    if not (scene.has_friction and getattr(law, "timed", False)):
+        return False
+    speed = fastest * np.concatenate([[0.0], np.logspace(-4.0, 1.0, 101)])
+    pressure, friction, age = (np.full(speed.size, value) for value in (PRESSED, 0.5, 1.0))
+    bound = np.asarray(law.bound(pressure, friction, speed, age))
+    return bool((np.diff(bound) < -1e-9 * np.abs(bound).max()).any())
+
+
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Slides after the last press that do not touch: before it, the bone may be on its way."""
     presses = [i for i, m in enumerate(scene.motion) if isinstance(m, Press) and _target(m) > 0.0]
@@ -136,30 +177,13 @@ def _target(press: Press) -> float:
 
 
 def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
-    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch does not come down."""
-    if gap < 0.0:
+    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch surely does not come down:
+    nothing attracts or loads it.
+    """
+    if gap < 0.0 or scene.electrics.acts or scene.forms:
         return False
     surface: Any = scene.ground
     if not surface.is_flat:
         gap -= float(np.ptp(surface.height(way(scene, mesh, WAY_STEP))))
-        if gap <= 0.0:
-            return False
-    if not scene.electrics.acts:
-        return True
-    return gap > 0.0 and hover_share(scene, mesh, gap) < STAYS_UP
-
-
-def hover_share(scene: Scene, mesh: Mesh, gap: float) -> float:
-    """Upper estimate of the relative change of the attraction by the deformation of a hovering
-    pad.
-
-    The softest tissue under the largest traction, from pad to bone: deflection p h / E, times d(ln
-    p)/dg, of the weaker of which the laws' bound is 1/(g + s) + 1/(g + D) with the traction of the
-    smallest gap.
-    """
-    assert scene.law is not None
-    layers = Layers.of(scene.electrics.lossless(scene.electrics.insulator))
-    traction = float(np.max(scene.law.traction(gap, scene.electrics.largest_voltage, layers)))
-    softest = min(2.0 * split(law).shear_modulus for law in scene.finger.materials.values())
-    depth = float(np.ptp(mesh.points[:, 1]))
-    return traction * depth / softest * 2.0 / gap
+        return gap > 0.0
+    return True

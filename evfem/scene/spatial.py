@@ -62,8 +62,10 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
         found.append(("surface.friction_law", f"{scene.friction_law} {SOLID}", allowed))
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
-    if isinstance(scene.voltage, FollowForce) and _goes_across(scene):
-        allowed = "angle 0 or 180: the friction force that is followed is that along x"
+    if isinstance(scene.voltage, FollowForce) and any(
+        isinstance(motion, Slide) and motion.direction != (1.0, 0.0) for motion in scene.motion
+    ):
+        allowed = "angle 0, and a negative distance for the way back: what is followed is the force along x"
         found.append(("electrostatics.voltage", "a friction force to follow on a slide across x", allowed))
     return found
 

@@ -40,7 +40,8 @@ def said(scene: Scene) -> str:
         return ""
     names = remembers(scene)
     if not names:
-        return "steps auto: nothing remembers the way, each step is one part"
+        what = "nothing but a snap" if scene.electrics.acts or not scene.ground.is_flat else "nothing"
+        return f"steps auto: {what} remembers the way, each step is one part"
     limit = f"{100.0 * scene.solver.strategy.path_error:g} %"
     verb = "remembers" if len(names) == 1 else "remember"
     return f"steps auto: {', '.join(names)} {verb} the way, a part errs by at most {limit} of the force"

@@ -10,20 +10,28 @@ machine and backend).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+import evfem
+from evfem.common.checks import plain
+from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
-from evfem.simulation.history import SUMS
+from evfem.simulation.history import COLUMNS, RESUMED, SUMS, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
-from evfem.simulation.result import Saved
+from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
 from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
 
+CHECKPOINT_FORMAT = "evfem-checkpoint-5"
+ANOTHER = "a run of another scene"
 #: statuses of a pad node are 0 to this
 LAST_STATUS = 3
 #: arrays whose size a run that has just been set up does not know
@@ -127,3 +135,72 @@ def state_of(arrays: Mapping[str, np.ndarray]) -> State:
     """The state in the arrays of a checkpoint."""
     parts: dict[str, Any] = {spec.name: arrays[spec.name] for spec in fields(State)}
     return State(**parts | {"voltage": float(arrays["voltage"])})
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """A file with the state after the last converged step of a run, from which the run can go on.
+
+    The same object writes the rows of earlier steps again without making their text anew.
+    """
+
+    path: Path
+    _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
+
+    def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
+        """Store the state in one step; the file before stays as it is if the disk refuses
+        (StorageError).
+        """
+        header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
+        header["version"] = np.array(evfem.__version__)
+        header["rows"] = np.array(self._text_of(rows))
+        save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
+
+    def _text_of(self, rows: Sequence[Row]) -> str:
+        """The rows as JSON."""
+        pairs = zip(rows, self._texts, strict=False)
+        same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
+        new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]
+        self._texts[same:] = new
+        return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
+
+    def read(self, scene_digest: str) -> Saved:
+        """The state of the same scene. Raises InputError for another scene's, another version's or
+        a damaged file.
+        """
+        allowed = "a checkpoint of the same scene and version"
+        arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
+        try:
+            owner, version = str(arrays["scene"]), str(arrays["version"])
+            rows = json.loads(str(arrays["rows"]))
+            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows and not columns_of(rows[0]) else []
+            if owner == scene_digest and not odd:
+                _check_rows(rows)
+        except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
+            raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
+        if version != evfem.__version__:
+            given = f"{self.path}, written by evfem {version[:40]!r}"
+            raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
+        if owner != scene_digest:
+            raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
+        if odd:
+            given = f"{self.path}, of another version: with missing or unknown columns {', '.join(odd)}"
+            raise InputError("checkpoint", given, allowed)
+        state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
+        return Saved(state, rows)
+
+
+def _check_rows(rows: Any) -> None:
+    """Whether these are the rows of a history, from the first step on."""
+    if not isinstance(rows, list) or not rows:
+        raise ValueError("no rows")
+    for step, row in enumerate(rows, 1):
+        if not columns_of(row) or set(row) != set(rows[0]):
+            raise ValueError(f"columns of row {step}")
+        numbers = [value for name, value in row.items() if name != "motion"]
+        if row["step"] != step or not isinstance(row["motion"], str):
+            raise ValueError(f"row {step}")
+        if not all(type(value) in (int, float) for value in numbers):
+            raise ValueError(f"row {step}")
+        if not all(math.isfinite(row[name]) for name in RESUMED):
+            raise ValueError(f"row {step}")

@@ -11,10 +11,9 @@ import numpy as np
 from evfem.common.constants import VERGE, VERGE_LOST
 from evfem.errors import InputError
 from evfem.scene.scene import Scene
+from evfem.scene.sense import weakens
 from evfem.simulation.model import Model
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
-
-FINER = "less friction or a finer mesh"
 
 
 def advice(scene: Scene, model: Model, failed: StepFailed) -> str:
@@ -59,7 +58,7 @@ def _place(model: Model, state: State) -> str:
 
 def _may_have_an_energy(scene: Scene) -> bool:
     """Whether its vertical attraction may also be along the normal, with an energy: not in every scene."""
-    if scene.law is None or scene.direction != "vertical" or scene.field == "full":
+    if not scene.electrics.acts or scene.direction != "vertical" or scene.field == "full":
         return False
     try:
         replace(scene, direction="normal")
@@ -69,21 +68,24 @@ def _may_have_an_energy(scene: Scene) -> bool:
 
 
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
-    """What may help a scene of its kind."""
-    dynamics = scene.solver.dynamics
+    """What may help a scene of its kind; of what it has not nothing is said."""
+    dynamics, pulled = scene.solver.dynamics, scene.electrics.acts
+    finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):
-        return "try more voltage, or hold = indentation"
+        return f"try {'more voltage, or ' if pulled else ''}hold = indentation"
     if isinstance(failed, Folded):
-        return f"try less voltage, a thicker insulator, smaller steps, {FINER}"
+        return f"try {'less voltage, a thicker insulator, ' if pulled else ''}smaller steps, {finer}"
+    if dynamics != "inertial" and weakens(scene):
+        return "try dynamics = inertial: friction that falls with the speed lets go at once what has no mass"
     if dynamics != "quasistatic":
         passing = failed.last is None or failed.last[1].duration > 0.0
         time = "a larger viscosity of the finger" if passing else "a motion with a speed"
-        return f"try smaller steps, {time}, {FINER}"
+        return f"try smaller steps, {time}, {finer}"
     if failed.released and _may_have_an_energy(scene):
         return (
             "try direction = normal, an attraction with an energy, or time: a speed, with dynamics = viscous"
         )
     if not lost:
-        return f"try smaller steps, a larger viscosity with dynamics = viscous, {FINER}"
+        return f"try smaller steps, a larger viscosity with dynamics = viscous, {finer}"
     off = "" if scene.solver.strategy.relaxation else "relaxation of the strategy switched on, or "
     return f"try {off}motions that take time: a speed, with dynamics = viscous or inertial"

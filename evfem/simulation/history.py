@@ -2,7 +2,8 @@
 
 In the plane model forces are per mm of depth (N/mm), works and energies too (N, that is N mm/mm).
 Over a whole depth they are N and mJ, and widths are areas in mm2, under the same names. Of a finger
-in three dimensions they are N and mJ at once; there are more columns (`SPATIAL`), and no widths.
+in three dimensions they are N and mJ at once; there are more columns (`SPATIAL`), and no widths. Its
+tangential forces are those along the direction of the last slide's angle, +x before the first.
 """
 
 from __future__ import annotations
@@ -126,6 +127,9 @@ MEANINGS: Mapping[str, str] = {spec.name: spec.metadata["meaning"] for spec in f
 #: further columns of a finger in three dimensions -> unit and meaning
 SPATIAL: Mapping[str, tuple[str, str]] = {
     "position_z": ("mm", "z of the bone"),
+    "applied_tangential_force_x": ("N", "along +x, on the bone"),
+    "applied_tangential_force_z": ("N", "along +z, on the bone"),
+    "tangential_force_x": ("N", "sum of contact forces, against +x"),
     "tangential_force_z": ("N", "sum of contact forces, against +z"),
     "contact_area": ("mm2", "of the convex hull of the touching nodes' shares"),
     "real_contact_area": ("mm2", "sum of the touching nodes' shares"),
@@ -201,7 +205,7 @@ def read_rows(text: str) -> list[dict[str, Any]]:
     """
     found = csv.DictReader(text.splitlines(), strict=True)
     names = found.fieldnames or ()
-    columns = (*COLUMNS, *SPATIAL) if set(SPATIAL) <= set(names) else COLUMNS
+    columns = COLUMNS if set(SPATIAL).isdisjoint(names) else (*COLUMNS, *SPATIAL)
     if not set(NEEDED) <= set(names) <= set(columns):
         raise ValueError("no history")
     unknown_yet = {name: "0" if name in INTEGERS else "nan" for name in columns}

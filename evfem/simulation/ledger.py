@@ -13,6 +13,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.contact.pad import Pad, surface_state
 from evfem.contact.signorini import FORWARD, OPEN
+from evfem.scene.motion import Slide
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
@@ -55,7 +56,7 @@ class Ledger:
         attraction = state.attraction.sum(axis=0)
         touching, withheld = state.status != OPEN, model.equilibrium.interface.withheld(state)
         real, extent = _extent(model, state, position, contact)
-        pressing = state.contact_force[:, 0] + withheld
+        pressing, (along, forward) = state.contact_force[:, 0] + withheld, self._forward(motion_index)
         return {
             "step": step,
             "motion_index": motion_index,
@@ -65,9 +66,9 @@ class Ledger:
             "indentation": model.indentation(state.bone),
             "voltage": state.voltage,
             "applied_force": float(0.0 - state.reaction[1]),  # 0.0 - x: no -0.0
-            "applied_tangential_force": float(state.reaction[0]),
+            "applied_tangential_force": float(state.reaction[along] @ forward),
             "normal_force": float(contact[1] + withheld.sum()),
-            "tangential_force": float(0.0 - contact[0]),
+            "tangential_force": float(0.0 - contact[along] @ forward),
             "electrostatic_force": float(withheld.sum() - attraction[1]),
             "electrostatic_force_x": float(attraction[0]),
             **extent,
@@ -79,6 +80,14 @@ class Ledger:
             "kinetic_energy": end.kinetic,
             "field_energy": self._field_energy(state),
         }
+
+    def _forward(self, motion_index: int) -> tuple[list[int], Floats]:
+        """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
+        if self.model.mesh.dim == 2:
+            return [0], np.ones(1)
+        motions = self.model.scene.motion[: motion_index + 1]
+        slides = [one.direction for one in motions if isinstance(one, Slide)]
+        return [0, 2], np.array(slides[-1] if slides else (1.0, 0.0))
 
     def _field_energy(self, state: State) -> float:
         """Energy of the field where the source's work is told, else 0."""
@@ -104,6 +113,9 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     return real, {
         **dict.fromkeys(WIDTHS, float("nan")),
         "position_z": float(state.bone[2]),
+        "applied_tangential_force_x": float(state.reaction[0]),
+        "applied_tangential_force_z": float(state.reaction[2]),
+        "tangential_force_x": float(0.0 - contact[0]),
         "tangential_force_z": float(0.0 - contact[2]),
         "contact_area": area,
         "real_contact_area": real,

@@ -27,7 +27,7 @@ from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
-from evfem.solver.equilibrium import Equilibrium, RigidOutline, StepSolver
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.spatial import SkinInterface
@@ -51,7 +51,7 @@ class Model:
     pad: Pad | Skin
     surface: Any
     attraction: Attraction | None
-    equilibrium: StepSolver
+    equilibrium: Equilibrium
     first_gap: float
     core: Core | None = None
 
@@ -72,12 +72,11 @@ def make_model(scene: Scene) -> Model:
     needed = plan_on(scene, mesh, element)
     for warning in needed.warnings:
         notices.warn(warning)
-    if needed.has("tissue"):
-        check_memory(mesh)
+    check_memory(mesh)
     space = make_space(mesh, element)
     pad: Pad | Skin = make_skin(mesh) if mesh.dim == 3 else make_pad(mesh)
     surface, first_gap = placed(scene.ground, mesh.points[pad.nodes])
-    core = core_of(scene, mesh) if needed.has("tissue") else None
+    core = core_of(scene, mesh)
     core = core if core is not None and core.fits else None
     attraction = make_attraction(scene, mesh, pad, surface, core) if needed.has("electricity") else None
     solver, laws = scene.solver, scene.finger.materials
@@ -98,10 +97,8 @@ def make_model(scene: Scene) -> Model:
         interface.restored = attraction.restored
     if core is not None or not isinstance(scene.friction_law, Coulomb):
         interface.law = scene.friction_law
-    equilibrium: StepSolver = RigidOutline(interface, attraction, limits, len(mesh.points))
-    if needed.has("tissue"):
-        factorised = FactorisedBody(body, interface, attraction, limits)
-        equilibrium = Equilibrium(factorised, interface, attraction, limits)
+    factorised = FactorisedBody(body, interface, attraction, limits)
+    equilibrium = Equilibrium(factorised, interface, attraction, limits)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 
 import evfem
 from evfem.common.arrays import Floats, Ints
-from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
@@ -29,7 +28,6 @@ from evfem.simulation.history import (
     DRIFT,
     INTEGERS,
     NEEDED,
-    RESUMED,
     SPATIAL,
     SPATIAL_UNITS,
     UNITS,
@@ -46,8 +44,6 @@ from evfem.simulation.provenance import provenance as provenance
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
-CHECKPOINT_FORMAT = "evfem-checkpoint-5"
-ANOTHER = "a run of another scene"
 #: what is shown of the last step
 SHOWN = (
     *("position", "indentation", "voltage"),
@@ -99,6 +95,17 @@ _SHAPES: dict[str, tuple[str, ...]] = {
 _SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", "stresses"), "J": ("E",)}
 
 
+def _component(name: str) -> Any:
+    """A column of three dimensions as an attribute; in the plane all is along x, and nothing along z."""
+
+    def found(result: Result) -> Floats:
+        if name in result.in_space:
+            return result.in_space[name]
+        return result[name.removesuffix("_x")] if name.endswith("_x") else np.zeros_like(result.position)
+
+    return property(found, doc=f"{SPATIAL[name][1]}; in the plane all is along x")
+
+
 @dataclass(frozen=True, eq=False)
 class Result(History):
     """Every column of the history as an array over the steps, the frames kept, the mesh and the
@@ -110,7 +117,9 @@ class Result(History):
     the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
-    (`SPATIAL`): `position_z`, `tangential_force_z` and the contact areas.
+    (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
+    `tangential_force` and `applied_tangential_force` are along the direction of the last slide's
+    angle (+x before the first), positive where a finger slides by a positive distance.
     """
 
     frames: list[Frame]
@@ -143,15 +152,11 @@ class Result(History):
         """A column by its name."""
         return self.in_space[name] if name in self.in_space else super().__getitem__(name)
 
-    @property
-    def position_z(self) -> Floats:
-        """z of the bone (mm); that of a finger in the plane stays 0."""
-        return self.in_space.get("position_z", np.zeros_like(self.position))
-
-    @property
-    def tangential_force_z(self) -> Floats:
-        """Sum of the contact forces against +z; none on a finger in the plane."""
-        return self.in_space.get("tangential_force_z", np.zeros_like(self.position))
+    position_z = _component("position_z")
+    tangential_force_x = _component("tangential_force_x")
+    tangential_force_z = _component("tangential_force_z")
+    applied_tangential_force_x = _component("applied_tangential_force_x")
+    applied_tangential_force_z = _component("applied_tangential_force_z")
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -207,6 +212,11 @@ class Result(History):
             raise InputError("depth", ABSENT, allowed)
         return self.depth
 
+    @property
+    def warnings(self) -> list[str]:
+        """What a run found that may make its numbers mean something else, a sentence each."""
+        return list(self.provenance.get("warnings", []))
+
     def summary(self) -> dict[str, Any]:
         """Sizes, the last row, extremes and costs, in plain numbers ready for JSON."""
         scene = self.provenance.get("scene", {})
@@ -226,6 +236,7 @@ class Result(History):
             "last": {name: _json(value) for name, value in self.rows[-1].items()} if steps else {},
             "largest": extremes,
             "load_drift": self.load_drift,
+            "warnings": self.warnings,
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
             "relaxations": int(self.relaxations.sum()),
@@ -252,6 +263,7 @@ class Result(History):
         lines[3] = f"over {self.depth:g} mm: {lines[3]}" if self._shows_total else lines[3]
         if (drift := self.load_drift) > DRIFT:
             lines.append(f"the load drifted by {drift:.1%} at a held indentation")
+        lines += self.warnings
         return "\n  ".join([f"Result of {self._title}", *(line for line in lines if line)])
 
     def _repr_html_(self) -> str:
@@ -359,75 +371,6 @@ class Saved:
 
     arrays: dict[str, np.ndarray]
     rows: list[dict[str, Any]]
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """A file with the state after the last converged step of a run, from which the run can go on.
-
-    The same object writes the rows of earlier steps again without making their text anew.
-    """
-
-    path: Path
-    _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
-
-    def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
-        """Store the state in one step; the file before stays as it is if the disk refuses
-        (StorageError).
-        """
-        header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
-        header["version"] = np.array(evfem.__version__)
-        header["rows"] = np.array(self._text_of(rows))
-        save_arrays(self.path, header | {f"state/{name}": np.asarray(a) for name, a in arrays.items()})
-
-    def _text_of(self, rows: Sequence[Row]) -> str:
-        """The rows as JSON."""
-        pairs = zip(rows, self._texts, strict=False)
-        same = next((i for i, (row, known) in enumerate(pairs) if row is not known[0]), len(self._texts))
-        new = [(row, json.dumps({name: plain(v) for name, v in row.items()})) for row in rows[same:]]
-        self._texts[same:] = new
-        return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
-
-    def read(self, scene_digest: str) -> Saved:
-        """The state of the same scene. Raises InputError for another scene's, another version's or
-        a damaged file.
-        """
-        allowed = "a checkpoint of the same scene and version"
-        arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
-        try:
-            owner, version = str(arrays["scene"]), str(arrays["version"])
-            rows = json.loads(str(arrays["rows"]))
-            odd = sorted({*COLUMNS} ^ {*rows[0]}) if rows and not columns_of(rows[0]) else []
-            if owner == scene_digest and not odd:
-                _check_rows(rows)
-        except (KeyError, ValueError, TypeError, AttributeError, RecursionError) as error:
-            raise InputError("checkpoint", f"{self.path}, damaged: {error}", allowed) from error
-        if version != evfem.__version__:
-            given = f"{self.path}, written by evfem {version[:40]!r}"
-            raise InputError("checkpoint", given, f"a checkpoint of evfem {evfem.__version__}")
-        if owner != scene_digest:
-            raise InputError("checkpoint", f"{self.path}, {ANOTHER}", "the run of this scene")
-        if odd:
-            given = f"{self.path}, of another version: with missing or unknown columns {', '.join(odd)}"
-            raise InputError("checkpoint", given, allowed)
-        state = {key.removeprefix("state/"): a for key, a in arrays.items() if key.startswith("state/")}
-        return Saved(state, rows)
-
-
-def _check_rows(rows: Any) -> None:
-    """Whether these are the rows of a history, from the first step on."""
-    if not isinstance(rows, list) or not rows:
-        raise ValueError("no rows")
-    for step, row in enumerate(rows, 1):
-        if not columns_of(row) or set(row) != set(rows[0]):
-            raise ValueError(f"columns of row {step}")
-        numbers = [value for name, value in row.items() if name != "motion"]
-        if row["step"] != step or not isinstance(row["motion"], str):
-            raise ValueError(f"row {step}")
-        if not all(type(value) in (int, float) for value in numbers):
-            raise ValueError(f"row {step}")
-        if not all(math.isfinite(row[name]) for name in RESUMED):
-            raise ValueError(f"row {step}")
 
 
 def _frames_from(arrays: Mapping[str, np.ndarray], mesh: Mesh) -> list[Frame]:

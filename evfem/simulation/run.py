@@ -33,6 +33,7 @@ from evfem.simulation.checkpoint import (
     state_of,
     usable,
 )
+from evfem.simulation.doubtful import deepest, doubtful, outside, through
 from evfem.simulation.failure import advice
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
@@ -142,6 +143,7 @@ class Run:
         self.stepper = Stepper(
             self.model.equilibrium, scene.coupling, body=self.model.body, allowed=allowed_error(scene)
         )
+        self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
         self.time = 0.0
@@ -327,9 +329,10 @@ class Run:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
             said = advice(self.scene, self.model, error)
-            raise NotConverged(request.step, error.residuals, said, self.result()) from error
+            raise NotConverged(request.step, error.residuals, said, self.result()) from None
         except Unresolved as error:
-            raise NotConverged(request.step, [], str(error), self.result()) from error
+            raise NotConverged(request.step, [], str(error), self.result()) from None
+        self.sunk = max(self.sunk, deepest(self.model, self.outside, self.state.u), key=lambda one: one[0])
         self.time += request.duration
         row = self.ledger.row(self.state, request.step, request.motion_index, request.kind, self.time)
         row["substeps"] = substeps
@@ -365,10 +368,11 @@ class Run:
         }
         if self.stepper.allowed is not None:
             solver["path_error"] = self.stepper.path_error
-        known = provenance(self.scene, self.model.mesh, solver)
+        about = provenance(self.scene, self.model.mesh, solver)
         if (core := self.model.core) is not None:
-            known["core"] = core.told
-        return Result.from_rows(self.rows, self.frames, self.model.mesh, known)
+            about["core"] = core.told
+        about["warnings"] = [*through(self.model, self.sunk), *doubtful(self.scene, self.rows)]
+        return Result.from_rows(self.rows, self.frames, self.model.mesh, about)
 
     # -- checkpoints
 
@@ -379,6 +383,7 @@ class Run:
             **reusable_arrays(self.state, self.model.equilibrium.reusable()),
             "substep": np.array(self.stepper.substep),
             "time": np.array(self.time),
+            "sunk": self.sunk,
             **ledger_arrays(self.ledger, self.state),
         }
 
@@ -387,7 +392,7 @@ class Run:
         self.state = state_of(arrays)
         self.model.equilibrium.resume(self.state, reusable_of(arrays))
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
-        self.ledger = ledger_of(self.model, arrays)
+        self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.errors import InputError, quoted
-from evfem.simulation.result import COLUMNS, Result
+from evfem.simulation.result import Result
 
 WINDOWS = ("none", "hann")
 #: largest difference of two steps, as a share of a step
@@ -62,8 +62,9 @@ def spectrum(
     InputError for fewer than two rows, and for rows that are not evenly spaced in time: motions
     with steps of different lengths, or none.
     """
-    if column not in COLUMNS or column == "motion":
-        raise InputError("column", quoted(column), ", ".join(name for name in COLUMNS if name != "motion"))
+    if column not in result.columns or column == "motion":
+        allowed = ", ".join(name for name in result.columns if name != "motion")
+        raise InputError("column", quoted(column), allowed)
     choice("window", window, WINDOWS)
     used, before = _rows(result, start, stop)
     step = _step(result.time[used], before)

@@ -27,7 +27,6 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
-from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
 from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
@@ -39,7 +38,6 @@ from evfem.solver.state import (
     Balance,
     Folded,
     Limits,
-    Record,
     Reusable,
     State,
     StepFailed,
@@ -53,11 +51,22 @@ NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as 
 FOLDED = "there is no equilibrium near here without the outline folding over itself, at x = {:.4g} mm"
 
 
-class Statics:
-    """What every solver of a pad on a surface offers beside its steps."""
+class Equilibrium:
+    """Finds equilibria of a body on a surface, with or without attraction, one step after the
+    other.
+    """
 
-    def __init__(self, interface: Interface, attraction: Attraction | None, size: int) -> None:
-        self.interface, self.attraction, self._size = interface, attraction, size
+    def __init__(
+        self,
+        body: FactorisedBody,
+        interface: Interface,
+        attraction: Attraction | None,
+        limits: Limits,
+    ) -> None:
+        self.interface, self.attraction, self._size = interface, attraction, body.size
+        self.body, self.record = body, body.record
+        self.tolerance, self.strategy = limits.tolerance, limits.strategy
+        self._seen: tuple[State, Balance] | None = None
 
     def rest(self, bone: Floats, voltage: float) -> State:
         """The undeformed body, translated by `bone` (dim,)."""
@@ -99,24 +108,6 @@ class Statics:
         """The target with the voltage that its control takes while the pad stays in `state`."""
         seen = Seen.of(self.attraction, self.interface, state, old.touching)
         return replace(target, drive=GivenVoltage(target.drive.held(seen)))
-
-
-class Equilibrium(Statics):
-    """Finds equilibria of a body on a surface, with or without attraction, one step after the
-    other.
-    """
-
-    def __init__(
-        self,
-        body: FactorisedBody,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
-    ) -> None:
-        super().__init__(interface, attraction, body.size)
-        self.body, self.record = body, body.record
-        self.tolerance, self.strategy = limits.tolerance, limits.strategy
-        self._seen: tuple[State, Balance] | None = None
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
@@ -241,40 +232,3 @@ class Equilibrium(Statics):
             self.body.admit(state, penetration)
             return False
         return self.interface.obeyed(old, state)
-
-
-class RigidOutline(Statics):
-    """The same questions asked of a pad that does not deform: it hovers, and the bone carries the
-    attraction.
-    """
-
-    def __init__(
-        self, interface: Interface, attraction: Attraction | None, limits: Limits, size: int
-    ) -> None:
-        super().__init__(interface, attraction, size)
-        self.tolerance, self.strategy, self.record = limits.tolerance, limits.strategy, Record()
-
-    def step(
-        self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None
-    ) -> State:
-        """The translated outline under its attraction; raises `StepFailed` if it would touch."""
-        state = self.rest(target.bone(old.bone), old.voltage)
-        state = self.rest(state.bone, self.as_held(old, state, target).drive.voltage)
-        gap = surface_state(self.interface.surface, self.positions(state.u)).gap
-        if gap.min() <= 0.0 or target.height.free:
-            raise StepFailed("a rigid outline cannot touch", [1.0])
-        return replace(state, velocity=old.velocity, hand=old.hand)
-
-    def verge(self, state: State, target: Target) -> None:
-        """It does not deform."""
-
-    def reusable(self) -> Reusable:
-        """Nothing."""
-        return Reusable(np.zeros(0, dtype=np.int64), None, 0.0)
-
-    def resume(self, state: State, carried: Reusable) -> None:
-        """Nothing to put back."""
-
-
-#: what the stepper, the ledger, the run and its checkpoints know of a solver
-StepSolver = Equilibrium | RigidOutline

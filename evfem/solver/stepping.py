@@ -32,7 +32,7 @@ import numpy as np
 
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.solver.control import Target
-from evfem.solver.equilibrium import StepSolver
+from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
@@ -101,7 +101,7 @@ class Stepper:
     is at most `allowed`, and `path_error` the largest accepted.
     """
 
-    equilibrium: StepSolver
+    equilibrium: Equilibrium
     coupling: str = "monolithic"
     substep: float = 1.0
     cuts: int = 0

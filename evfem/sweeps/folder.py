@@ -40,7 +40,8 @@ STATUS = ("done", "refused", "not_converged", "failed")
 @dataclass(frozen=True)
 class Answer:
     """What became of a point: `status` done, refused (by the scene reader), not_converged or
-    failed, the outputs of a point that is done, and the message of one that is not.
+    failed, the outputs of a point that is done, and its message: why it is not, or what its result
+    warns of.
     """
 
     status: str

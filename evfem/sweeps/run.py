@@ -91,8 +91,9 @@ def sweep(
     `workers` processes (None: one per core; 1: none but this one) or the Dask cluster at the
     address `scheduler` ("local" starts one) do the work; the numbers are the same. A point that
     the scene reader refuses, that does not converge or that fails otherwise is a row with its
-    status and message. Raises InputError if no point at all is a valid scene, StorageError when
-    the disk refuses or another sweep is at work in the folder.
+    status and message; the message of one that is done is what its result warns of. Raises
+    InputError if no point at all is a valid scene, StorageError when the disk refuses or another
+    sweep is at work in the folder.
 
     >>> from evfem.sweeps.file import loads as read
     >>> text = '''
@@ -269,7 +270,8 @@ def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | N
     outputs: dict[str, float | None] = {}
     status, message = "done", ""
     try:
-        outputs = ask(simulate(loads(text, folder)))
+        result = simulate(loads(text, folder))
+        outputs, message = ask(result), "; ".join(result.warnings)
     except NotConverged as error:
         status, message = "not_converged", str(error)
     except InputError as error:

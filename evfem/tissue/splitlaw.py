@@ -1,7 +1,7 @@
 """The split form of a law, which elements with a volume change of their own need, for laws that
 lack it.
 
-`split(law)` returns a law that has the form already, and wraps an object that only has `P(F)` or
+`split(law, dim)` returns a law that has the form already, and wraps an object that only has `P(F)` or
 `psi(F)` on F (3, 3, ...): its energy at F (d, d, ...) and theta is psi(Fbar) with Fbar =
 exp((theta - ln det F)/d) F, d = 3, or in the plane of plane strain, d = 2, with Fbar33 = 1, so that
 det Fbar = exp(theta). Derivatives come by complex step; where the second derivative of an energy is
@@ -191,12 +191,12 @@ def split(law: Any, dim: int = 2) -> SplitLaw:
     return cast(SplitLaw, UserLaw(law))
 
 
-def plane_modulus(law: SplitLaw, dim: int = 2) -> float:
+def plane_modulus(law: SplitLaw, dim: int) -> float:
     """E / (1 - nu^2) in MPa at small strain, with which a half space answers a line load: 4 mu (1 - mu / M),
     M being the stiffness against stretch without contraction.
 
     >>> from evfem.tissue.laws import NeoHookean
-    >>> round(plane_modulus(NeoHookean(E=1.0, nu=0.3)), 7)
+    >>> round(plane_modulus(NeoHookean(E=1.0, nu=0.3), 2), 7)
     1.0989011
     """
     stress = []
@@ -211,7 +211,7 @@ def plane_modulus(law: SplitLaw, dim: int = 2) -> float:
     return 4.0 * mu * (1.0 - mu * 2.0 * STRETCH / (stress[0] - stress[1]))
 
 
-def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float | None = None) -> bool:
+def nearly_incompressible(law: SplitLaw, dim: int, times: float | None = None) -> bool:
     """Whether a law is at rest so many `times` stiffer against a change of volume than in shear,
     d2W/dtheta2 / mu; by default so that its pressure is worth an unknown of its own
     (`evfem.solver.pressure`).
@@ -220,7 +220,7 @@ def nearly_incompressible(law: SplitLaw, dim: int = 2, times: float | None = Non
     theta is linear in the displacements.
 
     >>> from evfem.tissue.laws import NeoHookean
-    >>> [nearly_incompressible(NeoHookean(E=0.1, nu=nu)) for nu in (0.3, 0.49, 0.499)]
+    >>> [nearly_incompressible(NeoHookean(E=0.1, nu=nu), 2) for nu in (0.3, 0.49, 0.499)]
     [False, False, True]
     """
     if law.volume_measure == "trace":

@@ -122,15 +122,14 @@ def finite(scene: Scene, result: Result) -> Broken | None:
 
 @check
 def balance(scene: Scene, result: Result) -> Broken | None:
-    """Applied, contact and attraction forces add up to nothing, as a vector; without inertia. In
-    three dimensions no column has what is applied along z.
-    """
+    """Applied, contact and attraction forces add up to nothing, as a vector; without inertia."""
     if scene.solver.dynamics == "inertial":
         return None
-    x = result.applied_tangential_force - result.tangential_force + result.electrostatic_force_x
+    x = result.applied_tangential_force_x - result.tangential_force_x + result.electrostatic_force_x
+    z = result.applied_tangential_force_z - result.tangential_force_z
     y = -result.applied_force + result.normal_force - result.electrostatic_force
     allowed = max(TOLERANCE, 1e2 * scene.solver.tolerance)
-    return _worst("balance", np.hypot(x, y) / _largest_force(result), allowed, result.step)
+    return _worst("balance", np.hypot(np.hypot(x, z), y) / _largest_force(result), allowed, result.step)
 
 
 @check
@@ -139,8 +138,7 @@ def cone(scene: Scene, result: Result) -> Broken | None:
     if not scene.ground.is_flat or not isinstance(scene.friction_law, Coulomb):
         return None
     mu = float(np.max(np.atleast_2d(scene.surface.friction)[:, -1]))  # type: ignore[attr-defined]
-    along_z = result["tangential_force_z"] if _solid(result) else 0.0
-    beyond = np.hypot(result.tangential_force, along_z) - mu * result.normal_force
+    beyond = np.hypot(result.tangential_force_x, result.tangential_force_z) - mu * result.normal_force
     return _worst("cone", beyond / _largest_force(result), TOLERANCE, result.step)
 
 

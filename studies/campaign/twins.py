@@ -12,10 +12,10 @@ from evfem.simulation.result import Result
 from .invariants import FORCE, Broken, largest_energy
 
 #: columns that are compared, and which of them change sign in a mirror
-ODD = ("position", "tangential_force", "applied_tangential_force", "electrostatic_force_x")
+ODD = ("position", "tangential_force_x", "applied_tangential_force_x", "electrostatic_force_x")
 COMPARED = (*ODD, "indentation", "normal_force", "applied_force", "electrostatic_force")
 #: those of a finger in three dimensions too
-ALONG = ("position_z", "tangential_force_z")
+ALONG = ("position_z", "tangential_force_z", "applied_tangential_force_z")
 #: relative differences that two correct results may have
 MIRRORED, HALVED = 1e-4, 1e-5
 #: shares of the largest energy that snaps may set free, and that a step in time may lack, without a
@@ -58,7 +58,7 @@ def mirror_broken(one: Result, other: Result) -> Broken | None:
     scale, rows = _scale(one), []
     for name in (*COMPARED, *(name for name in ALONG if name in one.columns)):
         sign = -1.0 if name in ODD else 1.0
-        apart = np.abs(one[name] - sign * other[name])
+        apart = np.abs(getattr(one, name) - sign * getattr(other, name))
         rows.append(apart / (scale if "force" in name else 1.0))
     worst = np.max(rows, axis=0)
     row = int(np.argmax(worst))
@@ -74,5 +74,5 @@ def steps_broken(one: Result, other: Result) -> Broken | None:
 
 
 def _scale(result: Result) -> float:
-    names = ("normal_force", "applied_force", "electrostatic_force", "tangential_force")
+    names = ("normal_force", "applied_force", "electrostatic_force", "tangential_force_x")
     return max(FORCE, *(float(np.abs(getattr(result, name)).max(initial=0.0)) for name in names))

@@ -40,7 +40,7 @@ def job(ridges: str, load: float, *slides: ev.Slide) -> Callable[[], float]:
         finger = ev.Fingertip(ridges=ridges, resolution="coarse")
         scene = ev.Scene(finger, ev.Display(friction=0.3), ev.Kaczmarek(), 1000.0, motion)
         result = ev.simulate(scene)
-        return float(np.hypot(result["tangential_force"][-1], result["tangential_force_z"][-1]))
+        return float(np.hypot(result.tangential_force_x[-1], result.tangential_force_z[-1]))
 
     return run
 

@@ -211,6 +211,9 @@ def test_the_plan_chooses_by_the_bounds():
     far = ev.plan(scene("auto", SMOOTH, motion))
     near = ev.plan(scene("auto", ridged, [ev.Press(force=0.05)]))
     asked = ev.plan(scene("full", SMOOTH, motion))
+    lifted = ev.plan(scene("auto", SMOOTH, [ev.Press(force=0.05), ev.Press(indentation=-2.0)]))
+    assert lifted.terms == ev.plan(scene("auto", SMOOTH, [ev.Press(force=0.05), *motion])).terms
+    assert "at a gap of 2 mm" in " ".join(str(lifted).split())
     assert (near.has("full field"), asked.has("full field")) == (True, True)
     assert "at first touch is at most" in " ".join(str(near).split())
     assert "at a gap of 2 mm" in " ".join(str(far).split())

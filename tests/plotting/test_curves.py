@@ -22,6 +22,7 @@ from evfem.plotting import (
 )
 from evfem.plotting.curves import ENERGIES, OVER, abscissa
 from evfem.plotting.labels import kind_of
+from evfem.simulation.history import SPATIAL
 from evfem.simulation.result import COLUMNS, Result
 
 
@@ -242,7 +243,7 @@ def test_totals_and_others_are_not_compared():
 
 
 def test_what_can_be_drawn_over_is_in_the_history():
-    assert set(OVER) <= set(COLUMNS)
+    assert set(OVER) <= {*COLUMNS, *SPATIAL}
 
 
 def test_every_column_has_a_kind_and_a_unit():

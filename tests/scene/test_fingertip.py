@@ -120,7 +120,7 @@ def test_a_sweep_tells_columns_of_three_dimensions():
     tip = {"kind": "fingertip", "ridges": "none", "resolution": "coarse"}
     tables = {"version": 1, "finger": tip, "surface": {"kind": "flat"}}
     tables["motion"] = [{"kind": "press", "indentation": 0.1}]
-    names = ("contact_area.last", "tangential_force_z.last", "position_z.last")
+    names = ("contact_area.last", "applied_tangential_force_x.last", "position_z.last")
     table = ev.sweep(ev.Sweep(tables, {"finger.resolution": ["coarse"]}, outputs=names), workers=1)
     assert [row["status"] for row in table.rows] == ["done"]
     assert table.rows[0]["contact_area.last"] > 1.0

@@ -1,5 +1,6 @@
 """What a failed step says: which force wins and where, and only what can help that scene."""
 
+import traceback
 from dataclasses import replace
 
 import numpy as np
@@ -7,11 +8,13 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
+from evfem.contact.friction import RateFriction
 from evfem.contact.stability import SLOPES, Verge
 from evfem.contact.surfaces import Flat
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
 from evfem.scene.motion import Press, Slide
+from evfem.scene.plan import plan
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.failure import advice
 from evfem.simulation.run import Run, simulate
@@ -20,11 +23,14 @@ from evfem.solver.state import Folded, LiftedOff, StepFailed
 from evfem.solver.strategy import Strategy
 
 
-def said(share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, **solver):
+def said(
+    share=1.2, duration=0.0, released=False, unstable=False, failure=StepFailed, electric=None, **solver
+):
     """What is said of a step from a pressed finger whose loss is at `share`."""
     body = finger(block(4, 2), viscosity=1e-3)
     motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
-    going = Run(Scene(body, Flat(), motion=motion, solver=Solver(**solver)), None)
+    surface = Flat(friction=0.3, insulator=Layer(0.05, 3.0))
+    going = Run(Scene(body, surface, motion=motion, solver=Solver(**solver), **(electric or {})), None)
     going.advance(next(going.requests()))
     failed = failure("nodes keep changing", [1.0])
     failed.findings, failed.released, failed.unstable = "out of balance: 1 N/mm", released, unstable
@@ -94,7 +100,26 @@ def test_who_has_time_already_is_not_told_to_take_it(dynamics):
 def test_a_fold_is_told_as_it_is():
     found = said(failure=Folded)
     assert found[0] == "nodes keep changing"
-    assert "less voltage" in found[-1]
+    assert found[-1] == "try smaller steps, less friction or a finer mesh"
+    electric = {"law": Kaczmarek(), "voltage": 100.0}
+    assert "less voltage, a thicker insulator" in said(failure=Folded, electric=electric)[-1]
+
+
+def test_where_friction_falls_with_the_speed_only_mass_helps():
+    """Stribeck's law falls from mu to half of it; one that rises does not, and with mass it is followed."""
+    motion = [Press(indentation=0.1, steps=1), Slide(0.1, steps=1, speed=1.0)]
+
+    def told(law, **solver):
+        body = finger(block(4, 2), viscosity=1e-3)
+        scene = Scene(body, Flat(friction=0.3), motion=motion, friction_law=law, solver=Solver(**solver))
+        told = advice(scene, None, StepFailed("nodes keep changing", [1.0]))
+        known = next(term.reason for term in plan(scene).terms if term.name == "friction")
+        return "try dynamics = inertial" in told, "dynamics = inertial follows it" in known
+
+    falling, rising = RateFriction(speed=5.0, ratio=0.5), RateFriction(speed=5.0, exponent=0.5)
+    assert told(falling, dynamics="viscous") == (True, True)
+    assert told(falling) == (True, True)
+    assert told(falling, dynamics="inertial") == told(rising, dynamics="viscous") == (False, False)
 
 
 def test_a_finger_that_was_pulled_off_is_told_as_it_is_and_from_where():
@@ -107,8 +132,9 @@ def test_a_plain_failure_keeps_its_reason():
     hopeless = Solver(strategy=Strategy(iterations=2, smallest_part=1.0))
     with pytest.raises(
         NotConverged, match=r"no equilibrium in 2 iterations; out of balance.*try smaller steps"
-    ):
+    ) as caught:
         simulate(Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1), solver=hopeless))
+    assert "".join(traceback.format_exception(caught.value)).count("Traceback") == 1
 
 
 def test_a_singular_tangent_leaves_the_reason():

@@ -13,9 +13,10 @@ from tools.fakes import fake_result, fake_row
 from tools.meshes import KINDS
 
 from evfem.errors import InputError, StorageError
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import MEANINGS, csv_header, csv_line
 from evfem.simulation.provenance import versions
-from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, WHOLE_UNITS, Checkpoint, Result, load
+from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, WHOLE_UNITS, Result, load
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (

@@ -6,14 +6,17 @@ from numpy.testing import assert_allclose
 from tools.domes import DISPLAY, Dome, dome, dome_scene
 
 import evfem as ev
+from evfem import plotting
 from evfem.common.constants import SMALLEST_J
 from evfem.contact.coulomb import SLIP
+from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import SPATIAL, WIDTHS
-from evfem.simulation.result import Checkpoint, load
+from evfem.simulation.result import load
 from evfem.simulation.run import simulate
 
 PRESS = ev.Press(indentation=0.3, steps=2)
-FORCES = ("applied_force", "normal_force", "tangential_force", "tangential_force_z", "electrostatic_force")
+SHEARS = ("tangential_force_x", "tangential_force_z")
+FORCES = ("applied_force", "normal_force", *SHEARS, "electrostatic_force")
 
 
 def balance(result):
@@ -33,7 +36,7 @@ def test_forces_and_energies_balance_and_friction_is_against_the_slide(slid):
     assert_allclose(slid.normal_force - slid.electrostatic_force, slid.applied_force, rtol=1e-7)
     assert balance(slid) < 1e-7
     assert slid.frames[-1].contact_status.max() == SLIP
-    shear = np.array([slid.tangential_force[-1], slid.tangential_force_z[-1]])
+    shear = np.array([slid[name][-1] for name in SHEARS])
     assert_allclose(np.hypot(*shear), 0.3 * slid.normal_force[-1], rtol=2e-3)
     assert_allclose(np.degrees(np.arctan2(*shear[::-1])), 30.0, atol=0.3)
     assert_allclose([slid.position[-1], slid["position_z"][-1]], 0.5 * np.array([np.cos(np.pi / 6), 0.5]))
@@ -60,11 +63,29 @@ def test_a_turned_slide_turns_its_forces(slid):
     """The dome is the same along x and z: at 60 degrees x and z change places."""
     turned = simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=60.0)))
     mirrored = simulate(dome_scene(PRESS, ev.Slide(0.5, steps=4, angle=150.0)))
-    pairs = {"tangential_force": "tangential_force_z", "tangential_force_z": "tangential_force"}
+    pairs = dict(zip(SHEARS, reversed(SHEARS), strict=True))
     for name in FORCES:
         assert_allclose(turned[name][2:], slid[pairs.get(name, name)][2:], rtol=2e-6)
-        sign = -1.0 if name == "tangential_force" else 1.0
+        sign = -1.0 if name == "tangential_force_x" else 1.0
         assert_allclose(mirrored[name][2:], sign * slid[name][2:], rtol=2e-6)
+
+
+@pytest.mark.parametrize("angle", [0.0, 45.0, 90.0, 180.0])
+def test_tangential_forces_are_along_the_slide_and_friction_is_drawn_so(angle):
+    """Coulomb's law in full slip, forth and back; before the first slide along +x, where nothing pulls."""
+    way = {"steps": 2, "hold": "force", "angle": angle}
+    motion = [ev.Press(force=0.1, steps=2), ev.Slide(0.5, **way), ev.Slide(-0.7, **way)]
+    result = simulate(dome_scene(*motion, law=None, voltage=0.0))
+    for name in ("applied_tangential_force", "tangential_force"):
+        assert_allclose(result[name][[1, 3, 5]], [0.0, 0.03, -0.03], atol=1e-4)
+        x, z = (result[f"{name}_{axis}"] for axis in "xz")
+        along = x * np.cos(np.radians(angle)) + z * np.sin(np.radians(angle))
+        assert_allclose(result[name][2:], along[2:], atol=1e-12)
+    over = "position" if angle % 180.0 == 0.0 else "position_z"
+    for there in ("step", over):
+        line = plotting.friction(result, over=there).lines[0]
+        assert_allclose(line.get_ydata()[[3, 5]], [0.3, -0.3], atol=1e-3)
+        assert_allclose(line.get_xdata(), result[there], atol=1e-15)
 
 
 def test_a_slide_back_and_forth_needs_no_work_but_friction_s(slid):
@@ -186,3 +207,37 @@ def test_a_hovering_fingertip_is_pulled_as_another_code_says():
     result = simulate(ev.Scene(finger, DISPLAY, law=ev.Kaczmarek(), voltage=2000.0, motion=hover))
     assert_allclose(1e3 * result.electrostatic_force, [1.672, 2.858], rtol=2e-3)
     assert_allclose(result.applied_force, -result.electrostatic_force, rtol=1e-6)
+
+
+@ev.form
+def neo_hookean(u, v, w):
+    """With mu = 0.02 and lambda = 0.1 MPa, for three dimensions alone."""
+    F = ev.grad(u) + np.eye(3)[:, :, None, None]
+    return 0.02 * ev.ddot(F, ev.grad(v)) + (0.1 * u.theta - 0.02) * v.theta
+
+
+class InSpace:
+    """The same law, of one's own in the split form, for three dimensions alone."""
+
+    volume_measure, shear_modulus, viscosity, density = "log", 0.02, None, 1e-9
+    _law = ev.NeoHookean(E=0.02 * (0.3 + 0.04) / 0.12, nu=0.1 / 0.24)
+
+    def __getattr__(self, name):
+        if name not in ("split_energy", "split_stress", "split_tangent", "split_sigma_zz"):
+            raise AttributeError(name)
+
+        def of(F, theta):
+            assert len(F) == 3
+            return getattr(self._law, name)(F, theta)
+
+        return of
+
+
+@pytest.mark.parametrize("law", [neo_hookean, InSpace()], ids=["form", "split law"])
+def test_a_material_of_ones_own_for_space_is_tried_there(law):
+    """The form of a neo-Hookean law has its forces."""
+    still = {"law": None, "voltage": 0.0}
+    wanted = simulate(dome_scene(PRESS, finger=Dome(law=InSpace._law), **still))
+    scene = dome_scene(PRESS, finger=Dome(law=law), **still)
+    assert "shear modulus 0.02 MPa" in str(ev.plan(scene))
+    assert_allclose(simulate(scene).normal_force, wanted.normal_force, rtol=1e-6)

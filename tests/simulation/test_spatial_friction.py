@@ -56,6 +56,7 @@ def test_a_hand_lags_behind_by_its_stretch():
     assert balance(result) < 1e-6
 
 
+@pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_a_resolved_drive_has_the_mean_of_its_cycle_and_closed_books():
     """A leaking gap under a square wave of 250 Hz, settled, beside the closed form of its mean."""
     drive = {"frequency": 250.0, "waveform": "square", "gap_conductivity": 1e-8}

@@ -105,12 +105,11 @@ def test_a_rigid_gap_under_a_sine_attracts_at_its_frequency_and_twice_that():
     """F ~ U^2: mean, line at f, line at 2 f as B^2 + A^2/2, 2 A B, A^2/2; with modulation as
     1 + m^2/2, 2 m, m^2/2.
     """
-    body = finger(block(8, 3, sag=0.4), E=0.1)
+    body = finger(block(8, 3, sag=0.4), E=2e3)  # next to rigid
 
     def lines(signal):
         motion = [ev.Hover(0.5), ev.Wait(0.04, steps=80)]
         scene = ev.Scene(body, ev.Display(), ev.StrongTroxel(), signal, motion)
-        assert not ev.plan(scene).has("tissue")
         found = ev.spectrum(ev.simulate(scene), "electrostatic_force")
         assert found.frequency[2] == pytest.approx(50.0)
         other = np.delete(found.amplitude, [0, 2, 4])

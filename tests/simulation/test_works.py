@@ -81,6 +81,7 @@ def left_over(result):
 
 
 @pytest.mark.parametrize("name", SCENES)
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_the_books_are_closed_in_every_row(name):
     result = simulate(SCENES[name])
     assert left_over(result).max() < 1e-6
@@ -108,6 +109,7 @@ def test_full_slip_dissipates_friction_times_way():
     np.testing.assert_allclose(grown, 0.1 * 0.1 * result.normal_force[-3:], rtol=1e-7)
 
 
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
     """Held by the bone in the air nothing gives or takes but backward Euler, and less with half
     the step.

@@ -225,6 +225,7 @@ def test_what_a_hand_lacks_beyond_its_rounding_is_nothing_at_the_nearest_place_a
             assert 0.0 < beyond < abs(grip.missing(x + way * 16.0 * np.spacing(x), reaction))
 
 
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_mass_that_moves_for_a_tenth_of_a_microsecond_is_balanced_to_its_rounding():
     """A kilonewton per millimetre at x = 1 mm: half a digit of it is 200 times the tolerance."""
     result = ev.simulate(slab(ev.Hand(K, 0.0, M), slid(1.0, 1), slid(1e-7, 1), mu=0.0))

@@ -301,6 +301,7 @@ def test_friction_on_the_way_is_counted(point):
     assert (slipped < 1.1 * LENGTH).all()
 
 
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_tissue_without_time_snaps_below_a_heavy_hand_that_stays_where_it_is(point):
     """The tip jumps to the next trough at once, as without a hand, and no other column has what that
     sets free; the bone goes on.

@@ -109,7 +109,7 @@ def test_split_form_is_the_full_form_where_theta_is_the_volume_change(law, shape
     np.testing.assert_allclose(law.split_sigma_zz(F, theta), P[2, 2] / J, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("law", [*BUILT_IN, split(ENERGY), split(STRESS)], **names)
+@pytest.mark.parametrize("law", [*BUILT_IN, split(ENERGY, 2), split(STRESS, 2)], **names)
 def test_split_derivatives_against_central_differences(law):
     F, theta = split_states()
     S, q = law.split_stress(F, theta)
@@ -182,7 +182,7 @@ def test_rest_is_free_of_stress_and_energy(law):
         Yeoh(c1=0.5 * 0.8 / 2.6, c2=0.7, c3=0.3, nu=0.3),  # 2 c1 = mu = E / (2 (1 + nu))
         Yeoh(c1=0.5 * 0.8 / 2.6, bulk=0.8 / 1.2),  # K = E / (3 (1 - 2 nu))
         Ogden(mu=2.0 * (0.8 / 2.6) / 3.5, alpha=3.5, nu=0.3),  # mu_1 alpha_1 / 2 = mu
-        split(NeoHookean(E=0.8, nu=0.3)),
+        split(NeoHookean(E=0.8, nu=0.3), 2),
     ],
     **names,
 )
@@ -226,7 +226,7 @@ def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
     )  # mu 1.3, lmbda 2.1
     F = deformations(2)
     theta = np.log(det(F))
-    law = split(user)
+    law = split(user, 2)
     S, q = law.split_stress(F, theta)
     np.testing.assert_allclose(
         S + q * transpose(inv(F)), built_in.P(embed(F))[:2, :2], rtol=1e-12, atol=1e-13
@@ -241,7 +241,7 @@ def test_wrapped_users_law_is_the_same_law_where_theta_is_ln_det_F(user):
 @pytest.mark.parametrize(("user", "digits"), [(STRESS, 1e-12), (ENERGY, 1e-9)])
 def test_wrapped_users_law_has_the_split_derivatives_written_by_hand(user, digits):
     F, theta = split_states()
-    hand, law = BarredNeoHookean(), split(user)
+    hand, law = BarredNeoHookean(), split(user, 2)
     np.testing.assert_allclose(
         law.split_energy(F, theta), hand.split_energy(F, theta), rtol=1e-10, atol=1e-12
     )
@@ -261,7 +261,7 @@ def test_energy_of_a_stress_only_law_survives_large_turns():
     s, c = np.sin(2.6), np.cos(2.6)
     F = np.array([[c, -s], [s, c]]) @ np.array([[1.5, 0.2], [0.0, 0.8]])
     theta = np.log(det(F))
-    energy = split(STRESS).split_energy(F, theta)
+    energy = split(STRESS, 2).split_energy(F, theta)
     assert energy == pytest.approx(ENERGY.psi(embed(F)), rel=1e-10)
 
 
@@ -272,24 +272,24 @@ def test_energy_of_a_stress_only_law_that_is_not_objective():
             return LinearElastic(E=1.0, nu=0.3).P(F)
 
     F = deformations(2)
-    energy = split(Hooke()).split_energy(F, np.log(det(F)))
+    energy = split(Hooke(), 2).split_energy(F, np.log(det(F)))
     np.testing.assert_allclose(energy, LinearElastic(E=1.0, nu=0.3).psi(embed(F)), rtol=1e-9, atol=1e-12)
 
 
 def test_wrapper_keeps_the_laws_own_rates_and_is_not_applied_twice():
-    law = split(ViscousEnergy(1.3, 2.1))
+    law = split(ViscousEnergy(1.3, 2.1), 2)
     assert isinstance(law, UserLaw)
     assert law.viscosity == 0.25
     assert law.density == 1e-9
-    assert split(law) is law
+    assert split(law, 2) is law
     for built_in in BUILT_IN:
-        assert split(built_in) is built_in
+        assert split(built_in, 2) is built_in
         assert isinstance(built_in, SplitLaw)
 
 
 def test_an_object_without_energy_or_stress_is_refused():
     with pytest.raises(InputError, match=r"P\(F\) or psi\(F\)"):
-        split(object())
+        split(object(), 2)
 
 
 @pytest.mark.parametrize("law", BUILT_IN, **names)

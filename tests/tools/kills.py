@@ -11,7 +11,8 @@ import numpy as np
 
 from evfem.common.storage import load_arrays
 from evfem.mesh import file as meshfile
-from evfem.simulation.result import CHECKPOINT_FORMAT, COLUMNS
+from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
+from evfem.simulation.result import COLUMNS
 from tools.commands import process_of
 from tools.meshes import block
 

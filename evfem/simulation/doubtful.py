@@ -1,0 +1,106 @@
+"""What a run shows that may make its numbers mean something else, a sentence each: `Result.warnings`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.contact.pad import surface_state
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene
+from evfem.simulation.history import Row
+from evfem.simulation.model import Model
+
+#: share of the energy of motions that take time that their finite steps may dissipate
+DISSIPATED = 0.05
+#: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
+#: centimetre (algometers), and the crests of its ridges carry twice the mean
+BORNE = 1.0
+
+
+#: penetration that is told, relative to the size of the finger
+SUNK = 1e-6
+
+
+def outside(model: Model) -> Ints:
+    """Nodes of the finger's boundary that no contact holds: all but those of `pad` that may touch."""
+    mesh, pad = model.mesh, model.pad
+    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    return np.setdiff1d(facets, pad.nodes[pad.free])
+
+
+def deepest(model: Model, nodes: Ints, u: Floats) -> Floats:
+    """How deep (mm) these nodes are inside the surface at most, and the number of the one that is: (2,)."""
+    gap = surface_state(model.surface, (model.mesh.points + u)[nodes]).gap
+    return np.array([-gap.min(), nodes[gap.argmin()]], dtype=float) if gap.size else np.zeros(2)
+
+
+def through(model: Model, sunk: Floats) -> Iterator[str]:
+    """A boundary outside `pad` that went through the surface; `sunk` is the `deepest` of a run."""
+    points = model.mesh.points
+    if sunk[0] > SUNK * float(np.ptp(points, axis=0).max()):
+        place = ", ".join(f"{x + 0.0:.4g}" for x in points[int(sunk[1])])
+        yield (
+            f"the boundary outside `pad` passed through the surface, by {sunk[0]:.3g} mm at ({place}) of the "
+            "undeformed mesh: nothing holds it there, and contact forces are too small; extend `pad`"
+        )
+
+
+def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
+    """A sentence for everything that the rows of a scene's run say of their own worth."""
+    return [*_missed(scene, rows), *_crushed(scene, rows), *_dissipated(scene, rows)] if rows else []
+
+
+def _column(rows: Sequence[Row], name: str) -> Floats:
+    return np.array([row[name] for row in rows], dtype=float)
+
+
+def _missed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """Slides that touch nothing, unless on the way to where the finger is pressed."""
+    for i, motion in enumerate(scene.motion):
+        forces = [row["normal_force"] for row in rows if row["motion_index"] == i]
+        later = any(isinstance(one, Press) for one in scene.motion[i:])
+        if isinstance(motion, Slide) and forces and not any(forces) and not later:
+            yield f"motion {i}, a slide, never touched"
+
+
+def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """An attraction that is larger than the load, or presses as no fingertip can be pressed."""
+    names = ("electrostatic_force", "applied_force", "normal_force", "peak_contact_pressure")
+    pull, load, normal, peak = (_column(rows, name) for name in names)
+    pull, unit = np.where(normal > 0.0, pull, 0.0), "N" if "contact_area" in rows[0] else "N/mm"
+    if not pull.any():
+        return
+    first, worst, most = int(np.argmax(pull)), int(np.argmax(np.where(pull > 0.0, peak, 0.0))), load.max()
+    if any(isinstance(motion, Press) for motion in scene.motion) and pull[first] > max(most, 0.0):
+        times = f"{pull[first] / most:.3g} times the load, " if most > 0.0 else "more than the load, "
+        yield (
+            f"the attraction, {pull[first]:.3g} {unit} in step {rows[first]['step']}, is {times}"
+            f"which is {most:.3g} {unit} at most"
+        )
+    if peak[worst] > BORNE:
+        yield (
+            f"the skin is pressed with up to {peak[worst]:.3g} MPa under its attraction "
+            f"(step {rows[worst]['step']}), and no fingertip bears {BORNE:g} MPa"
+        )
+
+
+def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
+    """Steps in time that dissipate by themselves."""
+    hand = scene.hand is not None and scene.hand.timed
+    if scene.solver.dynamics == "quasistatic" and not hand:
+        return
+    timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
+
+    def lost(name: str) -> float:
+        return float(np.abs(np.diff(_column(rows, name), prepend=0.0)[timed]).sum())
+
+    stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
+    energy = float(stored) + sum(lost(f"{name}_dissipation") for name in ("friction", "viscous", "snap"))
+    if (own := lost("integrator_dissipation")) > DISSIPATED * energy:
+        yield (
+            f"the steps in time dissipate {own / energy:.0%} of the energy that is stored or dissipated by "
+            "themselves (integrator_dissipation): take shorter ones"
+        )

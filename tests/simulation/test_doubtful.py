@@ -1,0 +1,90 @@
+"""`Result.warnings`: what a run shows that its numbers may not be worth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tools.builders import finger
+from tools.domes import dome_scene
+from tools.meshes import block
+
+import evfem as ev
+from evfem.simulation.checkpoint import Checkpoint
+
+BLOCK = block(8, 3, sag=0.1)
+
+
+def narrow(mesh, half):
+    """The mesh with no more of its pad than within `half` mm of the middle."""
+    pad = mesh.node_sets["pad"]
+    inner = pad[np.abs(mesh.points[pad, 0]) <= half + 1e-9]
+    return replace(mesh, node_sets={**mesh.node_sets, "pad": inner})
+
+
+def scene_2d(half):
+    return ev.Scene(finger(narrow(BLOCK, half)), ev.Flat(), motion=ev.Press(indentation=0.2, steps=2))
+
+
+def scene_3d(half):
+    whole = dome_scene(ev.Press(indentation=0.2, steps=2), law=None, voltage=0.0)
+    mesh = narrow(whole.finger.mesh(1), half)
+    own = ev.MeshedFinger(mesh, whole.finger.materials, electrical=whole.finger.electrical)
+    return replace(whole, finger=own)
+
+
+@pytest.mark.parametrize("scene", [scene_2d, scene_3d])
+def test_a_boundary_outside_the_pad_that_passes_the_glass_is_told_with_its_place(scene):
+    assert ev.simulate(scene(10.0)).warnings == []
+    result = ev.simulate(scene(0.5))
+    mesh, frame = result.mesh, result.frames[-1]
+    facets = mesh.outer_edges if mesh.dim == 2 else mesh.outer_faces
+    nodes = np.setdiff1d(facets, mesh.node_sets["pad"])
+    glass = mesh.points[mesh.node_sets["pad"], 1].min()
+    depth = glass - (mesh.points + frame.displacement)[nodes, 1]
+    place = ", ".join(f"{x + 0.0:.4g}" for x in mesh.points[nodes[depth.argmax()]])
+    (said,) = result.warnings
+    assert f"passed through the surface, by {depth.max():.3g} mm at ({place})" in said
+
+
+def test_a_resumed_run_knows_what_passed_before(tmp_path):
+    scene = replace(
+        scene_2d(0.5), motion=[ev.Press(indentation=0.2, steps=1), ev.Press(indentation=0.01, steps=1)]
+    )
+    kept = []
+
+    class Keeper:
+        def step(self, row, frame, checkpoint):
+            kept.append(checkpoint())
+
+    whole = ev.simulate(scene, observers=[Keeper()])
+    file = Checkpoint(tmp_path / "checkpoint.npz")
+    file.write(scene.digest(), kept[0], whole.rows[:1])
+    assert len(whole.warnings) == 1
+    assert ev.simulate(scene, resume=file.read(scene.digest())).warnings == whole.warnings
+
+
+def test_a_slide_that_touches_nothing_is_told():
+    """An attracted one, of which no plan knows how far it comes down."""
+    slide = [ev.Hover(gap=0.3), ev.Slide(distance=0.2, steps=1)]
+    up = replace(scene_2d(10.0), surface=ev.Display(), law=ev.Kaczmarek(), voltage=10.0, motion=slide)
+    assert ev.simulate(up).warnings == ["motion 1, a slide, never touched"]
+    assert ev.simulate(replace(up, motion=[*slide, ev.Press(indentation=0.05, steps=1)])).warnings == []
+
+
+def test_steps_in_time_that_dissipate_by_themselves_are_told():
+    """A hand let go swings; backward Euler of n steps a period damps each by exp(-2 pi^2 / n)."""
+
+    def told(steps):
+        hand = ev.Hand(stiffness=0.01, mass=1e-6)  # a period of 0.063 s
+        motion = [
+            ev.Press(indentation=0.01, steps=1),
+            ev.Slide(0.05, steps=1, speed=5e3),
+            ev.Wait(0.06, steps=steps),
+        ]
+        return ev.simulate(
+            replace(scene_2d(10.0), hand=hand, surface=ev.Flat(friction=0.0), motion=motion)
+        ).warnings
+
+    (said,) = told(20)
+    assert "dissipate" in said
+    assert told(2000) == []
