@@ -21,13 +21,12 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import sides_of_pad
-from evfem.mesh.faces import PLACES, shape_functions
+from evfem.contact.pad import OVERSHOT, sides_of_pad
+from evfem.mesh.faces import shape_functions
 from evfem.mesh.mesh import Mesh
 
-#: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
-ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}
-ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
+#: the faces between neighbouring nodes of a biquadratic one
+QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +85,54 @@ class Skin:
         unknown = 3 * self.faces[:, None, :] + np.array([0, 2])[:, None, None, None]
         return of.ravel(), np.broadcast_to(unknown, values.shape).ravel(), values.ravel()
 
-    def areas(self, position: Floats, touching: Any) -> tuple[float, float]:
-        """Gross and real contact area (mm2): that of the convex hull of the touching nodes' shares,
-        and the sum of all shares.
+    @property
+    def _quarters(self) -> Ints:
+        """Bilinear faces (4 K or K, 4) between neighbouring nodes."""
+        return self.faces if self.faces.shape[1] == 4 else self.faces[:, QUARTERS].reshape(-1, 4)
+
+    def _parts(self, position: Floats) -> tuple[Floats, Floats]:
+        """Projected areas (Q,) of the `_quarters`, 0 of those that face up, and how far apart their
+        nodes are (P,), the root of the mean area around a node.
         """
-        x, z = position[:, 0], position[:, 2]
-        real = float(self.tributary(position)[touching].sum())
+        corners = position[self._quarters][..., [0, 2]]
+        x, z = np.moveaxis(corners[:, 2:] - corners[:, :2], 2, 0)
+        area = np.maximum(0.5 * (x[:, 0] * z[:, 1] - x[:, 1] * z[:, 0]), 0.0)
+        return area, np.sqrt(self._around(area) / np.maximum(self._around(area > 0.0), 1.0))
+
+    def _around(self, values: Any) -> Floats:
+        """Sum of values of the `_quarters` (Q,) around every node (P,)."""
+        each = np.repeat(values, 4).astype(float)
+        return np.asarray(np.bincount(self._quarters.ravel(), each, self.nodes.size), dtype=float)
+
+    def spacing_at(self, position: Floats) -> Floats:
+        """How far the nodes are from their neighbours (P,) in mm, projected on the display."""
+        return self._parts(position)[1]
+
+    def areas(self, position: Floats, reach: Floats) -> tuple[float, float]:
+        """Gross and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,): that of the
+        convex hull of what touches, and of all that touches.
+
+        Every face between four nodes consists of four triangles around its middle; contact ends on a
+        line across those in which the linear reach changes its sign, less `OVERSHOT` of the spacing.
+        """
+        area, space = self._parts(position)
+        faces = self._quarters[area > 0.0]
+        values = np.stack([position[:, 0], position[:, 2], reach, space], axis=1)[faces]
+        middle = np.broadcast_to(values.mean(axis=1, keepdims=True), values.shape)
+        triangles = np.stack([values, np.roll(values, -1, axis=1), middle], axis=2).reshape(-1, 3, 4)
+        inside, line = _clipped(triangles)
+        border = np.linalg.norm(np.diff(line[..., :2], axis=1)[:, 0], axis=1)
+        covered, strip = np.zeros((2, area.size))
+        covered[area > 0.0] = inside.reshape(-1, 4).sum(axis=1)
+        strip[area > 0.0] = (border * line[..., 3].mean(axis=1)).reshape(-1, 4).sum(axis=1)
+        near = self._around(covered)[self._quarters].mean(axis=1)
+        cut = OVERSHOT * np.minimum(strip, near).sum()
+        real = float(covered.sum() - cut)
         if not real > 0.0:
             return 0.0, 0.0
-        m = self.faces.shape[1]
-        ends = [list(product(*(ENDS[m][float(t)] for t in place))) for place in PLACES[:m]]
-        value = np.stack([shape_functions(m, np.array(corners))[0] for corners in ends])
-        facing = (self.tributary(position) > 0.0) & touching
-        face, node = np.nonzero(facing[self.faces])
-        of_face = self.faces[face]
-        outline = np.stack([np.einsum("nqm,nm->nq", value[node], c[of_face]).ravel() for c in (x, z)], axis=1)
-        return max(_hull_area(outline), real), real
+        touches = triangles[triangles[..., 2] > 0.0]
+        hull, around = _hull(np.concatenate([touches, line[border > 0.0].reshape(-1, 4)])[:, :2])
+        return max(hull - around * float(cut / max(border.sum(), 1e-300)), real), real
 
     def spacing(self, points: Floats) -> float:
         """Median length (mm) of the faces' edges from corner to corner; points (P, 3)."""
@@ -116,18 +147,41 @@ class Skin:
         return first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]
 
 
-def _hull_area(points: Floats) -> float:
-    """Area of the convex hull of points (n, 2), by the monotone chain of their lower and upper
-    halves; 0 of points on a line. Source: A. M. Andrew, Inf. Process. Lett. 9 (1979) 216,
-    doi:10.1016/0020-0190(79)90072-3.
+def _clipped(triangles: Floats) -> tuple[Floats, Floats]:
+    """Area (T,) of the part of triangles (T, 3, c), at x and z in their first two values, in which the
+    third one is positive; and the ends (T, 2, c) of the line that bounds it, a point where none does.
+    """
+    positive = triangles[..., 2] > 0.0
+    count = positive.sum(axis=1)
+    odd = np.where(count == 1, positive.argmax(axis=1), positive.argmin(axis=1))
+    first, second, third = (
+        np.take_along_axis(triangles, ((odd + i) % 3)[:, None, None], axis=1)[:, 0] for i in range(3)
+    )
+    mixed = (count == 1) | (count == 2)
+    u, v = ((other - first)[:, :2] for other in (second, third))
+    whole = np.abs(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+    sides = np.stack([second, third], axis=1)
+    fall = np.where(mixed[:, None], first[:, None, 2] - sides[..., 2], 1.0)
+    way = np.where(mixed[:, None], first[:, None, 2] / fall, 0.0)
+    corner = way.prod(axis=1) * whole
+    line = first[:, None] + way[..., None] * (sides - first[:, None])
+    return np.where(count == 1, corner, np.where(count > 1, whole - corner, 0.0)), line
 
-    >>> round(_hull_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]])), 12)
-    2.0
+
+def _hull(points: Floats) -> tuple[float, float]:
+    """Area and circumference of the convex hull of points (n, 2), by the monotone chain of their lower
+    and upper halves; area 0 of points on a line. Source: A. M. Andrew, Inf. Process. Lett. 9 (1979)
+    216, doi:10.1016/0020-0190(79)90072-3.
+
+    >>> found = _hull(np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]]))
+    >>> tuple(round(size, 12) for size in found)
+    (2.0, 6.0)
     """
     places = points[np.lexsort(points.T[::-1])].tolist()
-    corners = _lower_half(places)[:-1] + _lower_half(places[::-1])[:-1]
-    x, z = np.array(corners or [[0.0, 0.0]]).T
-    return float(0.5 * (x @ np.roll(z, -1) - z @ np.roll(x, -1)))
+    corners = np.array((_lower_half(places)[:-1] + _lower_half(places[::-1])[:-1]) or [[0.0, 0.0]])
+    (x, z), following = corners.T, np.roll(corners, -1, axis=0)
+    area = 0.5 * float(x @ following[:, 1] - z @ following[:, 0])
+    return area, float(np.linalg.norm(following - corners, axis=1).sum())
 
 
 def _lower_half(places: list[list[float]]) -> list[list[float]]:
