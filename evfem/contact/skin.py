@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import OVERSHOT, sides_of_pad
+from evfem.contact.pad import OVERSHOT, sides_of_pad, widened
 from evfem.mesh.faces import shape_functions
 from evfem.mesh.mesh import Mesh
 
@@ -90,49 +90,61 @@ class Skin:
         """Bilinear faces (4 K or K, 4) between neighbouring nodes."""
         return self.faces if self.faces.shape[1] == 4 else self.faces[:, QUARTERS].reshape(-1, 4)
 
-    def _parts(self, position: Floats) -> tuple[Floats, Floats]:
-        """Projected areas (Q,) of the `_quarters`, 0 of those that face up, and how far apart their
-        nodes are (P,), the root of the mean area around a node.
-        """
-        corners = position[self._quarters][..., [0, 2]]
-        x, z = np.moveaxis(corners[:, 2:] - corners[:, :2], 2, 0)
-        area = np.maximum(0.5 * (x[:, 0] * z[:, 1] - x[:, 1] * z[:, 0]), 0.0)
-        return area, np.sqrt(self._around(area) / np.maximum(self._around(area > 0.0), 1.0))
+    @cached_property
+    def _rows(self) -> Ints:
+        """Nodes (3, R), each between two opposite neighbours of the four that it has."""
+        node, size = self._quarters, self.nodes.size
+        here, onward = (node * size + np.roll(node, -1, axis=1)).ravel(), np.roll(node, 1, axis=1).ravel()
+        order = np.argsort(here)
+        here, onward = here[order], onward[order]
 
-    def _around(self, values: Any) -> Floats:
-        """Sum of values of the `_quarters` (Q,) around every node (P,)."""
-        each = np.repeat(values, 4).astype(float)
-        return np.asarray(np.bincount(self._quarters.ravel(), each, self.nodes.size), dtype=float)
+        def turned(about: Ints, neighbour: Ints) -> Ints:
+            at = np.minimum(np.searchsorted(here, about * size + neighbour), here.size - 1)
+            return np.where(here[at] == about * size + neighbour, onward[at], -size)
+
+        about, first = here // size, here % size
+        opposite = turned(about, turned(about, first))
+        back = turned(about, turned(about, opposite))
+        found = (opposite >= 0) & (back == first) & (first < opposite)
+        return np.stack([first, about, opposite])[:, found]
 
     def spacing_at(self, position: Floats) -> Floats:
-        """How far the nodes are from their neighbours (P,) in mm, projected on the display."""
-        return self._parts(position)[1]
+        """How far the nodes are from their neighbours (P,) in mm, projected on the display: the shorter
+        way of the two, which crosses the ridges of a pad.
+        """
+        before, node, after = self._rows
+        flat, found = position[:, [0, 2]], np.full(self.nodes.size, self.spacing(position))
+        np.minimum.at(found, node, 0.5 * np.linalg.norm(flat[after] - flat[before], axis=1))
+        return found
 
     def areas(self, position: Floats, reach: Floats) -> tuple[float, float]:
         """Gross and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,): that of the
         convex hull of what touches, and of all that touches.
 
         Every face between four nodes consists of four triangles around its middle; contact ends on a
-        line across those in which the linear reach changes its sign, less `OVERSHOT` of the spacing.
+        line across those in which the linear reach changes its sign, less `OVERSHOT` of the nodes' distance
+        across that line, or of less where little touches around the face.
         """
-        area, space = self._parts(position)
-        faces = self._quarters[area > 0.0]
-        values = np.stack([position[:, 0], position[:, 2], reach, space], axis=1)[faces]
+        reach = widened(reach, self._rows)
+        corners = np.stack([position[:, 0], position[:, 2], reach], axis=1)[self._quarters]
+        down = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) > 0.0
+        values = corners[down]
         middle = np.broadcast_to(values.mean(axis=1, keepdims=True), values.shape)
-        triangles = np.stack([values, np.roll(values, -1, axis=1), middle], axis=2).reshape(-1, 3, 4)
+        triangles = np.stack([values, np.roll(values, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
         inside, line = _clipped(triangles)
-        border = np.linalg.norm(np.diff(line[..., :2], axis=1)[:, 0], axis=1)
-        covered, strip = np.zeros((2, area.size))
-        covered[area > 0.0] = inside.reshape(-1, 4).sum(axis=1)
-        strip[area > 0.0] = (border * line[..., 3].mean(axis=1)).reshape(-1, 4).sum(axis=1)
-        near = self._around(covered)[self._quarters].mean(axis=1)
-        cut = OVERSHOT * np.minimum(strip, near).sum()
-        real = float(covered.sum() - cut)
+        way = np.diff(line[..., :2], axis=1)
+        sides = np.stack([values[:, 1] - values[:, 0], values[:, 2] - values[:, 1]], axis=1)[..., :2]
+        sides += np.stack([values[:, 2] - values[:, 3], values[:, 3] - values[:, 0]], axis=1)[..., :2]
+        strip = 0.5 * np.linalg.norm(_cross(np.repeat(sides, 4, axis=0), way), axis=1)
+        faces, covered = self._quarters[down], inside.reshape(-1, 4).sum(axis=1)
+        near = np.bincount(faces.ravel(), np.repeat(covered, 4), self.nodes.size)[faces].mean(axis=1)
+        cut = OVERSHOT * float(np.minimum(strip.reshape(-1, 4).sum(axis=1), near).sum())
+        border, real = np.linalg.norm(way[:, 0], axis=1), float(inside.sum()) - cut
         if not real > 0.0:
             return 0.0, 0.0
         touches = triangles[triangles[..., 2] > 0.0]
-        hull, around = _hull(np.concatenate([touches, line[border > 0.0].reshape(-1, 4)])[:, :2])
-        return max(hull - around * float(cut / max(border.sum(), 1e-300)), real), real
+        hull, around = _hull(np.concatenate([touches, line[border > 0.0].reshape(-1, 3)])[:, :2])
+        return max(hull - around * (cut / max(border.sum(), 1e-300)), real), real
 
     def spacing(self, points: Floats) -> float:
         """Median length (mm) of the faces' edges from corner to corner; points (P, 3)."""
@@ -147,6 +159,11 @@ class Skin:
         return first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]
 
 
+def _cross(a: Floats, b: Floats) -> Floats:
+    """a x b (...) of vectors (..., c) by their first two components."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+
+
 def _clipped(triangles: Floats) -> tuple[Floats, Floats]:
     """Area (T,) of the part of triangles (T, 3, c), at x and z in their first two values, in which the
     third one is positive; and the ends (T, 2, c) of the line that bounds it, a point where none does.
@@ -158,8 +175,7 @@ def _clipped(triangles: Floats) -> tuple[Floats, Floats]:
         np.take_along_axis(triangles, ((odd + i) % 3)[:, None, None], axis=1)[:, 0] for i in range(3)
     )
     mixed = (count == 1) | (count == 2)
-    u, v = ((other - first)[:, :2] for other in (second, third))
-    whole = np.abs(0.5 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]))
+    whole = np.abs(0.5 * _cross(second - first, third - first))
     sides = np.stack([second, third], axis=1)
     fall = np.where(mixed[:, None], first[:, None, 2] - sides[..., 2], 1.0)
     way = np.where(mixed[:, None], first[:, None, 2] / fall, 0.0)

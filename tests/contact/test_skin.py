@@ -110,7 +110,7 @@ def test_areas_pass_continuously_where_a_node_begins_to_touch(m, alone):
     for tiny in (1e-9, -1e-9):
         reach[node] = tiny
         ends.append(skin.areas(points, reach)[1])
-    assert_allclose(*ends, atol=1e-7)
+    assert_allclose(*ends, atol=1e-4)  # the area below one node grows like the root of its reach
 
 
 def test_a_skin_has_the_pad_s_faces_and_says_where_there_are_none():
