@@ -48,8 +48,8 @@ WAY = (0.1, 0.25, LOAD)
 ASSUMPTIONS = {
     "pad": "Table 2's axes and moduli; 22.5 mm long (26 mm seen at 30 degrees); the bone's axes are assumed",
     "areas": (
-        "gross: mean of the convex hulls of the touching nodes and of their shares; its uncertainty is half "
-        "the difference, under `error`; ridge (and smooth pads): sum of the touching nodes' shares"
+        "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is larger "
+        "than the hull of the touching nodes; ridge (and smooth pads): all that touches"
     ),
     "press": "no friction, no voltage, rim held by the nail; one variant has friction 0.3",
     "hover": "rigid, local thickness of the stratum corneum; fingers of Table 1 as Fingertip.participant",
@@ -115,17 +115,16 @@ def press(finger: Any, loads: Sequence[float], friction: float = 0.0, steps: int
 
 
 def gross_area(result: ev.Result, frame: int) -> tuple[float, float]:
-    """Gross contact area (mm2), and how uncertain the nodes leave it: between the convex hull of the
-    touching nodes and that of their shares.
+    """Gross contact area (mm2), and how uncertain the nodes leave it: by how much it is larger than
+    the convex hull of the touching nodes.
     """
     from scipy.spatial import ConvexHull
 
     skin, shown = make_skin(result.mesh), result.frames[frame]
     position = (result.mesh.points + shown.displacement)[skin.nodes]
-    touching = shown.contact_status[skin.nodes] > 0
-    inner = float(ConvexHull(position[touching][:, ::2]).volume)
-    outer = skin.areas(position, touching)[0]
-    return 0.5 * (inner + outer), 0.5 * (outer - inner)
+    inner = float(ConvexHull(position[shown.contact_status[skin.nodes] > 0][:, ::2]).volume)
+    gross = float(result.contact_area[frame])
+    return gross, gross - inner
 
 
 def pressed(name: str, result: ev.Result, loads: Sequence[float]) -> dict[str, list[float]]:

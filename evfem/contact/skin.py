@@ -21,13 +21,12 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import sides_of_pad
-from evfem.mesh.faces import PLACES, shape_functions
+from evfem.contact.pad import OVERSHOT, sides_of_pad, widened
+from evfem.mesh.faces import shape_functions
 from evfem.mesh.mesh import Mesh
 
-#: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
-ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}
-ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
+#: the faces between neighbouring nodes of a biquadratic one
+QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,22 +85,66 @@ class Skin:
         unknown = 3 * self.faces[:, None, :] + np.array([0, 2])[:, None, None, None]
         return of.ravel(), np.broadcast_to(unknown, values.shape).ravel(), values.ravel()
 
-    def areas(self, position: Floats, touching: Any) -> tuple[float, float]:
-        """Gross and real contact area (mm2): that of the convex hull of the touching nodes' shares,
-        and the sum of all shares.
+    @property
+    def _quarters(self) -> Ints:
+        """Bilinear faces (4 K or K, 4) between neighbouring nodes."""
+        return self.faces if self.faces.shape[1] == 4 else self.faces[:, QUARTERS].reshape(-1, 4)
+
+    @cached_property
+    def _rows(self) -> Ints:
+        """Nodes (3, R), each between two opposite neighbours of the four that it has."""
+        node, size = self._quarters, self.nodes.size
+        here, onward = (node * size + np.roll(node, -1, axis=1)).ravel(), np.roll(node, 1, axis=1).ravel()
+        order = np.argsort(here)
+        here, onward = here[order], onward[order]
+
+        def turned(about: Ints, neighbour: Ints) -> Ints:
+            at = np.minimum(np.searchsorted(here, about * size + neighbour), here.size - 1)
+            return np.where(here[at] == about * size + neighbour, onward[at], -size)
+
+        about, first = here // size, here % size
+        opposite = turned(about, turned(about, first))
+        back = turned(about, turned(about, opposite))
+        found = (opposite >= 0) & (back == first) & (first < opposite)
+        return np.stack([first, about, opposite])[:, found]
+
+    def spacing_at(self, position: Floats) -> Floats:
+        """How far the nodes are from their neighbours (P,) in mm, projected on the display: the shorter
+        way of the two, which crosses the ridges of a pad.
         """
-        x, z = position[:, 0], position[:, 2]
-        real = float(self.tributary(position)[touching].sum())
+        before, node, after = self._rows
+        flat, found = position[:, [0, 2]], np.full(self.nodes.size, self.spacing(position))
+        np.minimum.at(found, node, 0.5 * np.linalg.norm(flat[after] - flat[before], axis=1))
+        return found
+
+    def areas(self, position: Floats, reach: Floats) -> tuple[float, float]:
+        """Gross and real contact area (mm2) of nodes at (P, 3) with this `reach` (P,): that of the
+        convex hull of what touches, and of all that touches.
+
+        Every face between four nodes consists of four triangles around its middle; contact ends on a
+        line across those in which the linear reach changes its sign, less `OVERSHOT` of the nodes' distance
+        across that line, or of less where little touches around the face.
+        """
+        reach = widened(reach, self._rows)
+        corners = np.stack([position[:, 0], position[:, 2], reach], axis=1)[self._quarters]
+        down = _cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) > 0.0
+        values = corners[down]
+        middle = np.broadcast_to(values.mean(axis=1, keepdims=True), values.shape)
+        triangles = np.stack([values, np.roll(values, -1, axis=1), middle], axis=2).reshape(-1, 3, 3)
+        inside, line = _clipped(triangles)
+        way = np.diff(line[..., :2], axis=1)
+        sides = np.stack([values[:, 1] - values[:, 0], values[:, 2] - values[:, 1]], axis=1)[..., :2]
+        sides += np.stack([values[:, 2] - values[:, 3], values[:, 3] - values[:, 0]], axis=1)[..., :2]
+        strip = 0.5 * np.linalg.norm(_cross(np.repeat(sides, 4, axis=0), way), axis=1)
+        faces, covered = self._quarters[down], inside.reshape(-1, 4).sum(axis=1)
+        near = np.bincount(faces.ravel(), np.repeat(covered, 4), self.nodes.size)[faces].mean(axis=1)
+        cut = OVERSHOT * float(np.minimum(strip.reshape(-1, 4).sum(axis=1), near).sum())
+        border, real = np.linalg.norm(way[:, 0], axis=1), float(inside.sum()) - cut
         if not real > 0.0:
             return 0.0, 0.0
-        m = self.faces.shape[1]
-        ends = [list(product(*(ENDS[m][float(t)] for t in place))) for place in PLACES[:m]]
-        value = np.stack([shape_functions(m, np.array(corners))[0] for corners in ends])
-        facing = (self.tributary(position) > 0.0) & touching
-        face, node = np.nonzero(facing[self.faces])
-        of_face = self.faces[face]
-        outline = np.stack([np.einsum("nqm,nm->nq", value[node], c[of_face]).ravel() for c in (x, z)], axis=1)
-        return max(_hull_area(outline), real), real
+        touches = triangles[triangles[..., 2] > 0.0]
+        hull, around = _hull(np.concatenate([touches, line[border > 0.0].reshape(-1, 3)])[:, :2])
+        return max(hull - around * (cut / max(border.sum(), 1e-300)), real), real
 
     def spacing(self, points: Floats) -> float:
         """Median length (mm) of the faces' edges from corner to corner; points (P, 3)."""
@@ -116,18 +159,45 @@ class Skin:
         return first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]
 
 
-def _hull_area(points: Floats) -> float:
-    """Area of the convex hull of points (n, 2), by the monotone chain of their lower and upper
-    halves; 0 of points on a line. Source: A. M. Andrew, Inf. Process. Lett. 9 (1979) 216,
-    doi:10.1016/0020-0190(79)90072-3.
+def _cross(a: Floats, b: Floats) -> Floats:
+    """a x b (...) of vectors (..., c) by their first two components."""
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
-    >>> round(_hull_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]])), 12)
-    2.0
+
+def _clipped(triangles: Floats) -> tuple[Floats, Floats]:
+    """Area (T,) of the part of triangles (T, 3, c), at x and z in their first two values, in which the
+    third one is positive; and the ends (T, 2, c) of the line that bounds it, a point where none does.
+    """
+    positive = triangles[..., 2] > 0.0
+    count = positive.sum(axis=1)
+    odd = np.where(count == 1, positive.argmax(axis=1), positive.argmin(axis=1))
+    first, second, third = (
+        np.take_along_axis(triangles, ((odd + i) % 3)[:, None, None], axis=1)[:, 0] for i in range(3)
+    )
+    mixed = (count == 1) | (count == 2)
+    whole = np.abs(0.5 * _cross(second - first, third - first))
+    sides = np.stack([second, third], axis=1)
+    fall = np.where(mixed[:, None], first[:, None, 2] - sides[..., 2], 1.0)
+    way = np.where(mixed[:, None], first[:, None, 2] / fall, 0.0)
+    corner = way.prod(axis=1) * whole
+    line = first[:, None] + way[..., None] * (sides - first[:, None])
+    return np.where(count == 1, corner, np.where(count > 1, whole - corner, 0.0)), line
+
+
+def _hull(points: Floats) -> tuple[float, float]:
+    """Area and circumference of the convex hull of points (n, 2), by the monotone chain of their lower
+    and upper halves; area 0 of points on a line. Source: A. M. Andrew, Inf. Process. Lett. 9 (1979)
+    216, doi:10.1016/0020-0190(79)90072-3.
+
+    >>> found = _hull(np.array([[0, 0], [2, 0], [2, 1], [0, 1], [1, 0.5], [1, 0.0]]))
+    >>> tuple(round(size, 12) for size in found)
+    (2.0, 6.0)
     """
     places = points[np.lexsort(points.T[::-1])].tolist()
-    corners = _lower_half(places)[:-1] + _lower_half(places[::-1])[:-1]
-    x, z = np.array(corners or [[0.0, 0.0]]).T
-    return float(0.5 * (x @ np.roll(z, -1) - z @ np.roll(x, -1)))
+    corners = np.array((_lower_half(places)[:-1] + _lower_half(places[::-1])[:-1]) or [[0.0, 0.0]])
+    (x, z), following = corners.T, np.roll(corners, -1, axis=0)
+    area = 0.5 * float(x @ following[:, 1] - z @ following[:, 0])
+    return area, float(np.linalg.norm(following - corners, axis=1).sum())
 
 
 def _lower_half(places: list[list[float]]) -> list[list[float]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.skin import ENDS, Skin, make_skin
+from evfem.contact.skin import Skin, make_skin
 from evfem.errors import InputError, quoted
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.colours import TISSUE
@@ -24,6 +24,10 @@ from evfem.plotting.finger import Near, checked_window, figure_height, label_bar
 from evfem.plotting.labels import field_label
 from evfem.plotting.outline import TRACTIONS
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
+
+#: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
+ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}
+ENDS[9] = {-1.0: (-1.0, -2 / 3), 0.0: (-2 / 3, 2 / 3), 1.0: (2 / 3, 1.0)}
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

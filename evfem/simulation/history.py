@@ -60,15 +60,11 @@ class History:
     tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x"))
     electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
-    contact_width: Floats = field(
-        metadata=column("mm", "from the first to the last touching node's share", "mm2")
-    )
-    real_contact_width: Floats = field(metadata=column("mm", "sum of the touching nodes' shares", "mm2"))
+    contact_width: Floats = field(metadata=column("mm", "from the first to the last edge of contact", "mm2"))
+    real_contact_width: Floats = field(metadata=column("mm", "sum of what touches, between edges", "mm2"))
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
-    mean_contact_pressure: Floats = field(
-        metadata=column("MPa", "pressing forces over the touching nodes' shares")
-    )
+    mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
     external_work: Floats = field(metadata=column("N", "done on the bone, and by forms of your own"))
     electrostatic_work: Floats = field(metadata=column("N", "done by the attraction"))
     stored_energy: Floats = field(metadata=column("N", "in the tissue, and in the springs of a penalty"))
@@ -131,8 +127,8 @@ SPATIAL: Mapping[str, tuple[str, str]] = {
     "applied_tangential_force_z": ("N", "along +z, on the bone"),
     "tangential_force_x": ("N", "sum of contact forces, against +x"),
     "tangential_force_z": ("N", "sum of contact forces, against +z"),
-    "contact_area": ("mm2", "of the convex hull of the touching nodes' shares"),
-    "real_contact_area": ("mm2", "sum of the touching nodes' shares"),
+    "contact_area": ("mm2", "of the convex hull of what touches"),
+    "real_contact_area": ("mm2", "of all that touches"),
 }
 #: columns that it leaves empty
 WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")

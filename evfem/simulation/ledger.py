@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.pad import Pad, surface_state
+from evfem.contact.pad import Pad, reach, surface_state
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.scene.motion import Slide
 from evfem.simulation.history import SUMS, WIDTHS
@@ -106,10 +106,13 @@ def _extent(model: Model, state: State, position: Floats, contact: Floats) -> tu
     """How much of the pad touches, in mm or mm2, and the columns that say so; in three dimensions
     those along z with them.
     """
+    pressure = state.contact_force[:, 0] / shares(model, position)
+    gap = surface_state(model.surface, position).normal_gap
+    at = reach(gap, pressure, model.pad.spacing_at(position), model.shear_modulus)
     if isinstance(model.pad, Pad):
-        width, real = model.pad.contact_widths(position[:, 0], state.touching)
+        width, real = model.pad.contact_widths(position, at)
         return real, {"contact_width": width, "real_contact_width": real}
-    area, real = model.pad.areas(position, state.touching)
+    area, real = model.pad.areas(position, at)
     return real, {
         **dict.fromkeys(WIDTHS, float("nan")),
         "position_z": float(state.bone[2]),

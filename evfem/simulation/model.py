@@ -5,6 +5,7 @@ equilibrium solver.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from evfem.solver.state import Limits
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
 from evfem.tissue.space import make_space
+from evfem.tissue.splitlaw import split
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import check_laws
 
@@ -54,6 +56,17 @@ class Model:
     equilibrium: Equilibrium
     first_gap: float
     core: Core | None = None
+
+    @cached_property
+    def shear_modulus(self) -> Floats:
+        """Shear modulus (P,) in MPa at rest of the tissue below the pad nodes, the mean of their cells."""
+        mesh, laws = self.mesh, self.scene.finger.materials
+        moduli = np.zeros(max(mesh.region_names.values()) + 1)
+        for name, number in mesh.region_names.items():
+            moduli[number] = split(laws[name], mesh.dim).shear_modulus
+        nodes, per_node = mesh.cells.ravel(), mesh.cells.shape[1]
+        found = np.bincount(nodes, np.repeat(moduli[mesh.region], per_node)) / np.bincount(nodes)
+        return np.asarray(found[self.pad.nodes])
 
     def bone(self, position: float, indentation: float, position_z: float = 0.0) -> Floats:
         """Translation of the bone (dim,) in mm."""

@@ -5,9 +5,9 @@ outlines.
 import numpy as np
 import pytest
 
-from evfem.contact.edge import contact_spans, outline_nodes
-from evfem.errors import InputError
+from evfem.contact.edge import outline_nodes
 from evfem.finger.fingerpad import FingerPad
+from studies.pressing import contact_spans
 
 
 def spans(x, gap):
@@ -62,8 +62,3 @@ def test_outline_runs_along_the_pad():
     middles = nodes[1::2]
     assert set(middles) <= set(mesh.cells[:, 4:].ravel())  # ends and middles alternate
     assert not set(nodes[0::2]) & set(mesh.cells[:, 4:].ravel())
-
-
-def test_arrays_of_other_lengths_are_refused():
-    with pytest.raises(InputError, match="one value per node"):
-        contact_spans(np.arange(3.0), np.zeros(2), np.zeros(3, dtype=bool))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tools.meshes import block
 
-from evfem.contact.pad import Pad, _near, fold, make_pad, surface_state
+from evfem.contact.pad import Pad, _near, fold, make_pad, reach, surface_state
 from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
@@ -87,30 +87,46 @@ def test_gradient_of_the_lengths_by_central_differences(edges):
     assert (x[pad.edges[:, 1]] < x[pad.edges[:, 0]]).any()
 
 
-def touching(*nodes, of):
-    return np.isin(np.arange(of), nodes)
+def widths(edges, x, reach):
+    return pad_of(edges).contact_widths(np.column_stack([x, 0.0 * x]), np.array(reach))
 
 
-def test_contact_widths_on_linear_edges():
-    pad, x = pad_of(CHAIN), np.array([0.0, 1.0, 2.0, 4.0])
-    assert pad.contact_widths(x, touching(of=4)) == (0.0, 0.0)
-    assert pad.contact_widths(x, touching(1, of=4)) == (1.0, 1.0)
-    assert pad.contact_widths(x, touching(1, 2, of=4)) == (2.5, 2.5)
-    # first and last node only: the open part between counts for the overall width alone
-    assert pad.contact_widths(x, touching(0, 3, of=4)) == (4.0, 1.5)
+def test_contact_ends_between_the_nodes():
+    x = np.array([0.0, 1.0, 2.0, 3.0])
+    assert widths(CHAIN, x, [-1.0, -1.0, -2.0, -1.0]) == (0.0, 0.0)
+    # whole to the pad's left end; half way to node 2, less a fourth of the distance
+    np.testing.assert_allclose(widths(CHAIN, x, [1.0, 1.0, -1.0, -1.0]), 1.25)
+    # a node alone: Hertz's half width where next to nothing presses it, (r / pi g)^(1/2) each way
+    np.testing.assert_allclose(
+        widths(CHAIN, x, [-3.0, 1e-3, -3.0, -1.0]), 2.0 * np.sqrt(1e-3 / (3.0 * np.pi)), rtol=0.01
+    )
+    # first and last node: the open part between counts for the overall width alone
+    np.testing.assert_allclose(widths(CHAIN, x, [1.0, -1.0, -1.0, 1.0]), (3.0, 0.75))
 
 
-def test_contact_widths_on_quadratic_edges():
-    pad, x = pad_of([[0, 1, 2], [1, 3, 4]]), np.array([0.0, 6.0, 3.0, 12.0, 9.0])
-    np.testing.assert_allclose(pad.contact_widths(x, touching(2, of=5)), (4.0, 4.0))
-    np.testing.assert_allclose(pad.contact_widths(x, touching(1, of=5)), (2.0, 2.0))
-    # middle nodes of both edges: from 1 to 11, less the 2 mm of the open node between
-    np.testing.assert_allclose(pad.contact_widths(x, touching(2, 4, of=5)), (10.0, 8.0))
+def test_contact_widths_on_quadratic_edges_see_every_node():
+    linear, quadratic = [[k, k + 1] for k in range(4)], [[0, 2, 1], [2, 4, 3]]
+    x, reach = np.arange(5.0), [-0.1, 0.3, 0.2, -0.4, -1.0]
+    np.testing.assert_allclose(widths(quadratic, x, reach), widths(linear, x, reach))
+
+
+@pytest.mark.parametrize("node", range(4))
+def test_widths_pass_continuously_where_a_node_begins_to_touch(node):
+    reach = np.array([-0.2, 0.5, 0.4, -0.3])
+    ends = []
+    for tiny in (1e-12, -1e-12):
+        reach[node] = tiny
+        ends.append(widths(CHAIN, np.array([0.0, 1.0, 2.1, 3.0]), reach)[1])
+    np.testing.assert_allclose(*ends, atol=1e-10)
+
+
+def test_reach_is_by_pressure_inside_and_by_the_gap_outside():
+    found = reach(np.array([0.0, 0.2, -1e-9]), np.array([0.5, 0.0, 0.0]), 0.1 * np.ones(3), 0.05 * np.ones(3))
+    np.testing.assert_allclose(found, [0.5, -0.2, 0.0])
 
 
 def test_a_touching_node_that_faces_up_has_no_width():
-    x = np.array([0.0, 1.0, 3.0, 2.5])
-    assert pad_of(CHAIN).contact_widths(x, touching(3, of=4)) == (0.0, 0.0)
+    assert widths(CHAIN, np.array([0.0, 1.0, 3.0, 2.5]), [-1.0, -1.0, -1.0, 1.0]) == (0.0, 0.0)
 
 
 def test_frame_on_a_flat_surface():

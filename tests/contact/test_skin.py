@@ -83,14 +83,34 @@ def test_several_places_at_once_are_each_place_alone():
 
 
 @pytest.mark.parametrize("m", FACES)
-def test_gross_area_is_the_hull_of_the_shares_and_real_area_their_sum(m):
-    skin, points = sheet(4, m, lambda p, q: (4.0 * p, 0.0 * p, 4.0 * q))
+def test_areas_end_between_the_nodes(m):
+    skin, points = sheet(10, m, lambda p, q: (4.0 * p, 0.0 * p, 4.0 * q))
     x, z = points[:, 0], points[:, 2]
-    assert_allclose(skin.areas(points, np.ones(x.size, bool)), (16.0, 16.0))
-    assert skin.areas(points, np.zeros(x.size, bool)) == (0.0, 0.0)
-    ends = (np.abs(x - 2.0) > 1.9) & (np.abs(z - 2.0) > 1.9)  # the four corners
-    share = 0.25 if m == 4 else 1.0 / 36.0
-    assert_allclose(skin.areas(points, ends), (16.0, 4 * share))
+    h = 0.4 if m == 4 else 0.2
+    assert_allclose(skin.areas(points, np.ones(x.size)), (16.0, 16.0))
+    assert skin.areas(points, -np.ones(x.size)) == (0.0, 0.0)
+    assert_allclose(skin.areas(points, 1.83 - x), 4.0 * (1.83 - h / 4), rtol=1e-4)
+    # a disc, less a fourth of a spacing around it; polygons between the nodes miss (h / r)^2 / 3 of it
+    disc = np.pi * (1.3 - h / 4) ** 2
+    assert_allclose(skin.areas(points, 1.3 - np.hypot(x - 2.03, z - 1.99)), disc, rtol=(h / 1.3) ** 2 / 3)
+    # two discs apart: the hull spans what is open between them
+    apart = np.minimum(np.hypot(x - 1.1, z - 2.0), np.hypot(x - 2.9, z - 2.0))
+    r = 0.8 - h / 4
+    expected = np.array([np.pi * r**2 + 1.8 * 2.0 * r, 2.0 * np.pi * r**2])
+    assert_allclose(skin.areas(points, 0.8 - apart), expected, rtol=(h / r) ** 2 / 3)
+
+
+@pytest.mark.parametrize("m", FACES)
+@pytest.mark.parametrize("alone", [False, True])
+def test_areas_pass_continuously_where_a_node_begins_to_touch(m, alone):
+    skin, points = sheet(6, m, bent)
+    reach = -0.5 - points[:, 0] if alone else 0.2 - np.hypot(points[:, 0] - 0.7, points[:, 2] - 1.0)
+    node = np.argmin(np.abs(reach))
+    ends = []
+    for tiny in (1e-9, -1e-9):
+        reach[node] = tiny
+        ends.append(skin.areas(points, reach)[1])
+    assert_allclose(*ends, atol=1e-4)  # the area below one node grows like the root of its reach
 
 
 def test_a_skin_has_the_pad_s_faces_and_says_where_there_are_none():

@@ -54,6 +54,25 @@ def test_hertz_line_contact(law, nu):
         assert error < 0.005 * hertz.peak_pressure
 
 
+@pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
+def test_hertz_width_between_the_nodes(element):
+    """The edge of contact at sixty loads, as its place between the nodes changes: to a tenth of their
+    distance (whole nodes alone leave half of it), and no load widens contact less than a third of Hertz.
+    """
+    E, nu, radius, spacing = 0.91, 0.48, 1e3, 1 / 8
+    cell = spacing * (2 if element == "q2p1" else 1)
+    x = both_sides(graded(1.5, cell, 60.0, 1.4))
+    mesh = contact_block(x, graded(0.3, cell, 60.0, 1.4), 1.5, parabola(radius), element == "q2p1")
+    largest = HertzLine.from_half_width(1.2, radius, plane_modulus(E, nu)).load
+    motion = (ev.Press(indentation=1e-5, steps=1), ev.Press(force=largest, steps=60))
+    result = press(mesh, ev.LinearElastic(E, nu), ev.Flat(friction=0.0), *motion, element=element)
+    hertz = [2.0 * HertzLine(load, radius, plane_modulus(E, nu)).half_width for load in result.applied_force]
+    np.testing.assert_allclose(result.contact_width[12:], hertz[12:], atol=2.0 * 0.1 * spacing)
+    np.testing.assert_allclose(result.contact_width, result.real_contact_width, rtol=1e-12)
+    growth = np.diff(result.contact_width[12:]) / np.diff(hertz[12:])
+    assert growth.min() > 1 / 3
+
+
 def test_bonded_layer_under_a_cylinder():
     """nu = 0.3, a = h: P'R/(E* a^2) = 1.221797, delta R/a^2 = 0.653997.
 

@@ -139,7 +139,7 @@ def test_the_closed_form_is_near_where_its_area_law_is_right(jump):
     # the air layer adds to the attraction, so that the force is somewhat too large, nowhere too small
     assert fidelity.error.min() > -1e-6 * 0.02
     assert 1e-4 < fidelity.relative_l2 < 0.03
-    assert fidelity.pearson > 0.999
+    assert fidelity.pearson > 0.998
     assert fidelity.largest_error == fidelity.error.max()
 
 

@@ -114,14 +114,15 @@ def parabola(radius, flat=np.inf):
     return lambda x: x**2 / (2.0 * radius) / np.sqrt(1.0 + (x / flat) ** 4)
 
 
-def contact_block(x, y, pad, lower=np.zeros_like):
-    """quad9 cells with corners on x, y (y from 0 up), the lower side moved up by lower(x).
+def contact_block(x, y, pad, lower=np.zeros_like, quadratic=True):
+    """quad9 (or quad) cells with corners on x, y (y from 0 up), the lower side moved up by lower(x).
 
     `pad`: nodes of the lower side in abs(x) <= pad; `bone`: the upper side.
     """
-    x, y = (np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])) for s in (x, y))
+    if quadratic:
+        x, y = (np.sort(np.concatenate([s, 0.5 * (s[1:] + s[:-1])])) for s in (x, y))
     across, up = np.meshgrid(x, y)
-    mesh = between(across, up + lower(across) * (1.0 - up / y[-1]), "quad9")
+    mesh = between(across, up + lower(across) * (1.0 - up / y[-1]), "quad9" if quadratic else "quad")
     return held(mesh, pad=np.flatnonzero(np.abs(x) <= pad + 1e-12))
 
 
