@@ -19,8 +19,8 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage listed tables",
+        {"numpy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        "arrays constants notices checks views pools digest storage listed tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},

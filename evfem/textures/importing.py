@@ -15,6 +15,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import above, real
+from evfem.common.pictures import read_grey
 from evfem.common.tables import read_columns
 from evfem.electrostatics import wav
 from evfem.errors import InputError
@@ -24,8 +25,8 @@ from evfem.textures.texture import QUANTITIES, Texture
 #: units of length -> mm
 LENGTHS = {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6, "m": 1e3}
 IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
-#: largest image in pixels and largest file in bytes
-MOST_PIXELS, MOST_BYTES = 40_000_000, 64_000_000
+#: largest image in pixels
+MOST_PIXELS = 40_000_000
 #: frequencies of a spectrum that is kept, and the highest in 1/mm
 MOST_LINES, HIGHEST_FREQUENCY = 400, 20.0
 
@@ -192,40 +193,26 @@ def from_image(
     """A line through a grey image (PNG, JPEG, TIFF, BMP), along its width: white lies `depth` (mm)
     above black, a pixel is `pixel` (mm) wide, `row` (0 top to 1 bottom) says where.
 
-    Colours are turned to grey; how deep something is cannot be read off a picture, and the
-    provenance says that `depth` was set.
+    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest
+    value are then black and white (`evfem.common.pictures`); colours are turned to grey, transparent
+    points are gaps. How deep something is cannot be read off a picture, and the provenance says that
+    `depth` was set.
     """
     above("pixel", pixel, 0.0, "a width in mm above zero")
     above("depth", depth, 0.0, "a height in mm above zero")
     real("row", row, "a place from 0 (top) to 1 (bottom)", lambda place: 0.0 <= place <= 1.0)
     path = Path(path)
-    grey = _grey(path)
+    allowed = f"an image ({', '.join(IMAGES)}) of up to {MOST_PIXELS} pixels, at least 4 wide"
+    grey, numbers = read_grey(path, "file", allowed, MOST_PIXELS, IMAGES)
+    if grey.shape[1] < 4:
+        raise InputError("file", f"{path}, {grey.shape[1]} x {grey.shape[0]} pixels", allowed)
     line = round(row * (grey.shape[0] - 1))
-    height = grey[line].astype(float) / 255.0 * depth
+    height = grey[line] * depth
     x, height, done = (cleaning or Cleaning())(np.arange(height.size) * pixel, height)
     notes = [
         f"Row {line + 1} of {grey.shape[0]}, {pixel:g} mm per pixel.",
+        numbers,
         f"Heights are grey values, white set {depth:g} mm above black: they were not measured.",
         *done,
     ]
     return source.texture(path, "image", (x, height), notes)
-
-
-def _grey(path: Path) -> Floats:
-    from PIL import Image
-
-    allowed = f"an image ({', '.join(IMAGES)}) of up to {MOST_PIXELS} pixels, at least 4 wide"
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError("file", f"{path}, which is too long", allowed)
-        with Image.open(path, formats=IMAGES) as image:
-            if image.width * image.height > MOST_PIXELS or image.width < 4:
-                raise InputError("file", f"{path}, {image.width} x {image.height} pixels", allowed)
-            return np.asarray(image.convert("L"))
-    except InputError:
-        raise
-    except OSError as error:
-        reason = error.strerror or "cut off or of another kind"
-        raise InputError("file", f"{path} ({reason})", allowed) from None
-    except Exception:  # whatever the many decoders raise for a damaged file
-        raise InputError("file", f"{path} (damaged)", allowed) from None

@@ -115,6 +115,45 @@ def test_grey_values_become_heights_of_the_depth_that_is_said(tmp_path):
     assert any("not measured" in note for note in texture.provenance)
 
 
+RAMP = np.array([[0.0, 0.25, 1.0, 0.5, 0.75, 0.0]])
+GREYS = {
+    "8.png": np.rint(255 * RAMP).astype(np.uint8),
+    "16.png": np.rint(65535 * RAMP).astype(np.uint16),
+    "16.tif": np.rint(65535 * RAMP).astype(np.uint16),
+    "big.tif": np.rint(65535 * RAMP).astype(">u2"),
+    "32.tif": np.rint(1e6 * RAMP - 3e5).astype(np.int32),
+    "float.tif": (3.0 * RAMP + 1.0).astype(np.float32),
+    "rgb.png": np.repeat(np.rint(255 * RAMP).astype(np.uint8)[..., None], 3, axis=2),
+}
+
+
+def raw(path, depth=0.1):
+    return from_image(path, SOURCE, pixel=0.1, depth=depth, cleaning=Cleaning(level="none"))
+
+
+@pytest.mark.parametrize("name", GREYS)
+def test_a_picture_has_all_its_greys_whatever_its_bits(tmp_path, name):
+    Image.fromarray(GREYS[name]).save(tmp_path / name)
+    texture = raw(tmp_path / name)
+    within = 1e-4 if GREYS[name].dtype.itemsize > 1 else 0.003
+    np.testing.assert_allclose(texture.values, 0.1 * RAMP[0], atol=0.1 * within)
+    assert any(note.startswith("Grey values") for note in texture.provenance)
+
+
+def test_a_faint_picture_of_16_bits_is_a_share_of_white_and_not_of_its_brightest_point(tmp_path):
+    Image.fromarray(np.array([[0, 4095, 0, 4095]], np.uint16)).save(tmp_path / "a.png")
+    assert raw(tmp_path / "a.png", 1.0).values.max() == pytest.approx(1.0 / 16.0, rel=1e-3)
+
+
+def test_where_a_picture_is_transparent_there_is_a_gap(tmp_path):
+    grey = np.array([[0, 200, 100, 150, 200]], np.uint8)
+    seen = np.array([[255, 0, 255, 255, 255]], np.uint8)
+    Image.merge("LA", [Image.fromarray(grey), Image.fromarray(seen)]).save(tmp_path / "a.png")
+    texture = raw(tmp_path / "a.png", 2.55)
+    assert texture.values.tolist() == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    assert "1 of 5 values missing, filled by straight lines." in texture.provenance
+
+
 @pytest.mark.parametrize("name", ["a.png", "a.wav", "a.csv"])
 def test_damaged_files_are_refused(tmp_path, name):
     path = tmp_path / name
