@@ -30,9 +30,9 @@ from evfem.tissue.splitlaw import nearly_incompressible, split
 #: soft, and in a mesh (MPa) of its softest material and of the others, at most: kPa make a factor of 1000
 TIMES_TABLE_2, TIMES_SOFT, SOFTEST, HARD = 1e4, 300.0, 10.0, 2e4
 DRIES = ("stratum_corneum", "nail")
-#: lengths (mm) of a mesh from end to end, at least, and of an insulator, at most; speed of a slide (mm/s), at
+#: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
 #: least, and rms slope of a profile, at most
-SMALLEST_MESH, THICKEST_INSULATOR, SLOWEST, STEEPEST = 3.0, 0.5, 0.2, 10.0
+SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.5, 0.2, 10.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
 #: field (V/um) that breaks any solid down
@@ -93,9 +93,9 @@ def _small(scene: Scene) -> Iterator[str]:
 
 def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Lengths and speeds as they are in cm, um, m/s."""
-    size = float(np.ptp(mesh.points, axis=0).max())
-    if size < SMALLEST_MESH:
-        yield f"the mesh is {size:.3g} mm from end to end, less than any finger: lengths are in mm, not cm"
+    size = float(np.ptp(mesh.points[:, :2], axis=0).max())
+    if size < SMALLEST:
+        yield f"the mesh is {size:.3g} mm across, less than any finger: lengths are in mm, not in cm"
     insulator = scene.electrics.insulator if scene.law is not None else None
     if insulator is not None and np.max(insulator.thickness) > THICKEST_INSULATOR:
         thick = (

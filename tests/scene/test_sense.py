@@ -70,8 +70,8 @@ def test_a_mesh_in_centimetres_is_doubted():
     for scale, doubted in ((0.1, True), (0.5, False)):
         small = replace(mesh, points=scale * mesh.points)
         asked = ev.Scene(ev.MeshedFinger(small, soft, SKIN), ev.Flat(), motion=PRESS)
-        found = [one for one in plan(asked).warnings if "not cm" in one]
-        assert [one[:28] for one in found] == ["the mesh is 1.67 mm from end"] * doubted
+        found = [one for one in plan(asked).warnings if "not in cm" in one]
+        assert [one[:26] for one in found] == ["the mesh is 1.67 mm across"] * doubted
 
 
 def test_an_insulator_in_micrometres_is_doubted():
