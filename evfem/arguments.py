@@ -227,7 +227,11 @@ def _import_options(command: argparse.ArgumentParser) -> None:
     _about_texture(command)
     command.add_argument("--licence", required=True, help="what others may do with it")
     command.add_argument("--note", help="where it is from, a sentence")
-    command.add_argument("--unit", help="of lengths: mm, um, nm or m; default: mm, or what a scan names")
+    command.add_argument("--unit", help="of lengths: mm, um, nm or m; default: mm, or what the file names")
+    command.add_argument(
+        "--quantity", help="what a recording holds: acceleration, velocity, displacement, ..."
+    )
+    command.add_argument("--channel", help="which channel of a WAV, from 1, or column of a csv file")
     command.add_argument("--level", help="none, mean, line or parabola; default: line")
     options = {
         "start": (None, "MM", "where to begin"),
@@ -237,6 +241,7 @@ def _import_options(command: argparse.ArgumentParser) -> None:
         "pixel": (None, "MM", "width of a pixel of an image"),
         "depth": (None, "MM", "how deep black lies below white in an image"),
         "speed": (None, "MM/S", "at which something slid while it was recorded"),
+        "longest": (None, "MM", "longest wave of a recording; default: 10"),
     }
     _numbers(command, options)
 

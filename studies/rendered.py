@@ -11,8 +11,6 @@ import time
 import warnings
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from evfem.common.arrays import Floats
 from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.encoding import AreaLaw, Encoding
@@ -223,7 +221,7 @@ def _replayed(kind: str, case: Case, reference: Recording, friction: float, sign
 
 def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:
     fidelity, felt = compare(reference.result, found.result), apparent_friction(found.result)
-    slide = np.array(found.result.motion) == "slide"
+    slide = found.result.motion == "slide"
     return Rendered(
         felt.tangential_force[1:],
         felt.normal_force[1:],

@@ -19,8 +19,8 @@ TESTS = Path(__file__).parent
 #: rooms from the ground up: the packages from outside that they may import, and their files in order
 ROOMS = {
     "common": (
-        {"numpy", "tqdm", "threadpoolctl", "pandas", "distributed"},
-        "arrays constants notices checks views pools digest storage listed tables",
+        {"numpy", "scipy", "PIL", "tqdm", "threadpoolctl", "pandas", "distributed"},
+        "arrays constants notices checks views pools digest storage listed tables pictures",
     ),
     "mesh": (
         {"numpy", "scipy", "meshio"},
@@ -58,7 +58,7 @@ ROOMS = {
         "core drift partchecks parts sense fieldchoice timescales spatial way plan",
     ),
     "simulation": (
-        {"numpy", "scipy", "threadpoolctl"},
+        {"numpy", "scipy"},
         "provenance history result spectrum model doubtful works ledger checkpoint failure run rendering",
     ),
     "sweeps": (
@@ -67,7 +67,7 @@ ROOMS = {
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
-        {"numpy", "scipy", "PIL", "SurfaceTopography", "threadpoolctl"},
+        {"numpy", "scipy", "PIL", "SurfaceTopography"},
         "texture generate library cleaning importing scans parametric touch pressed sliding correction "
         "estimators database estimate feeling commands",
     ),

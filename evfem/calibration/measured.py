@@ -23,6 +23,7 @@ from evfem.common.checks import set_frozen
 from evfem.common.tables import numbers, read_table
 from evfem.errors import InputError, quoted, unknown
 from evfem.scene.keys import shown
+from evfem.scene.options import Solver
 from evfem.scene.scene import DEPTH
 from evfem.simulation.history import SPATIAL, over_depth
 from evfem.simulation.result import COLUMNS, Result
@@ -32,6 +33,8 @@ from evfem.sweeps.run import output
 NUMBERS = tuple(name for name in (*COLUMNS, *SPATIAL) if name != "motion")
 #: most measured numbers of one kind
 MOST = 100_000
+#: error of a solved column relative to its largest value, in tolerances of the solver
+SOLVED = 10.0
 
 
 @dataclass(frozen=True)
@@ -88,9 +91,10 @@ class Run:
 class MeasuredCurve:
     """A column of the history measured along another one in one run.
 
-    `values` (N,) of `column` where `over` is `at` (N,); `motion` is the number of the motion (None:
-    the whole run, in which `over` must grow or fall throughout). `where`: keys of the scene that
-    this measurement sets, `sd` the standard deviation of a value, one for all or (N,).
+    `values` (N,) of `column` where `over` is `at` (N,), growing or falling throughout: loading and
+    unloading are a curve each; `motion` is the number of the motion (None: the whole run, in which
+    `over` must grow or fall throughout, too). `where`: keys of the scene that this measurement sets,
+    `sd` the standard deviation of a value, one for all or (N,).
 
     >>> force = MeasuredCurve("normal_force", over="indentation", at=[0.2, 0.4], values=[0.01, 0.03])
     >>> force.names
@@ -113,6 +117,12 @@ class MeasuredCurve:
         set_frozen(self, **_measured(self.values, self.sd, len(self.at), "as many values as places"))
         if len(np.unique(self.at)) < len(self.at):
             raise InputError("data.at", "the same place twice", "each place once; the mean of its values")
+        turn = np.flatnonzero(np.diff(np.sign(np.diff(self.at))))
+        if turn.size:
+            first, there, after = self.at[turn[0] : turn[0] + 3]
+            given = f"{self.over} {first:g}, {there:g}, then {after:g} (number {turn[0] + 3})"
+            allowed = "growing or falling places: loading and unloading are a curve each, with its `motion`"
+            raise InputError("data.at", given, f"{allowed}; places that scatter, sorted")
         if self.motion is not None and (type(self.motion) is not int or self.motion < 0):
             raise InputError("data.motion", quoted(self.motion), "the number of a motion, from 0, or None")
         set_frozen(self, where={key: _setting(key, value) for key, value in self.where.items()})
@@ -228,8 +238,9 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
     all.
 
     The state before the motion is the last one of the motion before; before the first motion, if
-    that is a press without voltage, it is zero. Raises InputError where `over` turns round, and
-    for places beyond it.
+    that is a press without voltage, it is zero. A solved column is known to `SOLVED` tolerances of
+    the solver: a place that much beyond its end is at the end, and less is no advance. Raises
+    InputError where `over` turns round, and for places beyond it.
     """
     from scipy.interpolate import PchipInterpolator
 
@@ -242,13 +253,19 @@ def along(result: Result, column: str, over: str, at: Floats, motion: int | None
         x, y = np.concatenate([[0.0], x]), np.concatenate([[0.0], y])
     if len(x) > 1 and x[-1] < x[0]:
         x, y = x[::-1], y[::-1]
-    if len(x) < 2 or not (np.diff(x) > 0.0).all():
+    slack = 0.0 if over == "time" else SOLVED * _tolerance(result) * float(np.abs(x).max())
+    if len(x) < 2 or not (np.diff(x) > slack).all():
         which = "the run" if motion is None else f"motion {motion}"
         raise InputError("data.over", f"{over}, which does not advance in {which}", "one that does")
-    if at.min() < x[0] or at.max() > x[-1]:
+    if at.min() < x[0] - slack or at.max() > x[-1] + slack:
         given = f"{over} from {at.min():g} to {at.max():g}"
         raise InputError("data.at", given, f"places within those of the run, {x[0]:g} to {x[-1]:g}")
-    return PchipInterpolator(x, y)(at)
+    return PchipInterpolator(x, y)(np.clip(at, x[0], x[-1]))
+
+
+def _tolerance(result: Result) -> float:
+    """The solver's, of the run."""
+    return float(result.provenance.get("solver", {}).get("tolerance", Solver.tolerance))
 
 
 def _measured(values: Any, sd: Any, count: int, allowed: str) -> dict[str, Floats | None]:

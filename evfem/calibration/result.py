@@ -14,7 +14,7 @@ import tomli_w
 from evfem.calibration.parameters import Parameter
 from evfem.common.arrays import Floats
 from evfem.common.checks import real
-from evfem.common.storage import write_text
+from evfem.common.storage import check_ending, write_text
 from evfem.common.tables import frame
 from evfem.common.views import table
 from evfem.errors import InputError, quoted
@@ -135,8 +135,9 @@ class FitResult:
 
     def save(self, path: str | Path) -> None:
         """Write everything to one JSON file, in one step. Raises StorageError when the disk
-        refuses.
+        refuses, and InputError for the ending of another format.
         """
+        check_ending(path, ".json")
         content: dict[str, Any] = {"format": FORMAT}
         content |= {name: getattr(self, name) for name in PLAIN}
         content |= {name: _listed(getattr(self, name)) for name in ARRAYS}

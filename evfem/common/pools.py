@@ -91,9 +91,20 @@ class Worker:
         return self._process.exitcode
 
 
+def blas_limits(threads: int | None = 1) -> threadpool_limits:
+    """The limit of every BLAS to so many threads, from now on or of a block.
+
+    A limit holds for what is loaded, and scipy has another BLAS than numpy: one that comes later has
+    all cores, and its idle threads spin. MKL has its own limit, `Pardiso` sets it.
+    """
+    import scipy.linalg  # noqa: F401
+
+    return threadpool_limits(limits=threads)
+
+
 def _begin(function: Callable[..., None], line: Connection, *arguments: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threadpool_limits(1)
+    blas_limits()
     threading.Thread(target=_end_with_parent, daemon=True).start()
     function(line, *arguments)
 

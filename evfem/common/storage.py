@@ -24,6 +24,8 @@ from evfem.errors import InputError, StorageError
 
 #: largest archive that is read, in bytes, and the most arrays in it
 LARGEST_ARCHIVE, MOST_ARRAYS = 4 * 2**30, 10_000
+#: endings that say what is in a file
+FORMATS = (".csv", ".json", ".mat", ".msh", ".npy", ".npz", ".pdf", ".png", ".pvd", ".toml", ".txt", ".vtu")
 
 
 @contextmanager
@@ -52,6 +54,19 @@ def replacing(path: str | Path) -> Iterator[Path]:
     except BaseException:  # Ctrl-C too leaves nothing behind
         _remove(temporary)
         raise
+
+
+def check_ending(path: str | Path, own: str, instead: str = "") -> None:
+    """InputError for a path whose ending is that of another format than `own`; `instead` says what
+    writes that.
+
+    >>> check_ending("a.csv", ".npz", "to_csv writes that")
+    Traceback (most recent call last):
+    evfem.errors.InputError: path: given a.csv; allowed: a name that ends in .npz: to_csv writes that
+    """
+    ending = Path(path).suffix.lower()
+    if ending in FORMATS and ending != own:
+        raise InputError("path", str(path), f"a name that ends in {own}{f': {instead}' if instead else ''}")
 
 
 def write_text(path: str | Path, text: str) -> None:

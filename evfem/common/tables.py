@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from array import array
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -146,6 +148,95 @@ def read_table(path: Path, key: str) -> dict[str, Any]:
     return {
         name: _words_or_numbers(column) for name, column in zip(names, zip(*body, strict=True), strict=True)
     }
+
+
+@dataclass(frozen=True, eq=False)
+class Headed:
+    """Columns of numbers, NaN where one is missing, with the names and units of their header: small
+    letters, and None where no unit is said. `commas`: whether numbers had decimal commas.
+    """
+
+    names: list[str]
+    units: list[str | None]
+    columns: list[Floats]
+    commas: bool
+
+
+#: name and unit in a header: x [mm], x (mm), x/mm, "x, mm", x_mm
+NAMED = re.compile(r"(.+?)\s*(?:\[(.*)\]|\((.*)\)|[/,]\s*([^/,]+)|_([µμunm]?m|[mu]?s))?")
+
+
+def read_headed(path: Path, key: str) -> Headed:
+    """Columns of a text file as instruments write it: below a header, with commas, semicolons, tabs or
+    blanks between them, units beside the names or in a line of their own, UTF-8 or Latin-1.
+
+    What stands above the header is left out. Raises `InputError` with `key` for anything else.
+    """
+    allowed = "a text file with columns of numbers below a header"
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(key, f"{path} ({error.strerror or error})", allowed) from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    lines = [(n, line.strip(" \r")) for n, line in enumerate(text.split("\n"), 1) if line.strip()]
+    first = next((i for i, (_, line) in enumerate(lines) if _numeric(_cells(line, _separator(line)))), None)
+    if not first or "\0" in text:
+        raise InputError(key, f"{path}, which starts with {text[:40]!r}", allowed)
+    separator = _separator(lines[first][1])
+    above = [_cells(line, separator) for _, line in lines[:first]]
+    width = len(_cells(lines[first][1], separator))
+    if len(above[-1]) != width or len(lines) - first > MOST_ROWS:
+        given = f"{path}, {len(lines) - first} rows of {width} columns below {','.join(above[-1])[:60]!r}"
+        raise InputError(key, given, f"{allowed}, at most {MOST_ROWS}, with a name for each column")
+    values = []
+    for number, line in lines[first:]:
+        row = _cells(line, separator)
+        if len(row) != width or not _numeric(row, gaps=True):
+            raise InputError(key, f"{path}, line {number}: {line[:60]!r}", f"{width} numbers on each line")
+        values.append([_real(cell) for cell in row])
+    parts = [_named(cell) for cell in above[-1]]
+    if len(above) > 1 and len(above[-2]) == width and all(_is_unit(cell) for cell in above[-1]):
+        parts = [(name.lower(), unit.strip("[]()")) for name, unit in zip(*above[-2:], strict=True)]
+    commas = separator != "," and any("," in line for _, line in lines[first:])
+    return Headed([name for name, _ in parts], [unit for _, unit in parts], list(np.array(values).T), commas)
+
+
+def _separator(line: str) -> str | None:
+    return next((one for one in "\t;," if one in line), None)
+
+
+def _cells(line: str, separator: str | None) -> list[str]:
+    if separator is None:
+        return re.sub(r"\s+(?=[\[(])", "", line).split()
+    (cells,) = csv.reader([line], delimiter=separator)
+    return [cell.strip() for cell in cells]
+
+
+def _numeric(cells: list[str], gaps: bool = False) -> bool:
+    try:
+        return all(gaps or math.isfinite(value) for value in map(_real, cells)) and (gaps or len(cells) > 1)
+    except ValueError:
+        return False
+
+
+def _real(cell: str) -> float:
+    value = float(cell.replace(",", ".") or "nan")
+    if math.isinf(value):
+        raise ValueError(cell)
+    return value
+
+
+def _named(cell: str) -> tuple[str, str | None]:
+    found = NAMED.fullmatch(cell)
+    name, *units = found.groups() if found else (cell, None)
+    return name.lower(), next((unit.strip() for unit in units if unit), None)
+
+
+def _is_unit(cell: str) -> bool:
+    return re.fullmatch(r"[\[(]?([cµμunm]?m|[mu]?s|m?N|g|m/s\^?2|1/mm|1|-|)[\])]?", cell) is not None
 
 
 def _words_or_numbers(words: Iterable[str]) -> Any:

@@ -41,8 +41,11 @@ def _part(name: bytes, content: bytes) -> bytes:
     return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
 
 
-def read(path: Path, key: str, allowed: str = "a WAV with one channel") -> tuple[int, Any, dict[str, Any]]:
-    """Rate (Hz), samples as they are stored, and what evfem's comment says, {} without one.
+def read(
+    path: Path, key: str, allowed: str = "a WAV with one channel", *, several: bool = False
+) -> tuple[int, Any, dict[str, Any]]:
+    """Rate (Hz), samples as they are stored, and what evfem's comment says, {} without one; of
+    `several` channels, if they are wanted, a column each.
 
     Raises InputError for a file that is missing, too long, cut off or of another kind.
     """
@@ -62,7 +65,7 @@ def read(path: Path, key: str, allowed: str = "a WAV with one channel") -> tuple
             rate, samples = wavfile.read(io.BytesIO(data))
     except Exception:  # whatever scipy raises for a damaged file
         raise InputError(key, f"{path}, cut off or of another kind", allowed) from None
-    if samples.ndim != 1 or samples.size == 0 or rate <= 0:
+    if samples.ndim > 1 + several or samples.size == 0 or rate <= 0:
         raise InputError(key, f"{path}, with several channels or no samples", allowed)
     return int(rate), samples, _comment(data)
 

@@ -28,6 +28,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import set_frozen
+from evfem.common.pictures import read_grey
 from evfem.common.tables import numbers, read_columns
 from evfem.errors import InputError
 from evfem.finger.outline import Ridges, quintic
@@ -130,15 +131,17 @@ def faded(depth: Floats, share: Floats) -> Floats:
     return np.asarray(depth * fade[..., 0] * fade[..., 1])
 
 
-def read(path: Path, pixel: float, height: float) -> HeightMap:
+def read(path: Path, pixel: float, height: float, dark: str | None = None) -> HeightMap:
     """The print in a csv file (header x,z,height: every pair of some x and z, in mm), or in a grey
-    image with `pixel` mm from point to point, black `height` mm below white.
+    image with `pixel` mm from point to point, whose darkest and brightest points are `height` mm apart.
 
-    An image shows the pad from below, tip up, its middle at x = z = 0. Raises `InputError`.
+    An image shows the pad from below, tip up, its middle at x = z = 0; `dark` says what is dark in
+    it, "ridges" (ink, optical scanners) or "grooves" (a map of heights), which nothing in a picture
+    does. Raises `InputError`.
     """
     if path.suffix.lower() == ".csv":
         return _from_rows(*read_columns(path, ["x", "z", "height"], "finger.ridges"))
-    return _from_image(path, pixel, height)
+    return _from_image(path, pixel, height, dark)
 
 
 def _from_rows(x: Floats, z: Floats, height: Floats) -> HeightMap:
@@ -151,20 +154,15 @@ def _from_rows(x: Floats, z: Floats, height: Floats) -> HeightMap:
     return HeightMap(xs, zs, height[order].reshape(len(zs), len(xs)))
 
 
-def _from_image(path: Path, pixel: float, height: float) -> HeightMap:
-    from PIL import Image, UnidentifiedImageError
-
+def _from_image(path: Path, pixel: float, height: float, dark: str | None) -> HeightMap:
     allowed = f"a grey image of at most {MOST} points, or a csv file with the header x,z,height"
-    try:
-        with Image.open(path) as image:
-            if image.width * image.height > MOST or min(image.size) < 2:
-                raise InputError("finger.ridges", f"{path} with {image.width} x {image.height}", allowed)
-            grey = np.asarray(image.convert("F"), dtype=float)
-    except (OSError, UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise InputError("finger.ridges", str(path), allowed) from error
-    span = float(np.ptp(grey))
-    if span == 0.0:
-        raise InputError("finger.ridges", f"{path} of one grey", allowed)
+    grey, _ = read_grey(path, "finger.ridges", allowed, MOST)
+    if min(grey.shape) < 2 or not np.isfinite(grey).all() or not np.ptp(grey) > 0.0:
+        raise InputError("finger.ridges", f"{path} of one grey, one row or with transparent points", allowed)
+    if dark is None:
+        allowed = "ridges | grooves: what is dark in a picture of a print; scanners and ink show ridges dark"
+        raise InputError("finger.ridge_dark", f"nothing for {path}", allowed)
+    share = (grey[::-1] - grey.min()) / np.ptp(grey)
     rows, columns = grey.shape
     x, z = (pixel * (np.arange(n) - 0.5 * (n - 1)) for n in (columns, rows))
-    return HeightMap(x, z, height * (grey[::-1] - grey.min()) / span)
+    return HeightMap(x, z, height * (1.0 - share if dark == "ridges" else share))

@@ -108,9 +108,10 @@ class Fingertip:
     **Ridges.** False or "none"; "along" (True: those of the cross-section, whose crests run along the
     finger), "across", "whorl", "loop" or "arch" (`evfem.finger.fingerprint`), with the profile of
     `FingerPad`. Or a measured print: a `HeightMap`, the path of a csv file with the header x,z,height in mm,
-    or of a grey image whose points are `ridge_pixel` mm apart, white `ridge_height` above black, seen from
-    below with the tip up; `ridge_width` then says how finely the pad is divided. Ridges fade out towards the
-    edges of the rectangle that is 0.64 of the pad's axes.
+    or of a grey image whose points are `ridge_pixel` mm apart, seen from below with the tip up, in which
+    `ridge_dark` ("ridges", as scanners and ink show them, or "grooves") is black, and white `ridge_height`
+    from it; `ridge_width` then says how finely the pad is divided. Ridges fade out towards
+    the edges of the rectangle that is 0.64 of the pad's axes.
 
     **Layers and materials** are those of `FingerPad` (one table), without nail and nail bed.
 
@@ -162,6 +163,9 @@ class Fingertip:
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
+    ridge_dark: Annotated[
+        str | None, one_of("ridges", "grooves"), "what is dark in a grey image, which must be said"
+    ] = None
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
@@ -296,7 +300,7 @@ def _ridges(tip: Fingertip) -> str | HeightMap:
     if isinstance(given, str) and given in ("none", *PATTERNS):
         return given
     if isinstance(given, str | os.PathLike) and _is_file(os.fspath(given)):
-        return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height)
+        return fingerprint.read(Path(given), tip.ridge_pixel, tip.ridge_height, tip.ridge_dark)
     raise InputError("finger.ridges", quoted(given), _RIDGES)
 
 

@@ -65,8 +65,8 @@ def abscissa(result: Result) -> str:
 
 def _changes(values: Floats) -> bool:
     """Whether every step goes on in the same direction."""
-    steps = np.diff(values)
-    return steps.size > 0 and bool(np.all(steps > 0.0) or np.all(steps < 0.0))
+    steps, least = np.diff(values), ZERO * float(np.abs(values).max(initial=0.0))
+    return steps.size > 0 and bool(np.all(steps > least) or np.all(steps < -least))
 
 
 def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:

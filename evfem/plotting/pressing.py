@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from evfem.errors import InputError
-from evfem.plotting.curves import Results, along, checked_over, finish, named, styled, units_of
+from evfem.plotting.curves import ZERO, Results, along, checked_over, finish, named, styled, units_of
 from evfem.plotting.figures import Panels, axes_or_new, new_panels
 from evfem.plotting.labels import axis_label, column_label, values_of
 from evfem.simulation.result import Result
@@ -61,7 +61,7 @@ def friction(results: Results, over: str | None = None, ax: Axes | None = None) 
     ax = axes_or_new(ax)
     for (name, result), colour, style in styled(found):
         load = along(result, "applied_force", over)
-        rows = load > 0.0
+        rows = load > ZERO * float(np.abs(load).max(initial=0.0))
         ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
         ax.plot(along(result, over, over)[rows], ratio, style, color=colour, label=name)
     finish(ax, first, over, "apparent friction coefficient")
@@ -88,7 +88,7 @@ def signal(results: Results, over: str | None = None) -> Panels:
 
 
 def _presses(result: Result) -> np.ndarray:
-    rows = np.flatnonzero(np.array(result.motion) == "press")
+    rows = np.flatnonzero(result.motion == "press")
     if not rows.size:
         raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")
     return rows

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from evfem.contact.surfaces import Profile
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
@@ -25,9 +26,13 @@ from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.splitlaw import nearly_incompressible, split
 
-#: shear modulus over that of Table 2 in a `FingerPad`, and in a mesh (MPa) of its softest material and of
-#: the others, at most
-TIMES_TABLE_2, SOFTEST, HARD = 1e4, 1e3, 2e4
+#: shear modulus over that of Table 2 in a `FingerPad`, of what is hard when it is dry and of what is always
+#: soft, and in a mesh (MPa) of its softest material and of the others, at most: kPa make a factor of 1000
+TIMES_TABLE_2, TIMES_SOFT, SOFTEST, HARD = 1e4, 300.0, 10.0, 2e4
+DRIES = ("stratum_corneum", "nail")
+#: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
+#: least, and rms slope of a profile, at most
+SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.5, 0.2, 10.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
 #: field (V/um) that breaks any solid down
@@ -46,7 +51,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
     shear moduli (MPa) of the materials.
     """
-    lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())))
+    lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_unbearable(scene), *_hovering(scene, mesh))
 
 
@@ -68,10 +73,11 @@ def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:
     for name, modulus in moduli.items():
         most = SOFTEST if name == softest else HARD
         if name in TABLE_2 and not isinstance(scene.finger, MeshedFinger):
-            most = TIMES_TABLE_2 * NeoHookean(*TABLE_2[name]).mu
+            times = TIMES_TABLE_2 if name in DRIES else TIMES_SOFT
+            most = times * NeoHookean(*TABLE_2[name]).mu
         if modulus > most:
             much = f"the shear modulus of {name}, {modulus:.3g} MPa, is beyond that of any tissue"
-            yield f"{much}: moduli are in MPa, not in Pa"
+            yield f"{much}: moduli are in MPa, not in Pa or kPa"
 
 
 def _small(scene: Scene) -> Iterator[str]:
@@ -83,6 +89,28 @@ def _small(scene: Scene) -> Iterator[str]:
     # a mesh may have most of a half space beside a small contact
     if width is not None and 0.0 < travel < LEAST_TRAVEL * width:
         yield f"a finger of {width:g} mm is moved by {travel:g} mm at most: lengths are in mm, not in m"
+
+
+def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
+    """Lengths and speeds as they are in cm, um, m/s."""
+    size = float(np.ptp(mesh.points[:, :2], axis=0).max())
+    if size < SMALLEST:
+        yield f"the mesh is {size:.3g} mm across, less than any finger: lengths are in mm, not in cm"
+    insulator = scene.electrics.insulator if scene.law is not None else None
+    if insulator is not None and np.max(insulator.thickness) > THICKEST_INSULATOR:
+        thick = (
+            f"an insulator of {float(np.max(insulator.thickness)):g} mm is thicker than that of any display"
+        )
+        yield f"{thick}: lengths are in mm, 1 um is 0.001"
+    for i, motion in enumerate(scene.motion):
+        speed = motion.speed if isinstance(motion, Slide) else None
+        if speed is not None and speed <= SLOWEST:
+            slow = f"motion {i} slides at {speed:g} mm/s, slower than any finger explores"
+            yield f"{slow}: speeds are in mm/s, not in m/s"
+    if isinstance(scene.ground, Profile):
+        slope = np.diff(scene.ground.samples) / np.diff(scene.ground.x)
+        if (rms := float(np.sqrt(np.mean(slope**2)))) > STEEPEST:
+            yield f"the profile has an rms slope of {rms:.3g}: positions and heights are both in mm"
 
 
 def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats, Ints
+from evfem.common.arrays import Floats, Ints, Words
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text, frame
 from evfem.errors import readable, unknown
@@ -24,6 +24,8 @@ from evfem.errors import readable, unknown
 Row = Mapping[str, Any]
 #: a drift of the load that is worth a word
 DRIFT = 0.05
+#: solved lengths (mm) and forces (N/mm, N) that differ by less are the same
+SAME = 1e-9
 #: unit per mm of depth -> unit over a depth
 WHOLE = {"N/mm": "N", "N": "mJ"}
 #: columns from which a run goes on
@@ -49,7 +51,7 @@ class History:
 
     step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
     motion_index: Ints = field(metadata=column("", "number of the motion, from 0"))
-    motion: list[str] = field(metadata=column("", "kind of the motion"))
+    motion: Words = field(metadata=column("", "kind of the motion"))
     time: Floats = field(metadata=column("s", "at the end of the step"))
     position: Floats = field(metadata=column("mm", "x of the bone"))
     indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
@@ -169,8 +171,8 @@ def load_drift(rows: Sequence[Row]) -> float:
     largest, pressed = 0.0, None
     for row in rows:
         if row["motion"] in ("press", "hover"):
-            pressed = row if row["motion"] == "press" and row["applied_force"] > 0.0 else None
-        elif pressed is not None and row["indentation"] == pressed["indentation"]:
+            pressed = row if row["motion"] == "press" and row["applied_force"] > SAME else None
+        elif pressed is not None and abs(row["indentation"] - pressed["indentation"]) <= SAME:
             largest = max(largest, abs(row["applied_force"] / pressed["applied_force"] - 1.0))
     return largest
 
@@ -225,5 +227,5 @@ def _plain_value(name: str, value: Any) -> str | int | float:
 def column_of(name: str, values: list[Any]) -> Any:
     """A column from its values in the rows."""
     if name == "motion":
-        return [str(value) for value in values]
+        return np.array(values, dtype=str)
     return np.array(values, dtype=np.int64 if name in INTEGERS else np.float64)

@@ -63,5 +63,5 @@ def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str,
             "cells": len(mesh.cells),
             "kind": mesh.kind,
         },
-        "solver": dict(solver),
+        "solver": {"tolerance": scene.solver.tolerance, **solver},
     }

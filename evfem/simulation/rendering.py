@@ -23,6 +23,7 @@ from evfem.errors import InputError
 from evfem.protocols import ForceLaw, Observer, Surface
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
+from evfem.simulation.history import SAME
 from evfem.simulation.result import Frame, Result, Row
 from evfem.simulation.run import simulate
 from evfem.tensor import Array
@@ -103,7 +104,7 @@ class ApparentFriction:
 
     def minimum(self, after: float) -> float:
         """Smallest apparent friction from the position `after` (mm) on."""
-        there = self.position >= after
+        there = self.position >= after - SAME
         if not there.any():
             raise InputError("after", after, f"a position up to {self.position[-1]:g} mm")
         return float(self.friction[there].min())
@@ -125,7 +126,7 @@ def apparent_friction(result: Result) -> ApparentFriction:
 
 
 def _slide_rows(result: Result) -> Array:
-    rows = np.flatnonzero(np.array(result.motion) == "slide")
+    rows = np.flatnonzero(result.motion == "slide")
     if rows.size == 0 or np.any(np.diff(rows) != 1):
         raise InputError("slide", f"{rows.size} rows of slides", "one slide, or several in a row")
     return rows

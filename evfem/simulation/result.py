@@ -18,7 +18,7 @@ import numpy as np
 
 import evfem
 from evfem.common.arrays import Floats, Ints
-from evfem.common.storage import load_arrays, save_arrays
+from evfem.common.storage import check_ending, load_arrays, save_arrays
 from evfem.common.views import curves, plus, table
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.archive import mesh_arrays, mesh_of
@@ -305,8 +305,9 @@ class Result(History):
 
     def save(self, path: str | Path) -> None:
         """Write everything to one .npz file, in one step. Raises StorageError when the disk
-        refuses.
+        refuses, and InputError for the ending of another format.
         """
+        check_ending(path, ".npz", "to_csv writes the history, export.paraview the fields")
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
         arrays |= {f"history/{name}": np.array(self[name]) for name in self.columns}
         for spec in fields(Frame):
@@ -357,7 +358,7 @@ def _checked_column(name: str, column: np.ndarray) -> Any:
     kinds = "U" if name == "motion" else "iu" if name in INTEGERS else "f"
     if column.ndim != 1 or (column.size and column.dtype.kind not in kinds):
         raise ValueError(f"column {name}")
-    return [str(kind) for kind in column] if name == "motion" else column
+    return column.astype(str) if name == "motion" else column
 
 
 def _json(value: Any) -> Any:

@@ -11,11 +11,11 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from evfem.common import notices
 from evfem.common.constants import SMALLEST_FORCE
 from evfem.common.notices import LOG
+from evfem.common.pools import blas_limits
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
@@ -95,11 +95,9 @@ def simulate(
         from evfem.scene.file import scene_at
 
         scene = scene_at(scene)
-    import scipy.linalg  # noqa: F401  (its BLAS is another one than numpy's, limited only once it is loaded)
-
     # small dense solves lose more by sharing than they gain, and idle threads of the BLAS spin: the
     # scene's threads are those of the factorisation
-    with threadpool_limits(limits=1), notices.shown(progress):
+    with blas_limits(), notices.shown(progress):
         return _simulate(scene, progress, observers, resume)
 
 
@@ -115,7 +113,7 @@ def _simulate(scene: Scene, progress: bool, observers: Sequence[Observer], resum
         _tell(observers, "started", run.model.mesh, scene, total)
         bar.leave = True
         # the dense compliance of a skin in three dimensions has thousands of rows, which pay for threads
-        with threadpool_limits(limits=scene.solver.threads if run.model.mesh.dim == 3 else None):
+        with blas_limits(scene.solver.threads if run.model.mesh.dim == 3 else None):
             for request in run.requests():
                 frame = run.advance(request)
                 reasons = _tell(observers, "step", run.rows[-1], frame, run.checkpoint)

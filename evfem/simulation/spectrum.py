@@ -26,6 +26,8 @@ from evfem.simulation.result import Result
 WINDOWS = ("none", "hann")
 #: largest difference of two steps, as a share of a step
 EVEN = 1e-6
+#: times that differ by less, as a share of the last one, are the same
+ROUNDING = 1e-12
 
 
 class Spectrum(NamedTuple):
@@ -86,8 +88,9 @@ def _rows(result: Result, start: float | None, stop: float | None) -> tuple[Any,
     """Which rows are used, and the time of the row before them."""
     if not len(result.step):
         raise InputError("result", "no steps", "a result with steps in time")
-    first = result.motion_index == result.motion_index[-1] if start is None else result.time > start
-    used = first & (result.time <= (np.inf if stop is None else stop))
+    slack = ROUNDING * float(result.time[-1])
+    first = result.motion_index == result.motion_index[-1] if start is None else result.time > start + slack
+    used = first & (result.time <= (np.inf if stop is None else stop + slack))
     earlier = result.time[: int(np.argmax(used))] if used.any() else result.time
     return used, float(earlier[-1]) if earlier.size else 0.0
 

@@ -19,10 +19,17 @@ from evfem.errors import InputError
 from evfem.scene.file import dump
 from evfem.studio.state import State, rows
 from evfem.textures.cleaning import Cleaning
-from evfem.textures.commands import ENDINGS
 from evfem.textures.estimate import estimate
 from evfem.textures.feeling import Device, Rendering, playback, render, render_exact
-from evfem.textures.importing import Source, friction_profile, from_csv, from_image, from_recording
+from evfem.textures.importing import (
+    LONGEST_WAVE,
+    Source,
+    friction_profile,
+    from_csv,
+    from_image,
+    from_recording,
+    kind_of,
+)
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture
 from evfem.textures.touch import FrictionCurve, touch_scene
@@ -161,7 +168,8 @@ def file(state: State, kind: str) -> bytes:
 def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
     """The texture in an uploaded file, as the page keeps it; read by the importers.
 
-    `options`: licence, and as they are needed pixel, depth, speed, row, unit, smooth, mean, rms.
+    `options`: licence, and as they are needed pixel, depth, speed, quantity, longest, channel, row,
+    unit, smooth, mean, rms.
     """
     safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ")[-80:] or "file"
     source = Source(options.get("licence", ""), Path(safe).stem[:80] or "file")
@@ -173,18 +181,23 @@ def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
 
 def _imported(path: Path, source: Source, options: dict[str, str]) -> Texture:
     cleaning = Cleaning(smooth=_number(options, "smooth"))
-    ending = path.suffix.lower()
-    row = _number(options, "row", 0.5)
-    if ending == ".wav":
-        spectrum = from_recording(path, source, _number(options, "speed") or 0.0)
+    how, row, unit = kind_of(path), _number(options, "row", 0.5), options.get("unit") or None
+    if how == "recording":
+        spectrum = from_recording(
+            path,
+            source,
+            _number(options, "speed") or 0.0,
+            quantity=options.get("quantity") or None,
+            longest=_number(options, "longest", LONGEST_WAVE) or 0.0,
+            channel=options.get("channel") or None,
+        )
         mean, rms = _number(options, "mean") or 0.4, _number(options, "rms") or 0.02
         return friction_profile(spectrum, mean, rms, length=20.0)
-    if ending in ENDINGS:
+    if how == "image":
         sizes = {key: _number(options, key) or 0.0 for key in ("pixel", "depth")}
         return from_image(path, source, **sizes, row=row or 0.0, cleaning=cleaning)
-    unit = options.get("unit") or None
-    if ending == ".csv":
-        return from_csv(path, source, cleaning, unit or "mm")
+    if how == "csv":
+        return from_csv(path, source, cleaning, unit)
     return from_scan(path, source, row=row or 0.0, unit=unit, cleaning=cleaning)
 
 

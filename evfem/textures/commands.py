@@ -19,7 +19,7 @@ from evfem.textures.cleaning import Cleaning
 from evfem.textures.estimate import estimate, known_error
 from evfem.textures.feeling import Device, exact_voltage, playback, render
 from evfem.textures.generate import Knobs, make
-from evfem.textures.importing import Source, from_csv, from_image, from_recording
+from evfem.textures.importing import LONGEST_WAVE, Source, from_csv, from_image, from_recording, kind_of
 from evfem.textures.library import REFERENCES, about, find, names, reference
 from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture, is_data, write
@@ -28,11 +28,10 @@ from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_tex
 #: what each way of importing takes beside name, licence and note
 OPTIONS = {
     "csv": ("unit", "level", "start", "stop", "smooth"),
-    "recording": ("speed",),
+    "recording": ("speed", "quantity", "longest", "channel"),
     "image": ("pixel", "depth", "row", "level", "start", "stop", "smooth"),
     "scan": ("row", "unit", "level", "start", "stop", "smooth"),
 }
-ENDINGS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
 
 
 def run(given: argparse.Namespace) -> None:
@@ -82,7 +81,7 @@ def _make(given: argparse.Namespace) -> None:
 
 
 def _import(given: argparse.Namespace) -> None:
-    how = _how(given.file)
+    how = kind_of(given.file)
     for name in sorted({option for options in OPTIONS.values() for option in options} - set(OPTIONS[how])):
         if getattr(given, name) is not None:
             allowed = ", ".join(f"--{option}" for option in OPTIONS[how])
@@ -91,31 +90,24 @@ def _import(given: argparse.Namespace) -> None:
     cleaning = Cleaning(given.start, given.stop, given.level or "line", given.smooth)
     row = 0.5 if given.row is None else given.row
     if how == "csv":
-        texture = from_csv(given.file, source, cleaning, given.unit or "mm")
+        texture = from_csv(given.file, source, cleaning, given.unit)
     elif how == "recording":
-        texture = from_recording(given.file, source, _needed("speed", given.speed, "mm/s"))
+        texture = from_recording(
+            given.file,
+            source,
+            _needed("speed", given.speed, "mm/s"),
+            quantity=given.quantity,
+            longest=LONGEST_WAVE if given.longest is None else given.longest,
+            channel=given.channel,
+        )
     elif how == "image":
         pixel, depth = (_needed(name, getattr(given, name), "mm") for name in ("pixel", "depth"))
         texture = from_image(given.file, source, pixel=pixel, depth=depth, row=row, cleaning=cleaning)
     else:
         texture = from_scan(given.file, source, row=row, unit=given.unit, cleaning=cleaning)
     _written(texture, given.out)
-
-
-def _how(path: Path) -> str:
-    """What a file is taken for: by its ending, a csv file by its header."""
-    ending = path.suffix.lower()
-    if ending in ENDINGS:
-        return "image"
-    if ending not in (".csv", ".wav"):
-        return "scan"
-    if ending == ".csv":
-        try:
-            first = path.open(encoding="utf-8-sig").readline(200)
-        except (OSError, UnicodeDecodeError):
-            first = ""  # whoever reads it says what is wrong
-        return "recording" if first.replace(" ", "").strip() == "time,acceleration" else "csv"
-    return "recording"
+    for note in texture.provenance:
+        print(f"- {note}")
 
 
 def _needed(name: str, value: float | None, unit: str) -> float:

@@ -18,10 +18,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import choice
+from evfem.common.pools import blas_limits
 from evfem.errors import InputError
 from evfem.textures.correction import corrected
 from evfem.textures.database import Database, reference_curves, shipped
@@ -197,7 +197,7 @@ def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, flo
     steps = int(np.ceil(period * steps_over(touch.length) / touch.length))
     x = np.linspace(-BESIDE, period - BESIDE, steps, endpoint=False)
     pad = shipped_pad(touch.ridged).at(touch.load, touch.friction)
-    with threadpool_limits(limits=1):  # small dense solves lose more by sharing
+    with blas_limits():  # small dense solves lose more by sharing
         return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
 
 

@@ -13,7 +13,7 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import real
 from evfem.errors import InputError
 from evfem.textures.cleaning import Cleaning
-from evfem.textures.importing import LENGTHS, Source
+from evfem.textures.importing import LENGTHS, Source, from_csv, kind_of
 from evfem.textures.texture import Texture
 
 #: largest file in bytes, and most points of a scan
@@ -32,10 +32,13 @@ def from_scan(
     which line. `unit` (mm, um, nm, m) is that of files that do not name theirs; heights of .x3p
     files are in metres (ISO 25178-72).
 
-    Raises InputError without SurfaceTopography and for a file that it cannot read.
+    A text with a profile in columns is read as `from_csv` does, which knows a unit of each. Raises
+    InputError without SurfaceTopography and for a file that it cannot read.
     """
     path = Path(path)
     real("row", row, "a place from 0 (first) to 1 (last)", lambda place: 0.0 <= place <= 1.0)
+    if kind_of(path) == "csv":
+        return from_csv(path, source, cleaning, unit)
     if find_spec("SurfaceTopography") is None:
         raise InputError("file", str(path), 'the extra scans: pip install "evfem[scans]"')
     x, height, notes = _line(_topography(path), row, unit, path)

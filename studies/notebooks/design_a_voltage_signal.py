@@ -83,7 +83,7 @@ for name, found in comparisons.items():
 # the force, and the signal keeps the value it had.
 
 # %%
-slides = np.array(real.result.motion) == "slide"
+slides = real.result.motion == "slide"
 x = real.result.position[slides]
 figure, (top, middle, bottom) = plt.subplots(3, 1, sharex=True, figsize=(7, 6.5), layout="constrained")
 top.plot(x, real.result.applied_tangential_force[slides], color="#555555", linewidth=4, label="real surface")

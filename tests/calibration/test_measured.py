@@ -1,5 +1,7 @@
 """Measurements: what is read of a run at measured places, csv files, refused input."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tools.builders import finger
@@ -45,6 +47,25 @@ def test_places_beyond_the_run_are_refused(result):
         along(result, "normal_force", "indentation", np.array([0.1]))
     with pytest.raises(InputError, match="indentation, which does not advance in motion 1"):
         along(result, "normal_force", "indentation", np.array([0.1]), motion=1)
+
+
+def test_the_commanded_load_is_within_a_run_that_solves_for_it():
+    """Closed form of nothing: the run's own last row, which the solver left short of the load."""
+    run = simulate(Scene(finger(block()), Flat(friction=0.3), motion=Press(force=0.05, steps=4)))
+    reached = run.applied_force[-1]
+    for load in (0.05, reached * (1.0 - 5e-9), reached * (1.0 + 5e-9)):
+        depth = along(run, "indentation", "applied_force", np.array([load]), motion=0)
+        assert depth[0] == pytest.approx(run.indentation[-1], rel=1e-7)
+    with pytest.raises(InputError, match="within those of the run"):
+        along(run, "indentation", "applied_force", np.array([0.05 * (1.0 + 1e-5)]), motion=0)
+
+
+def test_a_load_that_changes_by_rounding_does_not_advance():
+    motion = [Press(force=0.05, steps=2), Slide(distance=0.2, steps=2, hold="force")]
+    run = simulate(Scene(finger(block()), Flat(friction=0.3), motion=motion))
+    rising = replace(run, applied_force=0.05 + 1e-12 * np.arange(4.0))
+    with pytest.raises(InputError, match="applied_force, which does not advance in motion 1"):
+        along(rising, "indentation", "applied_force", np.array([0.05]), motion=1)
 
 
 def test_a_curve_from_a_file(tmp_path):
@@ -103,6 +124,10 @@ GAPS = {"motion.0.gap": [0.1, 0.2]}
         (lambda: MeasuredCurve("time", "position", [0.1], [1.0, 2.0]), "given 2 values; allowed: as many"),
         (lambda: MeasuredCurve("time", "position", [], []), "given 0 values"),
         (lambda: MeasuredCurve("time", "position", [1, 1], [1, 2]), "the same place twice"),
+        (
+            lambda: MeasuredCurve("normal_force", "indentation", [0.1, 0.2, 0.4, 0.3], [1, 2, 3, 2]),
+            r"data\.at: given indentation 0\.2, 0\.4, then 0\.3 \(number 4\); .* a curve each",
+        ),
         (lambda: MeasuredCurve("time", "position", [1], [2], sd=0.0), r"data\.sd: .*larger than 0"),
         (lambda: MeasuredCurve("time", "position", [1], [2], sd=[1.0, 2.0]), r"data\.sd"),
         (lambda: MeasuredCurve("time", "position", [1], [2], motion=-1), r"data\.motion: given -1"),

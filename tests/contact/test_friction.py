@@ -268,6 +268,7 @@ def test_friction_around_the_kink_of_its_law_is_found_without_many_cuts():
     assert result.newton_iterations.max() <= 40
 
 
+@pytest.mark.filterwarnings("ignore:motion 3 slides at 0.01 mm")
 def test_a_slab_that_rests_ages_and_one_that_touches_anew_is_fresh():
     wait = ev.Wait(10.0, steps=2)
     again = [ev.Hover(0.1, steps=1), ev.Press(indentation=4e-5, steps=1)]

@@ -101,7 +101,7 @@ def test_the_readmes_two_commands_stand():
 
 def test_the_forces_are_those_of_a_press_and_full_slip(result):
     result, _ = result
-    assert result.motion == ["press"] * 3 + ["slide"] * 6
+    assert result.motion.tolist() == ["press"] * 3 + ["slide"] * 6
     np.testing.assert_allclose(result.applied_force[:3], [0.05 / 3, 0.1 / 3, 0.05], rtol=1e-7)
     np.testing.assert_allclose(result.applied_force[3:], 0.05, rtol=1e-7)
     assert result.tangential_force[-1] == pytest.approx(0.3 * result.normal_force[-1], rel=1e-7)

@@ -251,10 +251,13 @@ def test_prints_from_a_table_and_from_an_image(tmp_path):
 
     grey = np.round(65535 * (height - height.min()) / np.ptp(height)).astype(np.uint16)
     Image.fromarray(grey[::-1]).save(tmp_path / "print.png")
-    drawn = tip(
-        ridges=str(tmp_path / "print.png"), ridge_pixel=0.1, ridge_height=np.ptp(height), ridge_width=0.7
-    )
-    np.testing.assert_allclose(drawn.mesh().points, own.mesh().points, atol=2e-6)
+    Image.fromarray(65535 - grey[::-1]).save(tmp_path / "ink.png")
+    picture = {"ridge_pixel": 0.1, "ridge_height": float(np.ptp(height)), "ridge_width": 0.7}
+    for name, dark in (("print.png", "grooves"), ("ink.png", "ridges")):
+        drawn = tip(ridges=str(tmp_path / name), ridge_dark=dark, **picture)
+        np.testing.assert_allclose(drawn.mesh().points, own.mesh().points, atol=2e-6)
+    with pytest.raises(InputError, match=r"ridge_dark: given nothing for .*ridges \| grooves"):
+        tip(ridges=str(tmp_path / "ink.png"), **picture)
     fx, fz, depth = depth_of(own)
     assert depth.max() == pytest.approx(0.1, abs=1e-4)
     near = np.argmin(np.hypot(fx - 1.0, fz - 2.0))

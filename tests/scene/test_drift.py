@@ -102,3 +102,11 @@ def test_a_result_says_how_far_its_load_has_drifted():
     change = np.abs(loose.applied_force[4:] / loose.applied_force[3] - 1.0).max()
     assert loose.load_drift == pytest.approx(change, rel=1e-12)
     assert repr(loose).splitlines()[-1] == f"  the load drifted by {change:.1%} at a held indentation"
+
+
+def test_a_held_indentation_is_the_same_to_the_digits_that_are_solved():
+    held = {"motion": "slide", "indentation": 0.5 + 1e-13, "applied_force": 0.06}
+    press = held | {"motion": "press", "indentation": 0.5, "applied_force": 0.05}
+    assert measured([press, held]) == pytest.approx(0.2)
+    loose = press | {"applied_force": 1e-17}
+    assert measured([loose, held]) == 0.0

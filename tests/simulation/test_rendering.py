@@ -220,5 +220,11 @@ def test_slides_that_cannot_be_rendered_are_refused(jump):
         compare(jump.result, back.result)
     with pytest.raises(InputError, match="position up to 2 mm"):
         felt([0.1, 0.2, 0.3]).minimum(after=3.0)
+
+
+def test_a_position_that_rounding_left_short_is_there():
+    force = np.array([0.05, 0.05])
+    friction = ApparentFriction(np.array([0.0, 3 * 0.1 - 1e-15]), force, np.array([0.0, 0.01]))
+    assert friction.minimum(after=3 * 0.1) == pytest.approx(0.2)
     with pytest.raises(InputError, match="above zero all along"):
         felt([0.1, 0.1], force=-0.05)

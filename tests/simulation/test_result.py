@@ -65,6 +65,22 @@ def test_saving_under_any_ending_keeps_the_name(tmp_path):
     assert len(load(tmp_path / "run.data").step) == 4
 
 
+def test_the_name_of_another_format_is_refused_with_what_writes_it(tmp_path):
+    with pytest.raises(InputError, match=r"\.npz: to_csv writes the history"):
+        fake_result().save(tmp_path / "run.csv")
+    assert not list(tmp_path.iterdir())
+
+
+def test_rows_are_chosen_by_their_motion(tmp_path):
+    result = fake_result()
+    kinds = [row["motion"] for row in result.rows]
+    result.save(tmp_path / "run.npz")
+    for one in (result, result.total if result.depth else result, load(tmp_path / "run.npz")):
+        chosen = one.position[one.motion == kinds[0]]
+        assert len(chosen) == kinds.count(kinds[0]) > 0
+    assert {type(row["motion"]) for row in result.rows} == {str}
+
+
 def test_the_file_holds_no_pickled_objects(tmp_path):
     fake_result().save(tmp_path / "run.npz")
     with np.load(tmp_path / "run.npz", allow_pickle=False) as archive:

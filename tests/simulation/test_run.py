@@ -220,7 +220,7 @@ def test_rows_are_numbered_by_step_and_motion():
     result = run(Flat(), *motion, output=Output(every=3))
     assert result.step.tolist() == [1, 2, 3, 4, 5, 6, 7]
     assert result.motion_index.tolist() == [0, 1, 1, 2, 2, 2, 3]
-    assert result.motion == ["hover", "press", "press", "slide", "slide", "slide", "press"]
+    assert result.motion.tolist() == ["hover", "press", "press", "slide", "slide", "slide", "press"]
     np.testing.assert_allclose(result.indentation[:6], [-0.1, 0.05, 0.2, 0.2, 0.2, 0.2], rtol=1e-12)
     np.testing.assert_allclose(result.position, [0.0, 0.0, 0.0, -0.1, -0.2, -0.3, -0.3], atol=1e-15)
     np.testing.assert_allclose(result.time, [0.0, 0.0, 0.0, 0.01, 0.02, 0.03, 0.03], rtol=1e-12)

@@ -72,6 +72,15 @@ def test_rows_of_the_last_motion_are_used_or_those_of_a_window_of_time():
     np.testing.assert_allclose(first.amplitude[:2], [5.0, 0.0], atol=1e-12)
 
 
+@pytest.mark.parametrize("rounding", [-1e-15, 1e-15])
+def test_a_window_begins_and_ends_at_its_rows_however_their_times_are_rounded(rounding):
+    made = column(np.sin(2 * np.pi * 10.0 * TIMES), TIMES + rounding)
+    later = ev.spectrum(made, "tangential_force", start=0.4)
+    assert later.frequency[1] == pytest.approx(1.0 / 0.6)  # 60 rows of 10 ms
+    first = ev.spectrum(made, "tangential_force", start=0.0, stop=0.4)
+    assert first.frequency[1] == pytest.approx(1.0 / 0.4)
+
+
 def test_a_press_that_takes_no_time_stands_before():
     time = np.concatenate([np.zeros(10), TIMES[:40]])
     made = column(

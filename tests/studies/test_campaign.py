@@ -103,6 +103,7 @@ NEVER = {
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
     "finger.ridge_pixel": "of the picture of a print alone",
+    "finger.ridge_dark": "of the picture of a print alone",
     "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
     "finger.ridge_scan": "a measured outline, which no generator can draw",

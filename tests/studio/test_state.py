@@ -1,6 +1,7 @@
 """What the page may send, and what it gets: strict in, plain numbers out."""
 
 import json
+import math
 
 import numpy as np
 import pytest
@@ -126,6 +127,18 @@ def test_an_upload_is_read_by_the_importers_under_a_harmless_name():
         page.uploaded(b"\x89PNG", "a.png", {"licence": "CC0-1.0"})
     with pytest.raises(InputError, match="smooth: given 'x'"):
         page.uploaded(data, "a.csv", {"licence": "CC0-1.0", "smooth": "x"})
+
+
+def test_an_uploaded_recording_holds_what_is_said():
+    rows = "".join(f"{i}e-3,{math.sin(0.2 * math.pi * i)},0\n" for i in range(2000))
+    options = {"licence": "CC0-1.0", "speed": "50"}
+    data = ("time,x,y\n" + rows).encode()
+    for missing, more in (("channel", {}), ("quantity", {"channel": "x"})):
+        with pytest.raises(InputError, match=f"{missing}: given nothing"):
+            page.uploaded(data, "a.csv", options | more)
+    found = page.uploaded(data, "a.csv", options | {"channel": "x", "quantity": "velocity", "longest": "5"})
+    assert found["quantity"] == "friction"
+    assert "Waves of up to 5 mm." in found["provenance"]
 
 
 @pytest.mark.parametrize("name", ["friction-steps", "grating-1mm", "cork"])

@@ -48,6 +48,22 @@ def test_an_image_is_imported_with_what_it_cannot_know(tmp_path, capsys):
     assert json.loads((tmp_path / "cloth/texture.json").read_text())["licence"] == "CC0-1.0"
 
 
+def test_a_recording_is_imported_with_what_it_holds(capsys):
+    from scipy.io import wavfile
+
+    time = np.arange(2000) / 1000.0
+    wavfile.write("hum.wav", 1000, np.column_stack([np.sin(200 * np.pi * time), np.cos(400 * time)]))
+    words = ("import", "hum.wav", "--licence", "CC0-1.0", "--out", "hum", "--speed", "50")
+    assert run(*words, "--channel", "1") == 2
+    assert "quantity: given nothing" in capsys.readouterr().err
+    assert run(*words, "--quantity", "velocity") == 2
+    assert "channel: given nothing, of 2" in capsys.readouterr().err
+    assert run(*words, "--quantity", "velocity", "--channel", "1", "--longest", "4") == 0
+    assert "- Waves of up to 4 mm." in capsys.readouterr().out
+    assert read("hum").x[0] == pytest.approx(0.25, abs=0.03)
+    assert run(*words, "--quantity", "velocity", "--channel", "1", "--longest", "0") == 2
+
+
 def test_a_licence_is_needed(capsys):
     assert run("import", "a.csv", "--out", "a.json") == 2
     assert "--licence" in capsys.readouterr().err

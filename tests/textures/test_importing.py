@@ -42,6 +42,64 @@ def test_heights_in_micrometres_are_levelled_and_both_is_said(tmp_path):
     )
 
 
+HEADS = {
+    "brackets": "X [mm]\tZ [um]",
+    "parentheses": "x (mm);height (µm)",
+    "slash": "x/mm\tz/um",
+    "comma": "x, mm\theight, um",
+    "quoted": '"x, mm","height, um"',
+    "underscore": "x_mm,height_um",
+    "blanks": "x [mm] z [um]",
+    "line": "Position,Height\nmm,um",
+    "nanometres": "x [um],z [nm]",
+}
+
+
+@pytest.mark.parametrize("name", HEADS)
+@pytest.mark.parametrize("coding", ["utf-8", "latin-1"])
+def test_each_column_has_the_unit_that_the_header_says(tmp_path, name, coding):
+    head = HEADS[name]
+    x, z = np.arange(50) * 0.02, 2e-3 * np.cos(np.arange(50.0))  # mm
+    larger = 1e3 if name == "nanometres" else 1.0
+    first = head.split("\n")[0]
+    separator = next((one for one in "\t;" if one in first), " " if name == "blanks" else ",")
+    lines = [f"{larger * a:.9g}{separator}{larger * 1e3 * b:.9g}" for a, b in zip(x, z, strict=True)]
+    (tmp_path / "p.txt").write_text("\n".join(["Stylus, 2 µm", head, *lines]), encoding=coding)
+    for reader in (from_csv, scans.from_scan):
+        texture = reader(tmp_path / "p.txt", SOURCE, cleaning=Cleaning(level="none"))
+        np.testing.assert_allclose(texture.values, z, atol=1e-11)
+        np.testing.assert_allclose(texture.x, x, atol=1e-9)
+        assert "as the header says" in texture.provenance[2]
+
+
+def test_a_column_without_a_unit_has_that_of_the_file_and_an_unknown_one_is_refused(tmp_path):
+    rows = np.arange(50) * 0.02, np.sin(np.arange(50.0))
+    path = csv(tmp_path / "a.csv", "x [mm],height", *rows)
+    texture = from_csv(path, SOURCE, Cleaning(level="none"), unit="um")
+    assert np.abs(texture.values).max() == pytest.approx(1e-3, rel=1e-3)
+    assert texture.provenance[2:4] == ("x in mm, as the header says.", "Other lengths were in um.")
+    with pytest.raises(InputError, match=r"unit: given height in px; allowed: mm \| um"):
+        from_csv(csv(tmp_path / "b.csv", "x [mm],height [px]", *rows), SOURCE)
+    with pytest.raises(InputError, match=r"unit: given frequency in Hz; allowed: 1/mm"):
+        from_csv(csv(tmp_path / "c.csv", "frequency [Hz],amplitude", *rows), SOURCE)
+
+
+def test_heights_as_steep_as_a_wrong_unit_are_noted(tmp_path):
+    x = np.arange(200) * 0.02
+    wave = 5e-3 * np.sin(np.pi * x)  # slope 0.011
+    for scale, noted in ((1.0, False), (1e3, True)):
+        texture = from_csv(csv(tmp_path / "a.csv", "x,height", x, scale * wave), SOURCE)
+        assert any("Rms slope 11.1" in note for note in texture.provenance) == noted
+
+
+def test_decimal_commas_and_gaps(tmp_path):
+    (tmp_path / "a.csv").write_text("x;height\n" + "\n".join(f"0,{i}0;0,0{i}" for i in range(1, 9)) + "\n")
+    assert from_csv(tmp_path / "a.csv", SOURCE).provenance[2] == "Commas are decimal points."
+    (tmp_path / "b.csv").write_text("x,height\n0,0\n1,nan\n2,\n3,3\n4,4\n5,5\n")
+    texture = from_csv(tmp_path / "b.csv", SOURCE, Cleaning(level="none"))
+    assert texture.values.tolist() == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+
+
 def test_a_parabola_is_taken_off():
     x = np.linspace(0.0, 3.0, 50)
     _, height, notes = Cleaning(level="parabola")(x, 1.0 + 2.0 * x - 3.0 * x**2)
@@ -63,7 +121,7 @@ def test_a_cut_that_leaves_nothing_is_refused():
 def test_smoothing_halves_a_wave_of_the_cut_off_length():
     x = np.arange(0.0, 40.0, 0.01)
     _, height, _ = Cleaning(level="none", smooth=2.0)(x, np.sin(np.pi * x))
-    assert np.ptp(height[1000:3000]) == pytest.approx(1.0, rel=1e-3)
+    assert np.ptp(height[1000:3000]) == pytest.approx(1.0, rel=5e-3)
 
 
 def test_friction_is_kept_as_it_is(tmp_path):
@@ -75,7 +133,8 @@ def test_friction_is_kept_as_it_is(tmp_path):
 def test_a_recording_is_a_spectrum_over_the_spatial_frequency(tmp_path):
     time = np.arange(8000) / 4000.0
     samples = 0.4 * np.sin(2 * np.pi * 62.5 * time) + 0.3 * np.sin(2 * np.pi * 125.0 * time)
-    texture = from_recording(wav(tmp_path / "r.wav", samples, 4000), SOURCE, speed=50.0)
+    path = wav(tmp_path / "r.wav", samples, 4000)
+    texture = from_recording(path, SOURCE, speed=50.0, quantity="displacement")
     assert texture.quantity == "friction_spectrum"
     strong = texture.x[texture.values > 0.2]
     assert np.all((np.abs(strong - 1.25) < 0.06) | (np.abs(strong - 2.5) < 0.06))
@@ -93,9 +152,66 @@ def test_an_acceleration_is_divided_by_the_square_of_the_frequency(tmp_path):
     assert power[0] / power[1] == pytest.approx(1.0, rel=0.02)
 
 
+@pytest.mark.parametrize("rate", [1000, 8000, 48_000])
+def test_a_wave_has_its_length_at_every_rate(tmp_path, rate):
+    """A grating of 2 mm under 20 mm/s is 10 Hz, however often it is sampled."""
+    samples = 0.5 * np.sin(2 * np.pi * 10.0 * np.arange(rate) / rate)
+    texture = from_recording(wav(tmp_path / "g.wav", samples, rate), SOURCE, 20.0, quantity="height")
+    assert texture.x[np.argmax(texture.values)] == pytest.approx(0.5, rel=1e-3)
+
+
+def hand_held(time):
+    """Acceleration of a surface of 0.5 mm at 50 mm/s, and of a hand that drifts by 50 times as much."""
+    wave, drift = 2 * np.pi * 100.0, 2 * np.pi * 3.0
+    return 0.5 * np.sin(wave * time) + 50 * 0.5 * (drift / wave) ** 2 * np.sin(drift * time)
+
+
+def test_an_acceleration_is_the_same_texture_in_a_table_and_in_a_wav_and_without_the_hand(tmp_path):
+    time = np.arange(4000) / 1000.0
+    samples = hand_held(time)
+    table = from_recording(csv(tmp_path / "a.csv", "time,acceleration", time, samples), SOURCE, 50.0)
+    path = wav(tmp_path / "a.wav", samples, 1000)
+    sound = from_recording(path, SOURCE, 50.0, quantity="acceleration")
+    for texture in (table, sound):
+        near = np.abs(texture.x - 2.0) < 0.2
+        assert np.sum(texture.values[near] ** 2) > 0.99
+        assert texture.x[0] >= 0.1
+    longer = from_recording(path, SOURCE, 50.0, quantity="acceleration", longest=20.0)
+    assert longer.x[np.argmax(longer.values)] == pytest.approx(3.0 / 50.0, rel=0.05)
+
+
+def test_what_a_recording_holds_and_which_channel_must_be_said(tmp_path):
+    time = np.arange(2000) / 1000.0
+    one, other = np.sin(200 * np.pi * time), np.sin(100 * np.pi * time)
+    with pytest.raises(InputError, match=r"quantity: given nothing, and r\.wav does not say"):
+        from_recording(wav(tmp_path / "r.wav", one, 1000), SOURCE, 50.0)
+    path = csv(tmp_path / "xy.csv", "time [ms],X,Y", 1e3 * time, one, other)
+    with pytest.raises(InputError, match=r"channel: given nothing, of 2; allowed: x \| y \| 1 \| 2"):
+        from_recording(path, SOURCE, 50.0, quantity="velocity")
+    for channel, wave in (("X", 2.0), (1, 2.0), ("y", 1.0), ("2", 1.0)):
+        texture = from_recording(path, SOURCE, 50.0, quantity="velocity", channel=channel)
+        assert texture.x[np.argmax(texture.values)] == pytest.approx(wave, rel=5e-3)
+    wrong = csv(tmp_path / "a.csv", "time,acceleration", time, one)
+    with pytest.raises(InputError, match="quantity: given height, of acceleration"):
+        from_recording(wrong, SOURCE, 50.0, quantity="height")
+
+
+def test_a_channel_of_a_wav_is_chosen_by_its_number(tmp_path):
+    from scipy.io import wavfile
+
+    time = np.arange(4000) / 2000.0
+    both = np.column_stack([np.sin(200 * np.pi * time), np.sin(100 * np.pi * time)])
+    wavfile.write(tmp_path / "s.wav", 2000, both)
+    with pytest.raises(InputError, match=r"channel: given nothing, of 2; allowed: 1 \| 2"):
+        from_recording(tmp_path / "s.wav", SOURCE, 50.0, quantity="height")
+    texture = from_recording(tmp_path / "s.wav", SOURCE, 50.0, quantity="height", channel=2)
+    assert texture.x[np.argmax(texture.values)] == pytest.approx(1.0, rel=5e-3)
+
+
 def test_a_spectrum_becomes_friction_of_the_size_that_is_said(tmp_path):
     time = np.arange(8000) / 4000.0
-    texture = from_recording(wav(tmp_path / "r.wav", np.sin(400 * time), 4000), SOURCE, speed=50.0)
+    path = wav(tmp_path / "r.wav", np.sin(400 * time), 4000)
+    texture = from_recording(path, SOURCE, speed=50.0, quantity="friction")
     friction = friction_profile(texture, mean=0.4, rms=0.05, length=20.0, seed=1)
     assert np.mean(friction.values) == pytest.approx(0.4, abs=0.005)
     assert np.std(friction.values) == pytest.approx(0.05, rel=0.1)
@@ -115,13 +231,52 @@ def test_grey_values_become_heights_of_the_depth_that_is_said(tmp_path):
     assert any("not measured" in note for note in texture.provenance)
 
 
+RAMP = np.array([[0.0, 0.25, 1.0, 0.5, 0.75, 0.0]])
+GREYS = {
+    "8.png": np.rint(255 * RAMP).astype(np.uint8),
+    "16.png": np.rint(65535 * RAMP).astype(np.uint16),
+    "16.tif": np.rint(65535 * RAMP).astype(np.uint16),
+    "big.tif": np.rint(65535 * RAMP).astype(">u2"),
+    "32.tif": np.rint(1e6 * RAMP - 3e5).astype(np.int32),
+    "float.tif": (3.0 * RAMP + 1.0).astype(np.float32),
+    "rgb.png": np.repeat(np.rint(255 * RAMP).astype(np.uint8)[..., None], 3, axis=2),
+}
+
+
+def raw(path, depth=0.1):
+    return from_image(path, SOURCE, pixel=0.1, depth=depth, cleaning=Cleaning(level="none"))
+
+
+@pytest.mark.parametrize("name", GREYS)
+def test_a_picture_has_all_its_greys_whatever_its_bits(tmp_path, name):
+    Image.fromarray(GREYS[name]).save(tmp_path / name)
+    texture = raw(tmp_path / name)
+    within = 1e-4 if GREYS[name].dtype.itemsize > 1 else 0.003
+    np.testing.assert_allclose(texture.values, 0.1 * RAMP[0], atol=0.1 * within)
+    assert any(note.startswith("Grey values") for note in texture.provenance)
+
+
+def test_a_faint_picture_of_16_bits_is_a_share_of_white_and_not_of_its_brightest_point(tmp_path):
+    Image.fromarray(np.array([[0, 4095, 0, 4095]], np.uint16)).save(tmp_path / "a.png")
+    assert raw(tmp_path / "a.png", 1.0).values.max() == pytest.approx(1.0 / 16.0, rel=1e-3)
+
+
+def test_where_a_picture_is_transparent_there_is_a_gap(tmp_path):
+    grey = np.array([[0, 200, 100, 150, 200]], np.uint8)
+    seen = np.array([[255, 0, 255, 255, 255]], np.uint8)
+    Image.merge("LA", [Image.fromarray(grey), Image.fromarray(seen)]).save(tmp_path / "a.png")
+    texture = raw(tmp_path / "a.png", 2.55)
+    assert texture.values.tolist() == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
+    assert "1 of 5 values missing, filled by straight lines." in texture.provenance
+
+
 @pytest.mark.parametrize("name", ["a.png", "a.wav", "a.csv"])
 def test_damaged_files_are_refused(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff\xff")
     readers = {
         "a.png": lambda: from_image(path, SOURCE, pixel=0.1, depth=0.1),
-        "a.wav": lambda: from_recording(path, SOURCE, speed=10.0),
+        "a.wav": lambda: from_recording(path, SOURCE, speed=10.0, quantity="height"),
         "a.csv": lambda: from_csv(path, SOURCE),
     }
     with pytest.raises(InputError, match="file: given"):

@@ -32,3 +32,11 @@ def die_once(job):
         file.touch()
         os._exit(9)
     return runs.work(job)
+
+
+def blas_threads(job):
+    """How many threads each BLAS of the process may use, once scipy has loaded its own."""
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info
+
+    return sorted(one["num_threads"] for one in threadpool_info() if one["internal_api"] == "openblas")

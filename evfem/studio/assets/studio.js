@@ -212,10 +212,11 @@ async function send() {
   if (!file) return;
   const options = {name: file.name, licence: get("licence").value, unit: get("unit").value, row: get("row").value,
     pixel: get("pixel").value, depth: get("depth").value, smooth: get("smooth").value,
-    speed: get("recorded").value, mean: get("mean").value};
+    speed: get("recorded").value, mean: get("mean").value, quantity: get("quantity").value,
+    longest: get("longest").value, channel: get("channel").value};
   try {
     upload = await (await post(`upload?${new URLSearchParams(options)}`, file)).json();
-    get("uploaded").textContent = `${upload.name}: ${upload.x.length} rows`;
+    get("uploaded").textContent = `${upload.name}: ${upload.x.length} rows. ${upload.provenance.join(" ")}`;
     get("error").hidden = true;
     await refresh();
   } catch (error) { wrong(error); }
@@ -322,11 +323,13 @@ async function begin() {
   outputs();
   sketch();
   get("left").addEventListener("input", (event) => {
-    if (["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean"].includes(event.target.id)) return;
+    if (["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean",
+    "quantity", "longest", "channel"].includes(event.target.id)) return;
     outputs(); store(); refresh();
   });
   get("left").addEventListener("submit", (event) => event.preventDefault());
-  for (const id of ["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean"]) {
+  for (const id of ["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean",
+    "quantity", "longest", "channel"]) {
     get(id).addEventListener("change", async () => { await send(); store(); });
   }
   get("canvas").addEventListener("pointerdown", (event) => {

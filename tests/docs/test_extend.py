@@ -1,0 +1,114 @@
+"""The recipes that change files of the package are put into a copy of it, which then runs.
+
+A mark says where a block goes: `into FILE, FILE before WORDS` or `instead of WORDS`, the words being
+once in each file, at the beginning of a line, however they are spaced there.
+"""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from textwrap import indent
+
+import pytest
+from docs.test_pages import blocks
+
+import evfem
+
+PLACE = re.compile(r"not run: into (?P<files>.+?) (?P<how>before|instead of) (?P<words>.+)")
+RECIPES = [
+    (found, text) for _, text, mark, _ in blocks("howto/extend.md") if (found := PLACE.match(mark or ""))
+]
+
+LAYER = """
+moduli = {"fascia": ev.NeoHookean(E=0.3, nu=0.4)}
+for kind in (ev.FingerPad, ev.Fingertip):
+    usual = kind(ridges=False, resolution="coarse")
+    mesh = usual.mesh()
+    assert mesh.region_names["fascia"] == 5 and (mesh.region == 5).any(), kind
+    assert usual.materials["fascia"].E == 0.5
+    kind(ridges=False, resolution="coarse", fascia_thickness=0.5, materials=moduli)
+    try:
+        kind(fascia_thickness=0.7)
+    except ev.InputError as error:
+        assert "finger.fascia_thickness: given 0.7; allowed: 0.1 to 0.6 mm" in str(error), error
+    else:
+        raise AssertionError("0.7 mm are taken")
+tip = ev.Fingertip(ridges=False, resolution="coarse")
+result = ev.simulate(ev.Scene(tip, ev.Flat(), motion=ev.Press(indentation=0.1, steps=1)))
+assert result.normal_force[-1] > 0.0
+"""
+COLUMN = """
+pad = ev.FingerPad(ridges=False, resolution="coarse")
+surface = ev.Flat(friction=0.3, y=-7.0)
+result = ev.simulate(ev.Scene(pad, surface, motion=[ev.Hover(gap=0.1), ev.Press(indentation=0.1, steps=1)]))
+assert abs(result.lowest_point[-1] + 7.0) < 1e-9, result.lowest_point  # it lies on the surface
+result.to_csv("history.csv")
+assert "lowest_point" in open("history.csv").readline()
+result.save("run.npz")
+assert ev.load("run.npz").lowest_point[-1] == result.lowest_point[-1]
+"""
+WAVEFORM = """
+import numpy as np
+from evfem.electrostatics.timesignals import SIGNALS
+wave = SIGNALS["triangle"](frequency=50.0, amplitude=3.0)
+time = (np.arange(20000) + 0.5) / 20000 / 50.0
+effective, order, share = wave.powers()
+assert abs(np.sqrt(np.mean(wave(time) ** 2)) - effective) < 1e-6  # amplitude over the root of 3
+assert abs(share.sum() - 1.0) < 1e-12
+text = '''
+version = 1
+[finger]
+ridges = false
+resolution = "coarse"
+[surface]
+kind = "flat"
+[electrostatics]
+law = "strong_troxel"
+insulator = "film"
+voltage = 100.0
+frequency = 50.0
+waveform = "triangle"
+[[motion]]
+kind = "hover"
+gap = 0.2
+'''
+scene = ev.scenefile.loads(text)
+assert abs(scene.drive.peak(100.0) - 100.0 * 3**0.5) < 1e-9
+assert ev.simulate(scene).electrostatic_force[-1] > 0.0
+"""
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory):
+    """A folder with a copy of the package and all recipes in it."""
+    folder = tmp_path_factory.mktemp("copy")
+    package = Path(evfem.__file__).parent
+    shutil.copytree(package, folder / "evfem", ignore=shutil.ignore_patterns("__pycache__"))
+    for found, text in RECIPES:
+        first, *others = found["files"].split(", ")
+        for file in (folder / first, *((folder / first).with_name(other) for other in others)):
+            put_in(file, found["how"], found["words"], text)
+    return folder
+
+
+def put_in(file, how, words, text):
+    """Change a file as a mark says."""
+    lines = file.read_text(encoding="utf-8")
+    (place,) = re.finditer(r"^([ \t]*)" + r"\s*".join(map(re.escape, words.split())), lines, re.M)
+    new = indent(text if how == "before" else text.rstrip("\n"), place[1])
+    file.write_text(lines[: place.start()] + new + lines[place.start() if how == "before" else place.end() :])
+
+
+def test_every_block_that_does_not_run_on_the_page_has_its_place():
+    marks = [mark for kind, _, mark, _ in blocks("howto/extend.md") if kind == "python" and mark]
+    assert len(marks) == len(RECIPES) > 6
+
+
+@pytest.mark.parametrize("use", [LAYER, COLUMN, WAVEFORM], ids=["layer", "column", "waveform"])
+def test_the_recipes_work_together_in_a_copy(copy, use):
+    path = [str(copy), *sys.path]
+    head = f"import sys\nsys.path[:] = {path!r}\nimport evfem as ev\nassert {path[0]!r} in ev.__file__\n"
+    done = subprocess.run([sys.executable, "-c", head + use], capture_output=True, text=True, cwd=copy)
+    assert done.returncode == 0, done.stderr[-2000:]

@@ -1,0 +1,77 @@
+"""The BLAS keeps to its threads in a process in which no variable says how many.
+
+A limit holds for the libraries that are loaded: whatever enters one before scipy has loaded its BLAS
+leaves that on all cores. Looked at is what each limit has over at its end, and the CPU time of other
+threads than the main one.
+"""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+WATCH = """
+import time
+import threadpoolctl
+
+beyond, ended = [], 0
+
+class Watched(threadpoolctl.threadpool_limits):
+    def __init__(self, limits=None, **options):
+        self.most = limits or 10**6
+        super().__init__(limits=limits, **options)
+
+    def __exit__(self, *error):
+        global ended
+        ended += 1
+        blas = [one for one in threadpoolctl.threadpool_info() if "blas" in one["internal_api"]]
+        beyond.extend(one for one in blas if one["num_threads"] > self.most)
+        super().__exit__(*error)
+
+threadpoolctl.threadpool_limits = Watched
+import evfem as ev
+pad = ev.FingerPad(ridges=False, resolution="coarse")
+scene = ev.Scene(pad, ev.Flat(friction=0.3), motion=ev.Press(force=0.01, steps=1))
+all_before, main_before = time.process_time(), time.thread_time()
+"""
+LOOKED = """
+everyone, main = time.process_time() - all_before, time.thread_time() - main_before
+print(ended > 0, beyond, everyone - main < 0.3 * everyone + 0.1)
+"""
+WAYS = {
+    "simulate": "ev.simulate(scene)",
+    "a whole fingertip": "tip = ev.Fingertip(resolution='coarse', ridges=False)\n"
+    "ev.simulate(ev.Scene(tip, ev.Flat(), motion=ev.Press(indentation=0.05, steps=1)))",
+    "sweep": "grid = {'surface.friction': [0.2, 0.3]}\n"
+    "ev.sweep(ev.Sweep(scene, grid, outputs=['normal_force.last']), 'out', workers=1)",
+    "fit": "data = ev.MeasuredCurve('indentation', 'applied_force', [0.005, 0.01], [0.1, 0.2])\n"
+    "ev.fit(scene, data, {'finger.materials.hypodermis.E': (0.02, 0.06)}, workers=1)",
+    "estimate": "from evfem.textures.library import reference\n"
+    "from evfem.textures.estimate import estimate\n"
+    "estimate(reference('weave'), ev.Touch(length=2.0))",
+    "studio": "from evfem.studio import page\nfrom evfem.studio.state import parse\npage.answer(parse('{}'))",
+}
+
+
+def fresh(code, folder):
+    """What a new process prints, without the variables that limit threads."""
+    environment = {key: value for key, value in os.environ.items() if not key.endswith("_NUM_THREADS")}
+    words = [sys.executable, "-c", f"import sys\nsys.path[:0] = {sys.path!r}\n{code}"]
+    done = subprocess.run(words, capture_output=True, text=True, env=environment, cwd=folder)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_limit_is_that_of_every_blas(way, tmp_path):
+    assert fresh(f"{WATCH}{WAYS[way]}{LOOKED}", tmp_path).splitlines()[-1] == "True [] True"
+
+
+def test_a_process_of_a_pool_has_one_thread_whatever_it_loads(tmp_path):
+    code = (
+        "from tools.workers import blas_threads\n"
+        "from evfem.common import pools\n"
+        "with pools.open_pool(2, None) as pool: print([found for _, found in pool(blas_threads, {0: 0})])"
+    )
+    assert fresh(code, tmp_path) == "[[1, 1]]"
