@@ -21,7 +21,7 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.drift import drifting
-from evfem.scene.motion import Hover, VoltageRamp, Wait
+from evfem.scene.motion import Hover, VoltageRamp, Wait, follows_gap
 from evfem.scene.parts import check_parts
 from evfem.scene.resolution import too_fast, unresolved
 from evfem.scene.scene import Scene
@@ -197,6 +197,7 @@ def rigid_share(scene: Scene, mesh: Mesh) -> float | None:
         not hovers
         or not all(isinstance(motion, (Hover, VoltageRamp, Wait)) for motion in scene.motion)
         or scene.forms
+        or any(follows_gap(motion) for motion in scene.motion)
     ):
         return None
     gap = min(motion.gap for motion in hovers)

@@ -42,11 +42,13 @@ from evfem.contact.condensed import (
 )
 from evfem.contact.signorini import STICK
 from evfem.solver.hand import Grip
-from evfem.solver.state import State
+from evfem.solver.state import State, StepFailed
 from evfem.solver.voltage import Reading, Seen, electrode_charge, smallest_gap
 
 #: a voltage (V) that is none
 TINY = 1e-300
+#: why no voltage makes a gap (mm)
+TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is smaller"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
@@ -197,6 +199,10 @@ class VoltageControl:
         """Contact, together with the voltage where it is an unknown."""
         return DrivenStep(drive.solve(step))
 
+    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        """The voltage where it follows what the pad does, or nothing."""
+        return ()
+
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
         """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
         return True
@@ -241,6 +247,9 @@ class Met(VoltageControl):
         travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
         share = np.array([*travels, reading.by_voltage + own])
         return ExtraUnknown(push, 0, 0.0, Condition(row, share, wish - reading.value - still)), saved
+
+    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        return (self.unknown(step, drive)[0],)
 
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         unknown, saved = self.unknown(step, drive)
@@ -290,6 +299,17 @@ class GivenGap(Met):
 
     def lacking(self, seen: Seen) -> float:
         return abs(smallest_gap(seen).value / self.gap - 1.0)
+
+    def since(self, begin: VoltageControl, fraction: float) -> GivenGap:
+        """At `fraction` of the way from another one."""
+        first = begin.gap if isinstance(begin, GivenGap) else self.gap
+        return GivenGap(first + fraction * (self.gap - first))
+
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
+        found = super().solve(step, drive)
+        if drive.squared == 0.0 and found.change < 0.0:
+            raise StepFailed(TOO_WIDE.format(self.gap), [])
+        return found
 
 
 @dataclass

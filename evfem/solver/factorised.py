@@ -344,7 +344,11 @@ class FactorisedBody:
         ahead = self.begin(state, target, frozen=False, start=state)
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))
-        found = [verge(self._contact_step(state, place, target, still)) for place in (state, ahead)]
+        none, found = np.zeros(self.body.reduce(state.u).size), []
+        for place in (state, ahead):
+            step = self._contact_step(state, place, target, still)
+            also = target.drive.unknowns(step, self._problem(none, place))
+            found.append(verge(replace(step, unknowns=(*step.unknowns, *also))))
         return max(found, key=lambda one: one.share)
 
     # -- a step ends
