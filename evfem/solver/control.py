@@ -48,7 +48,7 @@ from evfem.solver.voltage import Reading, Seen, electrode_charge, smallest_gap
 #: a voltage (V) that is none
 TINY = 1e-300
 #: why no voltage makes a gap (mm)
-TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is smaller"
+TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
@@ -308,7 +308,7 @@ class GivenGap(Met):
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         found = super().solve(step, drive)
         if drive.squared == 0.0 and found.change < 0.0:
-            raise StepFailed(TOO_WIDE.format(self.gap), [])
+            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(drive.seen).value), [])
         return found
 
 
