@@ -313,7 +313,8 @@ class Run:
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
             if isinstance(end.drive, GivenGap):
-                return end.drive.since(start.drive, fraction)
+                gap = start.drive.gap if isinstance(start.drive, GivenGap) else end.drive.gap
+                return GivenGap(gap + fraction * (end.drive.gap - gap))
             if self._follows(seconds):
                 return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
             first, last = start.drive.voltage, end.drive.voltage

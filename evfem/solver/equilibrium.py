@@ -30,6 +30,7 @@ from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.pad import surface_state
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
+from evfem.electrostatics.measures import Seen
 from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
@@ -45,7 +46,6 @@ from evfem.solver.state import (
     StepFailed,
 )
 from evfem.solver.strategy import stuck
-from evfem.solver.voltage import Seen
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -95,10 +95,10 @@ class Statics:
             return np.zeros_like(state.contact_force)
         return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
 
-    def as_held(self, old: State, state: State, target: Target) -> Target:
-        """The target with the voltage that its control takes while the pad stays in `state`."""
+    def held(self, old: State, state: State, target: Target) -> GivenVoltage:
+        """The voltage that the target's control takes while the pad stays in `state`."""
         seen = Seen.of(self.attraction, self.interface, state, old.touching)
-        return replace(target, drive=GivenVoltage(target.drive.held(seen)))
+        return GivenVoltage(target.drive.held(seen))
 
 
 class Equilibrium(Statics):
@@ -259,7 +259,7 @@ class RigidOutline(Statics):
     ) -> State:
         """The translated outline under its attraction; raises `StepFailed` if it would touch."""
         state = self.rest(target.bone(old.bone), old.voltage)
-        state = self.rest(state.bone, self.as_held(old, state, target).drive.voltage)
+        state = self.rest(state.bone, self.held(old, state, target).voltage)
         gap = surface_state(self.interface.surface, self.positions(state.u)).gap
         if gap.min() <= 0.0 or target.height.free:
             raise StepFailed("a rigid outline cannot touch", [1.0])

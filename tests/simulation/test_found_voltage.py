@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 import evfem as ev
+from evfem.contact.pad import surface_state
 from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.measures import Seen, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.run import Run
-from evfem.solver.voltage import Seen, electrode_charge, smallest_gap
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
 SCREEN = ev.Display(ev.Layer(0.01, 3.0), friction=0.0)
@@ -208,7 +209,8 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
     attraction.charging.begin(attraction.charged(rest, 90.0, None, charges), seconds)
 
     def seen(place, voltage=120.0):
-        return Seen(attraction, place, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool))
+        below = surface_state(attraction.surface, place)
+        return Seen(attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool))
 
     for measure in (electrode_charge, smallest_gap):
         reading, step = measure(seen(position)), 1e-6
