@@ -142,7 +142,7 @@ def projected(problem: DiscProblem, forces: Forces, state: Floats) -> Projected:
     scale = max(1e-300, *(np.abs(part).max(initial=0.0) for part in (wanted, force, forces.drop, held)))
     miss = max(np.abs(wanted - force).max(initial=0.0), np.abs(drop).max(initial=0.0))
     if problem.extra_unknowns is not None:
-        miss = max(miss, np.abs(_lacking(problem.extra_unknowns, forces)).max(initial=0.0))
+        miss = max(miss, np.abs(_lacking(problem.extra_unknowns, forces, scale)).max(initial=0.0))
     return Projected(p, z, status, float(miss / scale))
 
 
@@ -155,5 +155,10 @@ def _drop(problem: DiscProblem, status: Ints, gap: Floats) -> Floats:
     return np.where(status == OPEN, weaker, -known.gain_on_closing)
 
 
-def _lacking(extra: ExtraUnknowns, forces: Forces) -> Floats:
-    return extra.right - extra.rows @ (forces.contact + forces.drop) - extra.pivot @ forces.extra
+def _lacking(extra: ExtraUnknowns, forces: Forces, scale: float) -> Floats:
+    """What the equations lack (p,), a condition of its own as a share of its terms times the `scale`."""
+    terms = np.hstack([extra.rows * (forces.contact + forces.drop), extra.pivot * forces.extra])
+    lacking, own = extra.right - terms.sum(axis=1), extra.conditioned
+    size = np.abs(terms[own]).sum(axis=1) + np.abs(extra.right[own])
+    lacking[own] *= scale / np.maximum(size, 1e-300)
+    return np.asarray(lacking)

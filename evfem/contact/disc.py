@@ -98,8 +98,9 @@ def _starts(problem: DiscProblem, given: Forces) -> Iterator[tuple[Forces, Proje
     """Where Newton's method starts, one after the other until it ends: forces, and what the laws make
     of them.
     """
-    touched = given.contact[::3] > 0.0
-    if not touched.any():
+    touched, extra = given.contact[::3] > 0.0, problem.extra_unknowns
+    # sweeps leave the unknowns as they are: a voltage that keeps a charge would be one that is given
+    if not touched.any() and not (extra is not None and extra.conditioned.size):
         with suppress(ContactNotSolved):
             given = sweeps(problem, given, DISC_SWEEPS)
     if problem.yields:

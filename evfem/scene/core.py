@@ -25,7 +25,7 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import Electrics
-from evfem.scene.motion import Hover
+from evfem.scene.motion import Hover, follows_gap
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
 from evfem.tissue.splitlaw import plane_modulus, split
@@ -89,7 +89,8 @@ def core_of(scene: Scene, mesh: Mesh) -> Core | None:
     """
     wanted, voltage = scene.solver.core, scene.electrics.largest_voltage
     charged = scene.drive is not None and scene.drive.resolved
-    has_none = charged or not scene.air_layer or isinstance(scene.voltage, FollowForce)
+    found = isinstance(scene.voltage, FollowForce) or any(map(follows_gap, scene.motion))
+    has_none = charged or found or not scene.air_layer
     if wanted == "off" or not scene.electrics.acts or has_none or _full(scene, mesh):
         return None
     electrics, rough = electrics_of(scene, mesh), roughness_of(scene.roughness_gap)

@@ -53,7 +53,7 @@ class Electrics:
             thickness = getattr(scene.finger, "stratum_corneum_thickness", SKIN)
         eps_r = float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
         skin = (scene.drive or Drive()).skin_layer(float(thickness), eps_r)
-        ramps = tuple(motion.voltage for motion in scene.motion if isinstance(motion, VoltageRamp))
+        ramps = tuple(motion.largest for motion in scene.motion if isinstance(motion, VoltageRamp))
         return cls(scene.law, scene.drive, scene.voltage, ramps, eps_r, skin, scene.ground.insulator)
 
     def above(self, electrical: Any, mesh: Any, nodes: Ints) -> Electrics:

@@ -14,6 +14,9 @@ from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
 
+#: a voltage (V) that is not known before the run
+UNKNOWN_VOLTAGE = 10_000.0
+
 # What a field may be, in words and as a check; scene files take their keys from the fields too.
 _FORCE = number("a force in N/mm, not negative", Within(0.0), "N/mm")
 _INDENTATION = number("an indentation in mm between -200 and 200", Within(-200.0, 200.0), "mm")
@@ -22,6 +25,7 @@ _DISTANCE = number(
 )
 _SPEED = number("a speed in mm/s, larger than 0", Within(0.0, above=True), "mm/s")
 _GAP = number("a gap in mm from 0 to 200", Within(0.0, 200.0), "mm")
+_NARROWED = number("a gap in mm, larger than 0, up to 200", Within(0.0, 200.0, above=True), "mm")
 VOLTAGE = number("a voltage in V between -1e6 and 1e6", Within(-1e6, 1e6), "V")
 _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, above=True), "s")
 _ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
@@ -112,13 +116,33 @@ class Hover(Checked):
 
 
 @dataclass(frozen=True)
-class VoltageRamp(Checked):
-    """Take the voltage from its present value to another, in equal parts."""
+class VoltageRamp:
+    """Take the voltage from its present value to another, or to where the smallest gap of the deformed pad
+    is a given one, in equal parts.
 
-    voltage: Annotated[float, VOLTAGE, "at the end, from the present one"]
+    A gap is followed where a given voltage pulls the pad in, and back; the voltage is what it takes. Raises
+    InputError unless exactly one of the two is given.
+
+    >>> VoltageRamp(gap=0.05).largest
+    10000.0
+    """
+
+    voltage: Annotated[float | None, VOLTAGE, "at the end, from the present one; this or gap"] = None
     steps: Steps = 10
     hold: Held = "indentation"
+    gap: Annotated[float | None, _NARROWED, "smallest gap of the deformed pad at the end"] = None
     kind = "voltage"
+
+    def __post_init__(self) -> None:
+        if (self.voltage is None) == (self.gap is None):
+            given = "neither voltage nor gap" if self.gap is None else "voltage and gap"
+            raise InputError("voltage", given, "exactly one of the two")
+        check_fields(self)
+
+    @property
+    def largest(self) -> float:
+        """Voltage (V) that counts in estimates: how much a gap takes is found."""
+        return UNKNOWN_VOLTAGE if self.voltage is None else self.voltage
 
 
 @dataclass(frozen=True)
@@ -137,6 +161,15 @@ class Wait(Checked):
 
 Motion = Press | Slide | Hover | VoltageRamp | Wait
 MOTIONS: Mapping[str, type] = {cls.kind: cls for cls in get_args(Motion)}
+
+
+def follows_gap(motion: Motion) -> bool:
+    """Whether the voltage of a motion is what makes a gap.
+
+    >>> follows_gap(VoltageRamp(100.0)), follows_gap(VoltageRamp(gap=0.1))
+    (False, True)
+    """
+    return isinstance(motion, VoltageRamp) and motion.gap is not None
 
 
 def takes_time(motion: Motion) -> bool:

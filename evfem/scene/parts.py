@@ -229,7 +229,7 @@ def _lowest(scene: Scene) -> float:
         seconds = sum(abs(motion.distance) / motion.speed for motion in slides if motion.speed)
         seconds += sum(motion.duration for motion in scene.motion if isinstance(motion, Wait))
         own = [own(time) for time in np.linspace(0.0, seconds, MOMENTS).tolist()]
-    ramps = [motion.voltage for motion in scene.motion if isinstance(motion, VoltageRamp)]
+    ramps = [motion.largest for motion in scene.motion if isinstance(motion, VoltageRamp)]
     return float(min([np.min(own), *ramps]))
 
 

@@ -33,7 +33,17 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
-from evfem.scene.motion import VOLTAGE, Hover, Motion, Press, Slide, VoltageRamp, Wait, takes_time
+from evfem.scene.motion import (
+    VOLTAGE,
+    Hover,
+    Motion,
+    Press,
+    Slide,
+    VoltageRamp,
+    Wait,
+    follows_gap,
+    takes_time,
+)
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
@@ -298,6 +308,8 @@ def _check_motion(scene: Scene) -> None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
         if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, SIGNALS):
             raise InputError(key, "a voltage ramp beside a voltage profile or signal", "one of the two")
+        if follows_gap(motion) and scene.coupling != "monolithic":
+            raise InputError(f"{key}.gap", f"a gap with coupling = {scene.coupling}", "coupling = monolithic")
         if isinstance(motion, (Slide, VoltageRamp, Wait)) and motion.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"

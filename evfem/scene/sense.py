@@ -19,7 +19,7 @@ from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
-from evfem.scene.motion import Hover, Press, Slide
+from evfem.scene.motion import Hover, Press, Slide, follows_gap
 from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
 from evfem.tissue.elements import ELEMENTS
@@ -131,7 +131,8 @@ def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
 
 def _breakdown(scene: Scene) -> Iterator[str]:
     """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
-    if scene.law is None or isinstance(scene.voltage, (FollowForce, ChargeControl)):
+    found = isinstance(scene.voltage, (FollowForce, ChargeControl)) or any(map(follows_gap, scene.motion))
+    if scene.law is None or found:
         return
     seen, voltage = scene.electrics, scene.electrics.largest_voltage
     reduced = float(np.min(seen.attraction[1].reduced))

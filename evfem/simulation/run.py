@@ -21,7 +21,7 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.protocols import Observer, TimeSignal
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait
+from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, follows_gap
 from evfem.scene.scene import Scene
 from evfem.scene.way import allowed_error
 from evfem.simulation.checkpoint import (
@@ -41,6 +41,7 @@ from evfem.simulation.result import Frame, Result, Saved, provenance
 from evfem.solver.control import (
     FollowFriction,
     Force,
+    GivenGap,
     GivenVoltage,
     HeightControl,
     Indentation,
@@ -215,10 +216,11 @@ class Run:
                 "indentation": 0.0,
                 "applied_force": 0.0,
                 "voltage": self.voltage_at(0.0, 0.0),
+                "min_gap": 0.0,
                 "loose": 0.0,
             }
         row = {"position_z": 0.0} | self.rows[rows_before - 1]
-        names = ("position", "position_z", "indentation", "applied_force", "voltage")
+        names = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap")
         start = {name: row[name] for name in names}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         start["loose"] = float(row["normal_force"] <= least and row["electrostatic_force"] == 0.0)
@@ -252,7 +254,7 @@ class Run:
             x, z = motion.way
             position = towards("position", start["position"] + x)
             position_z = towards("position_z", start["position_z"] + z)
-        elif isinstance(motion, VoltageRamp):
+        elif isinstance(motion, VoltageRamp) and motion.voltage is not None:
             voltage = towards("voltage", motion.voltage)
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
@@ -263,6 +265,8 @@ class Run:
         if force is not None and self._resting(motion, start, voltage, time):
             height = Loose(float(bone[1]))
         drive: VoltageControl = GivenVoltage(voltage)
+        if isinstance(motion, VoltageRamp) and motion.gap is not None:
+            drive = GivenGap(towards("min_gap", motion.gap))
         if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
             drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
@@ -272,7 +276,7 @@ class Run:
         """Whether a force is held that the finger has at any height: it is loose, and nothing is to
         attract it at `time` (s).
         """
-        if isinstance(motion, Press) or isinstance(self.voltage, FollowForce):
+        if isinstance(motion, Press) or isinstance(self.voltage, FollowForce) or follows_gap(motion):
             return False
         if isinstance(self.voltage, ChargeControl):
             return bool(start["loose"]) and self.voltage.charge_at(time) == 0.0
@@ -308,6 +312,9 @@ class Run:
                 return self._kept(begin + fraction * seconds, begin) or end.drive
             if isinstance(wanted, FollowForce) and isinstance(end.drive, FollowFriction):
                 return self._following(wanted, x)
+            if isinstance(end.drive, GivenGap):
+                gap = start.drive.gap if isinstance(start.drive, GivenGap) else end.drive.gap
+                return GivenGap(gap + fraction * (end.drive.gap - gap))
             if self._follows(seconds):
                 return GivenVoltage(self.voltage_at(x, begin + fraction * seconds))
             first, last = start.drive.voltage, end.drive.voltage

@@ -21,8 +21,7 @@ takes the place of :math:`\mu\lambda_n`. A step that fails leaves the accepted s
         not found: halve the part; from 1/32 of the step on, release the body (5); where it does not
             come to rest, halve on, and fail at the smallest part
 
-With `steps = "auto"` the length follows the difference of one part and two halves (`path`). A given
-charge of the electrode is brought about by the voltage, in a search around (2) (`voltage`).
+With `steps = "auto"` the length follows the difference of one part and two halves (`path`).
 
 **2. One equilibrium** (`equilibrium`)::
 
@@ -42,7 +41,8 @@ iterate, is condensed onto the nodes c that may touch and the bone (`linearisati
 
 Gaps and slips are then linear in the new forces :math:`\lambda^+`, and the laws of contact are
 solved exactly: an active set in the plane, projections and Newton's method in space [1]_ [2]_
-(`evfem.contact.condensed`). Unknown travel of the bone and unknown voltage are solved along::
+(`evfem.contact.condensed`). Unknown travel of the bone, and a voltage that a friction force, a charge
+or a gap asks for (`control`), are solved along::
 
     factorise K at u if there is no factorisation, it was made for other candidates or another time
         step, or more than `patience` iterations would be left with it

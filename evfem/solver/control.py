@@ -27,7 +27,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -41,51 +41,50 @@ from evfem.contact.condensed import (
     StepSolution,
 )
 from evfem.contact.signorini import STICK
+from evfem.electrostatics.measures import Reading, Seen, electrode_charge, smallest_gap
 from evfem.solver.hand import Grip
-from evfem.solver.state import State
-from evfem.solver.voltage import Reading, Seen, electrode_charge, smallest_gap
+from evfem.solver.state import State, StepFailed
 
 #: a voltage (V) that is none
 TINY = 1e-300
+#: why no voltage makes a gap (mm)
+TOO_WIDE = "no voltage makes a smallest gap of {:.4g} mm: without one it is {:.4g} mm"
 #: the voltage of `FollowFriction`: at its lower or upper bound, or an unknown settled by the friction force
 AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
 
-class HeightControl(Protocol):
-    """How high the bone stands: prescribed, or settled by an equation."""
+class HeightControl:
+    """How high the bone stands: prescribed, or settled by an equation; here by nothing. `free`: whether it is
+    an unknown of the step.
+    """
 
-    @property
-    def free(self) -> bool:
-        """Whether the bone's height is an unknown of the step."""
-
-    def known(self, height: float) -> float:
-        """The prescribed height (mm), or the present `height` where it is an unknown."""
-
-    def missing(self, height: float, reaction: Floats) -> float:
-        """Upward force (N/mm) on the bone that the equation lacks at a height and reactions (2,)."""
-
-    def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
-        """The extra unknown, the bone's travel from `height` in mm, or nothing."""
-
-    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
-        """The control at `fraction` of the way to another one of its kind."""
-
-
-@dataclass(frozen=True)
-class Indentation:
-    """The bone stands at `height` (mm)."""
-
-    height: float
     free = False
 
     def known(self, height: float) -> float:
-        return self.height
+        """The prescribed height (mm), or the present `height` where it is an unknown."""
+        return height
 
     def missing(self, height: float, reaction: Floats) -> float:
+        """Upward force (N/mm) on the bone that the equation lacks at a height and reactions (2,)."""
         return 0.0
 
     def unknowns(self, tangent: CondensedTangent, height: float) -> tuple[ExtraUnknown, ...]:
+        """The extra unknown, the bone's travel from `height` in mm, or nothing."""
         return ()
+
+    def towards(self, end: HeightControl, fraction: float) -> HeightControl:
+        """The control at `fraction` of the way to another one of its kind."""
+        return end
+
+
+@dataclass(frozen=True)
+class Indentation(HeightControl):
+    """The bone stands at `height` (mm)."""
+
+    height: float
+
+    def known(self, height: float) -> float:
+        return self.height
 
     def towards(self, end: HeightControl, fraction: float) -> HeightControl:
         assert isinstance(end, Indentation)
@@ -93,14 +92,11 @@ class Indentation:
 
 
 @dataclass(frozen=True)
-class Force:
+class Force(HeightControl):
     """The bone carries the downward `force` (N/mm)."""
 
     force: float
     free = True
-
-    def known(self, height: float) -> float:
-        return height
 
     def missing(self, height: float, reaction: Floats) -> float:
         return float(-self.force - reaction[1])
@@ -157,14 +153,12 @@ class DrivenStep:
 
 
 class VoltageControl:
-    """What the voltage is: prescribed, or settled by an equation between bounds. As it stands here nothing
-    but `voltage` (V) settles it.
+    """What the voltage is: prescribed, or settled by an equation between bounds; here `voltage` (V), else the
+    largest allowed one. Whether friction `follows` from it, and whether it is an unknown now, `free`.
     """
 
-    #: whether friction may settle the voltage; and whether it is an unknown of the present iteration
     follows: Any = False
     free: Any = False
-    #: the prescribed voltage (V), or the largest allowed one
     voltage: float = 0.0
 
     def begin(self, old: State) -> None:
@@ -187,15 +181,17 @@ class VoltageControl:
         return self.voltage
 
     def after(self, voltage: float, change: float) -> float:
-        """The voltage (V) after a change of its unknown in the unit of `DrivenStep`: its square, at least 0,
-        while its sign stays.
-        """
+        """The voltage (V), its sign kept, after a change of its unknown, here its square in kV^2."""
         squared = (voltage / KILOVOLT) ** 2 + change
         return float(np.copysign(KILOVOLT * np.sqrt(max(squared, 0.0)), voltage))
 
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         """Contact, together with the voltage where it is an unknown."""
         return DrivenStep(drive.solve(step))
+
+    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        """The voltage where it follows what the pad does, or nothing."""
+        return ()
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
         """Whether the equation, or its bound, holds for a bone that moves `forward` (+1 or -1)."""
@@ -217,10 +213,9 @@ class GivenVoltage(VoltageControl):
 
 
 class Met(VoltageControl):
-    """The voltage makes a number of the state what is wished: one more unknown, with the equation that the
-    number, linear in voltage and displacements, is that. The step is regular where a given voltage has no
-    equilibrium: under a given charge a plate's attraction does not change with its gap, and at a given gap
-    nothing of it does.
+    """The voltage makes a number of the state what is wished: one more unknown, with the equation that this
+    number, linear in voltage and displacements, is the wish. That is regular where a given voltage has no
+    equilibrium: the attraction under a given charge does not grow as the gap closes.
     """
 
     free = True
@@ -241,6 +236,9 @@ class Met(VoltageControl):
         travels = [row[unknown.axis - step.body.dim] for unknown in step.unknowns]
         share = np.array([*travels, reading.by_voltage + own])
         return ExtraUnknown(push, 0, 0.0, Condition(row, share, wish - reading.value - still)), saved
+
+    def unknowns(self, step: LinearContactStep, drive: VoltageProblem) -> tuple[ExtraUnknown, ...]:
+        return (self.unknown(step, drive)[0],)
 
     def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
         unknown, saved = self.unknown(step, drive)
@@ -290,6 +288,12 @@ class GivenGap(Met):
 
     def lacking(self, seen: Seen) -> float:
         return abs(smallest_gap(seen).value / self.gap - 1.0)
+
+    def solve(self, step: LinearContactStep, drive: VoltageProblem) -> DrivenStep:
+        found = super().solve(step, drive)
+        if drive.squared == 0.0 and found.change < 0.0:
+            raise StepFailed(TOO_WIDE.format(self.gap, smallest_gap(drive.seen).value), [])
+        return found
 
 
 @dataclass

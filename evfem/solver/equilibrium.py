@@ -29,6 +29,7 @@ from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
+from evfem.electrostatics.measures import Seen
 from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
@@ -43,7 +44,6 @@ from evfem.solver.state import (
     StepFailed,
 )
 from evfem.solver.strategy import stuck
-from evfem.solver.voltage import Seen
 
 #: why an equilibrium is refused that the body leaves
 NOT_STABLE = "the equilibrium that was found is not stable: {}, {:.3g} times as hard as its tissue holds it"
@@ -104,10 +104,10 @@ class Equilibrium:
             return np.zeros_like(state.contact_force)
         return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
 
-    def as_held(self, old: State, state: State, target: Target) -> Target:
-        """The target with the voltage that its control takes while the pad stays in `state`."""
+    def held(self, old: State, state: State, target: Target) -> GivenVoltage:
+        """The voltage that the target's control takes while the pad stays in `state`."""
         seen = Seen.of(self.attraction, self.interface, state, old.touching)
-        return replace(target, drive=GivenVoltage(target.drive.held(seen)))
+        return GivenVoltage(target.drive.held(seen))
 
     def step(
         self, old: State, target: Target, frozen: Floats | None = None, start: State | None = None

@@ -44,6 +44,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, Verge, verge
+from evfem.electrostatics.measures import Seen
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Target, VoltageProblem
 from evfem.solver.findings import findings
@@ -52,7 +53,6 @@ from evfem.solver.linearisation import Linearisation
 from evfem.solver.pressure import Pressure
 from evfem.solver.state import NO_PRESSURE, Balance, Limits, MixedBalance, Reusable, State, StepFailed
 from evfem.solver.travel import Travel
-from evfem.solver.voltage import Seen
 from evfem.tissue.body import Body
 
 
@@ -289,9 +289,7 @@ class FactorisedBody:
         return Seen.of(self.attraction, self.interface, state, self.linearisation.touching)
 
     def _problem(self, saved: Floats, state: State) -> VoltageProblem:
-        """What a voltage control has at its disposal; `saved` is the residual's state for the backward
-        solve.
-        """
+        """What a voltage control has; `saved` is the residual's state for the backward solve."""
         factor, seen, nodes = self.linearisation.factor, self._seen(state), self.pad.nodes
 
         def pushed(forces: Floats) -> tuple[Floats, Floats]:
@@ -344,7 +342,11 @@ class FactorisedBody:
         ahead = self.begin(state, target, frozen=False, start=state)
         self.linearisation.factorise(state)
         still = np.zeros(len(self.linearisation.tangent.schur))
-        found = [verge(self._contact_step(state, place, target, still)) for place in (state, ahead)]
+        none, found = np.zeros(self.body.reduce(state.u).size), []
+        for place in (state, ahead):
+            step = self._contact_step(state, place, target, still)
+            also = target.drive.unknowns(step, self._problem(none, place))
+            found.append(verge(replace(step, unknowns=(*step.unknowns, *also))))
         return max(found, key=lambda one: one.share)
 
     # -- a step ends

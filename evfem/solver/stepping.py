@@ -30,8 +30,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
-from evfem.solver.control import Target
+from evfem.solver.control import Met, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
@@ -291,9 +292,8 @@ class Stepper:
         if at_once or equilibrium.attraction is None:
             return equilibrium.step(state, target, start=start)
         if self.coupling == "staggered_once":
-            held = equilibrium.as_held(state, state, target)
-            new = equilibrium.step(state, held, equilibrium.attraction_at(state, state, held.drive.voltage))
-            return replace(new, voltage=equilibrium.as_held(state, new, target).drive.voltage)
+            held, frozen = self._frozen(state, state, target)
+            return self._charged(state, equilibrium.step(state, held, frozen), target)
         try:
             if not self.together:
                 return self._settled(state, target)
@@ -302,6 +302,17 @@ class Stepper:
         new = equilibrium.step(state, target, start=start)
         self.unsettled += 1
         return new
+
+    def _frozen(self, old: State, state: State, target: Target) -> tuple[Target, Floats]:
+        """The target with the voltage that it takes in `state`, and the attraction (P, dim) there."""
+        if isinstance(target.drive, Met):
+            target = replace(target, drive=self.equilibrium.held(old, state, target))
+        return target, self.equilibrium.attraction_at(old, state, target.drive.voltage)
+
+    def _charged(self, old: State, new: State, target: Target) -> State:
+        """The new state with the voltage that its own place takes."""
+        met = isinstance(target.drive, Met)
+        return replace(new, voltage=self.equilibrium.held(old, new, target).voltage) if met else new
 
     @property
     def _dragged(self) -> bool:
@@ -313,11 +324,10 @@ class Stepper:
         equilibrium, new = self.equilibrium, state
         changes: list[float] = []
         while len(changes) < STAGGERED_LIMIT and not stuck(changes):
-            held = equilibrium.as_held(state, new, target)
-            frozen = equilibrium.attraction_at(state, new, held.drive.voltage)
+            held, frozen = self._frozen(state, new, target)
             changes.append(float(np.abs(frozen - new.attraction).max()))
             done, allowed = len(changes) > 1, max(np.abs(new.reaction).max(), SMALLEST_FORCE)
             if done and changes[-1] <= equilibrium.tolerance * allowed:
-                return replace(new, voltage=held.drive.voltage)
+                return self._charged(state, new, target)
             new = equilibrium.step(state, held, frozen, start=new if done else None)
         raise StepFailed("the staggered coupling does not settle", equilibrium.record.residuals)

@@ -169,11 +169,12 @@ def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
         "version = 1\n[surface]\nkind='sinusoid'\nfriction=[[0, 0.3], [1, 0.5]]\nterms=[[0.1, 2, 0]]\n"
         "[electrostatics]\nlaw='kaczmarek'\ninsulator_thickness=0.1\ninsulator_eps_r=3\nair_layer=false\n"
         "[[motion]]\nkind='press'\nindentation=1\nspeed=2\n[[motion]]\nkind='voltage'\nvoltage=100\nsteps=3\nhold='force'\n"
-        "[[motion]]\nkind='slide'\ndistance=-1\nhold='force'\n"
+        "[[motion]]\nkind='slide'\ndistance=-1\nhold='force'\n[[motion]]\nkind='voltage'\ngap=0.05\nsteps=4\n"
     )
     scene = loads(text)
     press, ramp = Press(indentation=1.0, speed=2.0), VoltageRamp(100.0, steps=3, hold="force")
-    assert scene.motion == (press, ramp, Slide(distance=-1.0, hold="force"))
+    closing = VoltageRamp(gap=0.05, steps=4)
+    assert scene.motion == (press, ramp, Slide(distance=-1.0, hold="force"), closing)
     assert scene.voltage == 0.0
     assert scene.surface.friction_coefficient(np.array([0.5])).tolist() == [0.4]
     assert scene.surface.terms == ((0.1, 2.0, 0.0),)
@@ -219,7 +220,8 @@ def scenes(folder):
         output=Output(3),
     )
     grooves = Grating(1.0, 0.05, groove_width=0.4, phase=0.1, insulator=Layer(0.1, 3.0))
-    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press])
+    closing = VoltageRamp(gap=0.05, hold="force")
+    yield Scene(FingerPad(), grooves, Kaczmarek(), 100.0, [press, closing])
     rough = SelfAffine(0.7, 0.01, 5.0, 0.2, longest=2.0, seed=4, friction=[[0.0, 0.1], [1.0, 0.2]], y=-7.0)
     yield Scene(FingerPad(), rough, motion=[press])
 

@@ -1,5 +1,5 @@
-"""What the voltage may be asked to bring about (`evfem.solver.control.Met`), and how that changes with
-voltage and pad.
+"""What a voltage may be asked to bring about (`evfem.solver.control.Met`): the electrode's charge and the
+smallest gap of a pad, with their derivatives.
 """
 
 from __future__ import annotations
@@ -11,43 +11,39 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.pad import SurfaceState, surface_state
-from evfem.solver.interface import Interface
-from evfem.solver.state import State
+
+#: gaps up to this (mm) count as closed
+CLOSED = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What the attraction sees of a state: positions (P, dim), voltage (V), contact forces along the normal
-    (P,), and who touched when the step began (P,).
+    """What the attraction sees of a state: positions (P, dim), the surface below them, voltage (V), contact
+    forces along the normal (P,), and who touched when the step began (P,).
     """
 
     attraction: Any
     position: Floats
+    surface: Any
     voltage: float
     pressing: Floats
     touching: Any
 
     @classmethod
-    def of(cls, attraction: Any, interface: Interface, state: State, touching: Any) -> Seen:
-        """Of `state`, in a step that began with these nodes `touching` (P,)."""
-        position, pressing = interface.resting(state), state.contact_force[:, 0]
-        return cls(attraction, position, state.voltage, pressing, touching)
+    def of(cls, attraction: Any, interface: Any, state: Any, touching: Any) -> Seen:
+        """Of a `state` on its `interface`, in a step that began with these nodes `touching` (P,)."""
+        at = interface.resting(state), interface.surface_at(state)
+        return cls(attraction, *at, state.voltage, state.contact_force[:, 0], touching)
 
     def forces(self, voltage: float) -> Floats:
         """Attraction (P, dim) of the pad nodes under a voltage (V)."""
-        return self.attraction.forces(self.position, voltage, self.touching, self.pressing)
+        return np.asarray(self.attraction.forces(self.position, voltage, self.touching, self.pressing))
 
     @property
     def slope(self) -> Floats:
         """By how much the attraction (P, dim) grows with a kV: it is quadratic in the voltage."""
         more, less = (self.forces(self.voltage + change) for change in (KILOVOLT, -KILOVOLT))
         return 0.5 * (more - less)
-
-    @property
-    def surface(self) -> SurfaceState:
-        """The surface below the pad nodes."""
-        return surface_state(self.attraction.surface, self.position)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,10 +60,9 @@ def electrode_charge(seen: Seen) -> Reading:
     left out.
     """
     charging, surface = seen.attraction.charging, seen.surface
-    assert charging is not None
     at = seen.attraction.charged(seen.position, seen.voltage, seen.pressing)
     by_gap, by_length = charging.charge_slopes(at)
-    by_gap = np.where(surface.gap > 0.0, by_gap, 0.0)
+    by_gap = np.where(surface.gap > CLOSED, by_gap, 0.0)
     by_position = np.zeros_like(seen.position)
     by_position[:, 0], by_position[:, 1] = -by_gap * surface.slope, by_gap
     of, moved, value = seen.attraction.pad.tributary_gradient(seen.position)
@@ -77,8 +72,7 @@ def electrode_charge(seen: Seen) -> Reading:
 
 def smallest_gap(seen: Seen) -> Reading:
     """The smallest vertical gap of the pad (mm)."""
-    surface = seen.surface
-    least = int(np.argmin(surface.gap))
+    least = int(np.argmin(seen.surface.gap))
     by_position = np.zeros_like(seen.position)
-    by_position[least, :2] = -surface.slope[least], 1.0
-    return Reading(float(surface.gap[least]), 0.0, by_position)
+    by_position[least, :2] = -seen.surface.slope[least], 1.0
+    return Reading(float(seen.surface.gap[least]), 0.0, by_position)

@@ -1,0 +1,224 @@
+"""Voltages that are found, of a charge and of a gap, against the closed forms of a plate on a spring.
+
+Under a given voltage the plate snaps at a third of its gap; under a charge, or at a gap, it never does.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import evfem as ev
+from evfem.contact.pad import surface_state
+from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.measures import Seen, electrode_charge, smallest_gap
+from evfem.mesh.mesh import Mesh
+from evfem.simulation.run import Run
+
+SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
+SCREEN = ev.Display(ev.Layer(0.01, 3.0), friction=0.0)
+#: gap (mm) from which the plate comes, and the reduced thickness of the solids
+GAP, SOLIDS = 0.1, 0.01 / 3.0 + 1e-7
+RESOLVED = ev.Drive(resolved=True)
+ALONG = np.array([-8.0, -7.0, -1.0, 0.0, 1.0, 7.0, 8.0])
+
+
+@cache
+def plate(dim, apart=1.0):
+    """A stiff bar or plate on far columns, so that it cannot tilt; its pad is the middle, 2 mm wide."""
+    x, y = ALONG, np.array([0.0, 1.0, 2.0, 4.5, 7.0])
+    grids = np.meshgrid(y, *[x] * (dim - 1), indexing="ij")
+    points = np.column_stack([grids[-1].ravel(), grids[0].ravel(), *(g.ravel() for g in grids[1:-1])])
+    number = np.arange(len(points)).reshape(grids[0].shape)
+    cut = lambda *at: number[tuple(slice(a, a - 1 or None) for a in at)].ravel()  # noqa: E731
+    if dim == 2:
+        cells, kind = np.stack([cut(0, 0), cut(0, 1), cut(1, 1), cut(1, 0)], axis=1), "quad"
+    else:
+        below, above = ([(k, 0, 0), (k, 0, 1), (k, 1, 1), (k, 1, 0)] for k in (0, 1))
+        cells, kind = np.stack([cut(*at) for at in [*below, *above]], axis=1), "hexahedron"
+    middle = points[cells].mean(axis=1)
+    far = (np.abs(middle[:, [0, 2][: dim - 1]]) > 7.0).all(axis=1)
+    cells = cells[(middle[:, 1] < 2.0) | far]
+    used, cells = np.unique(cells, return_inverse=True)
+    points, cells = points[used], cells.reshape(-1, 2**dim)
+    region = (points[cells].mean(axis=1)[:, 1] > 2.0).astype(int)
+    inside = (np.abs(points[:, [0, 2][: dim - 1]]) <= 1.0).all(axis=1)
+    sets = {
+        "pad": np.flatnonzero((points[:, 1] == 0.0) & inside),
+        "bone": np.flatnonzero(points[:, 1] == 7.0),
+    }
+    mesh = Mesh(points, cells, kind, region, {"plate": 0, "columns": 1}, sets)
+    laws = {"plate": ev.LinearElastic(E=2e4, nu=0.0), "columns": ev.LinearElastic(E=0.1, nu=0.0)}
+    return ev.MeshedFinger(mesh, laws, electrical=SKIN)
+
+
+def scene(dim, voltage, motion, drive=None, **given):
+    motion = [ev.Hover(GAP), *motion]
+    return ev.Scene(plate(dim), SCREEN, ev.StrongTroxel(), voltage, motion, drive=drive, **given)
+
+
+class Rising:
+    """A charge (nC, per mm in the plane) whose square grows evenly to that of `last` in a second."""
+
+    highest_frequency = 0.0
+
+    def __init__(self, last):
+        self.last, self.largest = last, abs(last)
+
+    def __call__(self, time):
+        return self.last * np.sqrt(time)
+
+
+def spring(dim):
+    """Stiffness (N/mm, N) of the columns, and the pad's width or area: 1 mm wide, 5 mm high."""
+    return 0.1 * 2.0 ** (dim - 1) / 5.0, 2.0 ** (dim - 1)
+
+
+def charging(dim, farthest=0.5):
+    """A plate whose charge takes it to `farthest` of its gap, in equal parts of 1/8."""
+    k, area = spring(dim)
+    travel = farthest * GAP * np.arange(9) / 8.0
+    charge = np.sqrt(2.0 * eps_0 * area * k * travel)
+    signal = ev.ChargeControl(Rising(1e6 * charge[-1]))
+    return scene(dim, signal, [ev.Wait(1.0, steps=8)], RESOLVED), travel, charge
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_charge_holds_a_plate_beyond_a_third_of_its_gap(dim):
+    """x = Q^2 / (2 eps_0 A k), U = Q (g + s) / (eps_0 A), which falls beyond a third."""
+    asked, travel, charge = charging(dim)
+    found, (_, area) = ev.simulate(asked), spring(dim)
+    np.testing.assert_allclose(GAP - found.min_gap, travel, rtol=2e-3, atol=1e-9)
+    volts = charge * (found.min_gap + SOLIDS) / (eps_0 * area)
+    np.testing.assert_allclose(found.voltage, volts, rtol=2e-4)
+    assert found.voltage[-1] < found.voltage.max()
+    assert found.relaxations.sum() == 0
+    assert found.newton_iterations.max() <= 8
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_balance_closes_on_the_way_beyond_a_third(dim):
+    found = ev.simulate(charging(dim)[0])
+    spent = found.field_energy + found.electrostatic_work + found.stretch_work
+    np.testing.assert_allclose(found.source_work, spent, rtol=1e-5)
+    # while the pad moves, charges and voltage are those before: the integrator takes the rest
+    names = ("stored_energy", "friction_dissipation", "integrator_dissipation", "snap_dissipation")
+    kept = sum(found[name] for name in names)
+    np.testing.assert_allclose(found.electrostatic_work + found.external_work, kept, rtol=1e-5, atol=1e-12)
+    # without leak the field's energy is Q U / 2
+    charge = 2.0 * found.field_energy[1:] / found.voltage[1:]
+    np.testing.assert_allclose(charge, charging(dim)[2][1:], rtol=1e-7)
+
+
+def test_a_charge_of_either_sign_takes_a_voltage_of_its_own():
+    asked = charging(2)[0]
+    minus = ev.ChargeControl(Rising(-asked.voltage.charge.last))
+    up, down = ev.simulate(asked), ev.simulate(replace(asked, voltage=minus))
+    np.testing.assert_allclose(down.voltage, -up.voltage, rtol=1e-12)
+    np.testing.assert_allclose(down.min_gap, up.min_gap, rtol=1e-12)
+
+
+def test_a_charge_that_leaks_leaves_the_voltage_of_the_insulator():
+    """Long after, no field is left in a skin and a gap that conduct: U = Q s_3 / (eps_0 A), no force."""
+    leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-3), gap_conductivity=1e-4, resolved=True)
+    found = ev.simulate(scene(2, ev.ChargeControl(0.05), [ev.Wait(1.0, steps=4)], leak))
+    charge, (_, area) = 0.05e-6, spring(2)
+    assert found.electrostatic_force[0] == pytest.approx(charge**2 / (2.0 * eps_0 * area), rel=1e-3)
+    assert found.electrostatic_force[-1] < 1e-9 * found.electrostatic_force[0]
+    assert found.voltage[-1] == pytest.approx(charge * 0.01 / 3.0 / (eps_0 * area), rel=1e-6)
+
+
+@pytest.mark.parametrize("coupling", ["staggered", "staggered_once"])
+def test_a_charge_goes_with_both_couplings(coupling):
+    """It is the given one with each of them."""
+    asked, _, charge = charging(2)
+    found = ev.simulate(replace(asked, coupling=coupling))
+    np.testing.assert_allclose(2.0 * found.field_energy[1:] / found.voltage[1:], charge[1:], rtol=1e-7)
+
+
+def test_a_charge_is_kept_by_a_finger_under_a_given_force():
+    """Voltage and height of the bone are found together."""
+    soft = ev.FingerPad(resolution="coarse", ridges=False, electrical=ev.Electrical(0.30))
+    screen = ev.Display(insulator=ev.TOUCHSCREEN, friction=0.4)
+    motion = [ev.Press(force=0.02, steps=2), ev.Wait(0.16, steps=2, hold="force")]
+    asked = ev.ChargeControl(Rising(0.1))
+    found = ev.simulate(ev.Scene(soft, screen, ev.StrongTroxel(), asked, motion, drive=RESOLVED))
+    np.testing.assert_allclose(found.applied_force[1:], 0.02, rtol=1e-7)
+    charge = 2e6 * found.field_energy[2:] / found.voltage[2:]
+    np.testing.assert_allclose(charge, 0.1 * np.sqrt([0.08, 0.16]), rtol=1e-7)
+
+
+# -- a given gap ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_voltage_is_found_for_every_gap_through_the_pull_in_and_back(dim):
+    """U^2 = 2 k x (g + s)^2 / (eps_0 A): up to a third of the gap, down beyond, and the same way back."""
+    there = [ev.VoltageRamp(gap=0.02, steps=8), ev.VoltageRamp(gap=GAP, steps=2)]
+    found, (k, area) = ev.simulate(scene(dim, 0.0, there)), spring(dim)
+    gap = np.array([0.10, 0.09, 0.08, 0.07, 0.06, 0.05, 0.04, 0.03, 0.02, 0.06, 0.10])
+    np.testing.assert_allclose(found.min_gap, gap, rtol=1e-8)
+    expected = np.sqrt(2.0 * k * np.maximum(GAP - gap, 0.0) * (gap + SOLIDS) ** 2 / (eps_0 * area))
+    np.testing.assert_allclose(found.voltage, expected, rtol=2e-3, atol=0.05)
+    assert np.argmax(found.voltage) == 3
+    assert found.voltage[9] == pytest.approx(found.voltage[4], rel=1e-6)
+    assert found.relaxations.sum() == 0
+    assert found.newton_iterations.max() <= 8
+
+
+def test_a_gap_is_reached_in_a_run_that_goes_on_after_an_interruption():
+    whole = scene(2, 0.0, [ev.VoltageRamp(gap=0.03, steps=4), ev.VoltageRamp(0.0, steps=2)])
+    saved = []
+
+    class Keep:
+        def step(self, row, frame, checkpoint):
+            saved.append((checkpoint(), [*(saved[-1][1] if saved else []), dict(row)]))
+
+    straight = ev.simulate(whole, observers=[Keep()])
+    resumed = ev.simulate(whole, resume=ev.result.Saved(*saved[3]))
+    for name in ("voltage", "min_gap", "electrostatic_force", "stored_energy"):
+        np.testing.assert_array_equal(resumed[name], straight[name])
+    assert straight.voltage[-1] == 0.0
+
+
+def test_a_wider_gap_than_without_a_voltage_is_refused_with_a_sentence():
+    with pytest.raises(ev.NotConverged, match=r"no voltage makes .* without one it is 0[.]1 mm"):
+        ev.simulate(scene(2, 0.0, [ev.VoltageRamp(gap=0.2, steps=1)]))
+
+
+def test_a_gap_needs_the_monolithic_coupling():
+    with pytest.raises(ev.InputError, match="coupling = monolithic"):
+        scene(2, 0.0, [ev.VoltageRamp(gap=0.05)], coupling="staggered")
+
+
+# -- derivatives ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seconds", [0.0, 1e-3])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, seconds):
+    """At a pad that is out of shape, some nodes touching, with charges that leak."""
+    leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-4), gap_conductivity=1e-8, resolved=True)
+    run = Run(scene(dim, 100.0, [ev.Wait(1.0, steps=1)], leak), None)
+    attraction, rest = run.model.attraction, run.model.equilibrium.positions(run.state.u)
+    random = np.random.default_rng(3)
+    position = rest + random.uniform(0.0, 0.05, rest.shape)
+    position[0, 1] = -0.01
+    charges = 1e3 * random.standard_normal((2, len(rest)))
+    attraction.charging.begin(attraction.charged(rest, 90.0, None, charges), seconds)
+
+    def seen(place, voltage=120.0):
+        below = surface_state(attraction.surface, place)
+        return Seen(attraction, place, below, voltage, np.zeros(len(rest)), np.zeros(len(rest), dtype=bool))
+
+    for measure in (electrode_charge, smallest_gap):
+        reading, step = measure(seen(position)), 1e-6
+        for way in random.standard_normal((6, *rest.shape)):
+            if measure is electrode_charge:
+                way[0, 1] = 0.0  # a touching node is held by contact
+            ends = [measure(seen(position + side * step * way)).value for side in (1.0, -1.0)]
+            slope = (ends[0] - ends[1]) / (2.0 * step)
+            assert np.sum(reading.by_position * way) == pytest.approx(slope, rel=2e-5)
+        volts = [measure(seen(position, 120.0 + side)).value for side in (1.0, -1.0)]
+        assert reading.by_voltage == pytest.approx(500.0 * (volts[0] - volts[1]), rel=1e-9)
