@@ -15,7 +15,7 @@ from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
 from evfem.solver.hand import Grip
 
-pytestmark = [pytest.mark.solver, pytest.mark.filterwarnings("ignore:the shear modulus of tissue, 25 MPa")]
+pytestmark = pytest.mark.solver
 #: hardly deforms: 4 mm on 0.02 mm of 50 MPa
 SLAB = finger(block(2, 1, width=4.0, height=0.02), E=50.0, nu=0.0)
 N, K, M = 0.04, 0.02, 1e-6
