@@ -28,8 +28,10 @@ from evfem.tissue.splitlaw import nearly_incompressible, split
 
 #: shear modulus over that of Table 2 in a `FingerPad`, of what is hard when it is dry and of what is always
 #: soft, and in a mesh (MPa) of its softest material and of the others, at most: kPa make a factor of 1000
-TIMES_TABLE_2, TIMES_SOFT, SOFTEST, HARD = 1e4, 300.0, 10.0, 2e4
+TIMES_TABLE_2, TIMES_SOFT, SOFTEST, SOFTEST_SHEET, HARD = 1e4, 300.0, 10.0, 1e3, 2e4
 DRIES = ("stratum_corneum", "nail")
+#: height (mm) of a mesh below which it is a sheet and no finger
+THIN = 1.0
 #: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
 #: least, and rms slope of a profile, at most
 SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.5, 0.2, 10.0
@@ -52,7 +54,13 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
     shear moduli (MPa) of the materials.
     """
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
-    return (*_hard(scene, moduli), *lengths, *_breakdown(scene), *_unbearable(scene), *_hovering(scene, mesh))
+    return (
+        *_hard(scene, mesh, moduli),
+        *lengths,
+        *_breakdown(scene),
+        *_unbearable(scene),
+        *_hovering(scene, mesh),
+    )
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
@@ -68,10 +76,11 @@ def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[st
         yield f"{' and '.join(locked)} hardly changes volume at all, and {cells}: use {other}"
 
 
-def _hard(scene: Scene, moduli: Mapping[str, float]) -> Iterator[str]:
+def _hard(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:
     softest = min(moduli, key=lambda name: moduli[name])
     for name, modulus in moduli.items():
-        most = SOFTEST if name == softest else HARD
+        thin = float(np.ptp(mesh.points[:, 1])) < THIN
+        most = HARD if name != softest else SOFTEST_SHEET if thin else SOFTEST
         if name in TABLE_2 and not isinstance(scene.finger, MeshedFinger):
             times = TIMES_TABLE_2 if name in DRIES else TIMES_SOFT
             most = times * NeoHookean(*TABLE_2[name]).mu
