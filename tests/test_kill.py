@@ -65,6 +65,7 @@ def test_kills_at_random_moments_lose_nothing(name, count, tmp_path):
 
 
 @pytest.mark.parametrize("name", kills.SCENES)
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_run_resumed_after_any_step_repeats_the_uninterrupted_one_to_the_last_bit(name, tmp_path):
     kills.prepare(tmp_path, name)
     scene, kept = load(tmp_path / f"{name}.toml"), {}

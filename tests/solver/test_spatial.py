@@ -215,6 +215,7 @@ def test_what_sinks_in_on_a_linear_step_is_a_candidate_of_the_next():
 
 
 @pytest.mark.parametrize(("stiff", "many"), [(0.1, False), (1e-3, True)])
+@pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_what_is_attracted_more_than_a_body_holds_is_a_candidate(stiff, many):
     """Ten times the shear modulus over the height, 2 mm, on a node's area."""
     display = ev.Display(y=-0.005, insulator=ev.Layer(thickness=0.01, eps_r=3.35), friction=0.3)
