@@ -34,7 +34,7 @@ DRIES = ("stratum_corneum", "nail")
 THIN = 1.0
 #: size across (mm) of a mesh, at least, and of an insulator, at most; speed of a slide (mm/s), at
 #: least, and rms slope of a profile, at most
-SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.5, 0.2, 10.0
+SMALLEST, THICKEST_INSULATOR, SLOWEST, STEEPEST = 1.95, 0.95, 0.2, 20.0
 #: stiffness against a change of volume over that in shear, of tissue in which elements lock: nu = 0.499995
 LOCKED = 1e5
 #: field (V/um) that breaks any solid down

@@ -78,7 +78,7 @@ def test_a_mesh_in_centimetres_is_doubted():
 
 
 def test_an_insulator_in_micrometres_is_doubted():
-    for thickness, doubted in ((1.0, True), (0.4, False)):
+    for thickness, doubted in ((1.0, True), (0.9, False)):
         display = ev.Display(insulator=ev.Layer(thickness, 3.35))
         found = plan(replace(scene(law=ev.Kaczmarek(), voltage=100.0), surface=display)).warnings
         assert [one[:24] for one in found] == ["an insulator of 1 mm is "] * doubted

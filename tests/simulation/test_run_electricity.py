@@ -99,6 +99,7 @@ def test_hover_force_is_the_integral_over_the_deformed_outline(gap, rise):
     assert result.indentation[0] == -gap
 
 
+@pytest.mark.filterwarnings("ignore:the shear modulus of tissue")
 def test_a_stiff_hovering_pad_carries_the_force_of_the_rigid_outline():
     body = finger(block(40, 2, sag=1.0), E=1e3)
     result = run(Display(), Hover(0.25), body=body, law=Kaczmarek(), voltage=1000.0)
