@@ -222,3 +222,41 @@ def test_derivatives_of_charge_and_gap_are_those_of_central_differences(dim, sec
             assert np.sum(reading.by_position * way) == pytest.approx(slope, rel=2e-5)
         volts = [measure(seen(position, 120.0 + side)).value for side in (1.0, -1.0)]
         assert reading.by_voltage == pytest.approx(500.0 * (volts[0] - volts[1]), rel=1e-9)
+
+
+# -- a given voltage below the pull-in -----------------------------------------------------------------------
+
+
+@cache
+def column(dim):
+    """A plate of 2 mm below a column, nothing far: the softest way from a gap to a snap."""
+    y, ends = np.array([0.0, 0.5, 1.5, 2.5, 3.5, 4.5, 5.5]), (-1.0, 1.0)
+    if dim == 2:
+        points, ring = np.array([[a, b] for b in y for a in ends]), np.array([0, 1, 3, 2])
+        kind = "quad"
+    else:
+        points = np.array([[a, b, c] for b in y for c in ends for a in ends])
+        ring, kind = np.array([0, 1, 3, 2, 4, 5, 7, 6]), "hexahedron"
+    cells = 2 ** (dim - 1) * np.arange(6)[:, None] + ring
+    sets = {"pad": np.flatnonzero(points[:, 1] == 0.0), "bone": np.flatnonzero(points[:, 1] == 5.5)}
+    return Mesh(points, cells, kind, np.array([0, 1, 1, 1, 1, 1]), {"plate": 0, "column": 1}, sets)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+@pytest.mark.parametrize("ratio", [2e3, 2e4, 2e5])
+@pytest.mark.parametrize(("share", "steps"), [(0.3, 1), (0.9, 1), (0.9, 3)])
+def test_a_stiff_plate_on_a_soft_column_stays_below_its_pull_in(dim, ratio, share, steps):
+    """U^2 = 2 k x (g + s)^2 / (eps_0 A), its root below a third; factors of few digits lead to the snap."""
+    area, far = 2.0 ** (dim - 1), GAP + SOLIDS
+    k = area / (5.0 / 0.05 + 0.5 / (0.05 * ratio))
+    volts = share * np.sqrt(8.0 * k * far**3 / (27.0 * eps_0 * area))
+    roots = np.roots([2.0 * k, -4.0 * k * far, 2.0 * k * far**2, -eps_0 * area * volts**2])
+    laws = {
+        "plate": ev.LinearElastic(E=0.05 * ratio, nu=0.0),
+        "column": ev.LinearElastic(E=0.05, nu=0.0),
+    }
+    finger = ev.MeshedFinger(column(dim), laws, electrical=SKIN)
+    motion = [ev.Hover(GAP), ev.VoltageRamp(volts, steps=steps)]
+    found = ev.simulate(ev.Scene(finger, SCREEN, ev.StrongTroxel(), motion=motion))
+    assert GAP - found.min_gap[-1] == pytest.approx(roots.real.min(), rel=1e-4)
+    assert found.relaxations.sum() == 0
