@@ -6,7 +6,9 @@ region reflective method (Branch, Coleman and Li 1999, doi:10.1137/S106482759528
 takes its place: all its numbers weigh the same, and measurements of other units weigh alike.
 
 The Jacobian is of one-sided differences in the unknowns (`evfem.calibration.parameters`), one step
-of `STEP` for each, computed side by side. A scene that the solver does not solve makes a trial step
+of `STEP` for each, computed side by side. At the end one more run for each unknown, `FAR` steps away,
+says whether its residuals are smooth: they are not where whole nodes, snaps or steps are counted, and
+such a fit ends anywhere. A scene that the solver does not solve makes a trial step
 shorter; one beside an accepted point is tried on the other side.
 """
 
@@ -42,6 +44,9 @@ from evfem.sweeps.folder import SweepFolder
 #: step of a difference, in unknowns; relative changes of an unknown, and of the sum of squares, that end
 #: the fit; most steps of it
 STEP, UNKNOWNS, SQUARES, MOST_STEPS = 1e-3, 1e-5, 1e-6, 60
+#: steps over which slopes must agree with that of one, and by how much of the larger one they may differ;
+#: the change of the residuals, as a share of them, that is the solver's noise
+FAR, ROUGH, NOISE = 10.0, 0.3, 1e-6
 #: share of the distance between the bounds from which a parameter counts as at one
 AT_BOUND = 1e-3
 
@@ -234,6 +239,29 @@ class _Residuals:
             columns.append((beside - here) / step / self.problem.scale)
         return np.column_stack(columns)
 
+    def roughness(self, z: Floats, residuals: Floats, jacobian: Floats) -> list[str]:
+        """A sentence for every unknown whose `residuals` (N,) at z change otherwise over `FAR` steps than
+        the `jacobian` (N, P) says; one run each.
+        """
+        low, high = self.problem.parameters.bounds
+        steps = np.where(
+            high - z >= z - low, np.minimum(FAR * STEP, high - z), -np.minimum(FAR * STEP, z - low)
+        )
+        ways = [z + h * unit for h, unit in zip(steps, np.eye(len(z)), strict=True)]
+        told = []
+        for key, h, far, near in zip(
+            self.problem.parameters.names, steps, self.predicted(ways), jacobian.T, strict=True
+        ):
+            slope = ((far - self.problem.measured) / self.problem.scale - residuals) / h
+            size = max(np.linalg.norm(slope), np.linalg.norm(near))
+            if size * abs(h) > NOISE * math.sqrt(len(z)) and np.linalg.norm(slope - near) > ROUGH * size:
+                told.append(
+                    f"what is compared is not smooth in {key}: over {FAR:g} steps of a difference it changes "
+                    f"by {np.linalg.norm(slope):.2g} a unit, over one by {np.linalg.norm(near):.2g}; the fit "
+                    "may end anywhere near, and its interval is no measure"
+                )
+        return told
+
 
 def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     from scipy.optimize import least_squares
@@ -256,6 +284,7 @@ def _solve(problem: _Problem, runs: Runs, progress: bool) -> FitResult:
     )
     known = confidence(found.jac, found.fun, parameters.names)
     warnings = [*([] if found.success else [f"not finished after {MOST_STEPS} steps"]), *known.warnings]
+    warnings += residuals.roughness(found.x, found.fun, found.jac)
     return FitResult(
         parameters=dict(parameters.free),
         values=parameters.values(found.x),

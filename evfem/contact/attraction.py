@@ -110,6 +110,10 @@ class Attraction:
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 
+    def weights(self, position: Floats) -> Floats:
+        """Lengths or areas (P,) by which the forces are tractions, at positions (P, dim)."""
+        return self.pad.tributary(position)
+
     #: whether `work` is known from an energy
     has_energy = False
     #: whether the forces are more than those of columns

@@ -193,6 +193,15 @@ class FieldAttraction(Attraction):
                 forces[k] += voltage**2 * self._unit_forces(position, own)
         return forces
 
+    def weights(self, position: Floats) -> Floats:
+        """Lengths (P,): half the distance of each column from the next ones, by the shape functions that
+        make its force nodal, and the columns' own on the flanks.
+        """
+        lines = self.seen(position)
+        half = 0.5 * np.diff(lines @ position[:, 0])
+        own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
+        return np.asarray(own + self.flanks.pad.tributary(position))
+
     def column_forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:

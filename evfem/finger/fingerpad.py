@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
 from pathlib import Path
@@ -40,6 +40,7 @@ from evfem.finger.sizes import (
     BoneHeight,
     BoneOffset,
     BoneWidth,
+    CellsPerRidge,
     Dermis,
     Epidermis,
     Height,
@@ -56,6 +57,7 @@ from evfem.finger.sizes import (
     Width,
     check_at_most,
     check_bone,
+    check_cells,
     check_profile,
     check_skin,
 )
@@ -190,6 +192,7 @@ class FingerPad:
     bone_height: BoneHeight = 5.0
     bone_offset: BoneOffset = 1.0
     resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 22k, 50k nodes"] = "medium"
+    cells_per_ridge: CellsPerRidge = None
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
@@ -256,6 +259,9 @@ class FingerPad:
         elif self.ridges:
             profile = (self.ridge_height, self.ridge_width, self.ridge_exponent, self.ridge_phase)
             ridges = Ridges(*profile, self.ridge_crest, self.ridge_groove, FULL * outer.a, ZONE * outer.a)
+        divisions = RESOLUTIONS[self.resolution]
+        if self.cells_per_ridge is not None:
+            divisions = replace(divisions, per_ridge=self.cells_per_ridge // 2)
         return Section(
             outer,
             bone,
@@ -265,8 +271,14 @@ class FingerPad:
             nail=self.nail_thickness,
             nail_width=self.nail_width,
             ridges=ridges,
-            divisions=RESOLUTIONS[self.resolution],
+            divisions=divisions,
         )
+
+    @property
+    def ridge_cells(self) -> float:
+        """Distances of nodes from crest to crest; 0 of a smooth pad."""
+        ridged = self.ridges or self.ridge_scan is not None
+        return (self.cells_per_ridge or 2.0 * RESOLUTIONS[self.resolution].per_ridge) if ridged else 0.0
 
 
 def participant_sizes(name: str) -> dict[str, Any]:
@@ -313,6 +325,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
     """Refuse geometry whose parts do not fit into each other."""
     (outermost, second, *_), (thickness, below, *_) = section.layers, section.thickness
     ridges, outer = section.ridges, section.outer
+    check_cells(pad.cells_per_ridge, ridges is not None)
     low, high = SLIMMEST
     if not low * (1.0 - 1e-12) <= pad.height / pad.width <= high * (1.0 + 1e-12):
         raise InputError("finger.height", pad.height, f"{low:g} to {high:g} times finger.width")
@@ -323,7 +336,7 @@ def _check_section(pad: FingerPad, section: Section) -> None:
         check_at_most(height, ridges.height, 0.7 * thickness, meaning)
         steeper = 1.0 / (1.0 - ridges.height * outer.b / outer.a**2)
         if isinstance(ridges, ScannedRidges):
-            spacing = 0.5 * ridges.pitch / RESOLUTIONS[pad.resolution].per_ridge
+            spacing = 0.5 * ridges.pitch / section.divisions.per_ridge
             _check_scan(ridges, ridges.steepest * steeper, spacing)
         else:
             check_profile(ridges, steeper)

@@ -37,6 +37,7 @@ from evfem.finger.sizes import (
     BoneHeight,
     BoneOffset,
     BoneWidth,
+    CellsPerRidge,
     Dermis,
     Epidermis,
     Height,
@@ -51,6 +52,7 @@ from evfem.finger.sizes import (
     Width,
     check_at_most,
     check_bone,
+    check_cells,
     check_profile,
     check_skin,
 )
@@ -160,6 +162,7 @@ class Fingertip:
         one_of(*TIP_RESOLUTIONS),
         "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more",
     ] = "medium"
+    cells_per_ridge: CellsPerRidge = None
     materials: Materials = field(default_factory=dict)
     electrical: Skin = field(default_factory=Electrical)
     viscosity: Viscosity = 0.0
@@ -259,14 +262,20 @@ class Fingertip:
         merging = rows_that_merge(LAYERS[0].solid_rows.get(self.resolution, 1), fine)
         return Grid((across, along), merging, divisions.sides, (x[0], z[0]), (x[1], z[1]))
 
+    @property
+    def ridge_cells(self) -> float:
+        """Distances of nodes from crest to crest; 0 of a smooth pad."""
+        divisions, parallel = TIP_RESOLUTIONS[self.resolution], self.ridges in ("along", "across")
+        by_resolution = 2.0 * (divisions.per_ridge if parallel else divisions.per_curved_ridge)
+        return 0.0 if self.ridges == "none" else self.cells_per_ridge or by_resolution
+
     def _lines(self, axis: float, parallel: bool, plain: int) -> tuple[int, float, float]:
         """Columns of the rectangle at the bone over an axis (mm), and its two ends over the axis:
         `plain` of them, or nine times as many at the surface as ridges need.
         """
         if plain:
             return plain, -RECTANGLE, RECTANGLE
-        divisions = TIP_RESOLUTIONS[self.resolution]
-        step = 9.0 * self.ridge_width / (divisions.per_ridge if parallel else divisions.per_curved_ridge)
+        step = 18.0 * self.ridge_width / self.ridge_cells
         fitting = 2.0 * RECTANGLE * axis / step
         if not parallel:
             return max(round(fitting), 1), -RECTANGLE, RECTANGLE
@@ -308,6 +317,7 @@ def _check_shape(tip: Fingertip, solid: Solid) -> None:
     """Refuse geometry whose parts do not fit into each other."""
     skin = sum(solid.thickness)
     check_skin(skin, solid.outer.smallest_radius, THICKEST)
+    check_cells(tip.cells_per_ridge, tip.ridges != "none")
     if (relief := tip.ridges) != "none":
         axis = tip.length if relief == "across" else tip.width
         check_at_most("ridge_width", tip.ridge_width, 0.045 * axis, "0.045 times the axis across the ridges")

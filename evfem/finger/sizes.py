@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import between
+from evfem.common.checks import between, whole
 from evfem.errors import InputError
 from evfem.finger.layers import LAYERS, NAIL
 from evfem.finger.outline import Ridges
@@ -37,6 +37,12 @@ RidgeCrest = Annotated[
 ]
 RidgeGroove = Annotated[
     float, between(0.0, 0.5, "pitches", **_PART), "flat part of a groove, with flat crests"
+]
+CELLS = "an even whole number from 4 to 96"
+CellsPerRidge = Annotated[
+    int | None,
+    whole(96, 4, CELLS),
+    "distances of nodes from crest to crest (half as many quadratic cells); without it by resolution",
 ]
 StratumCorneum = Annotated[float, _thickness("stratum_corneum"), "at a crest"]
 Epidermis = Annotated[float, _thickness("epidermis"), "of the living epidermis"]
@@ -71,6 +77,27 @@ def check_profile(ridges: Ridges, steeper: float = 1.0) -> None:
     if slope > limit:
         allowed = f"slopes up to {limit:g}: lower or wider ridges, a smaller ridge_exponent or ridge_crest"
         raise InputError("finger.ridge_height", f"walls with a slope of {slope:.3g}", allowed)
+
+
+def area_error(cells: float) -> float:
+    """By how much, as a share of itself, the real contact width or area of ridges may be wrong with so
+    many `cells` (linear ones) from crest to crest.
+
+    Measured with the ridges of Table 2 at .02 and .05 N/mm against 96 cells: 34 % with 6, 8 % with 12,
+    4 % with 24, 2 % with 48.
+
+    >>> [round(area_error(cells), 3) for cells in (6, 12, 48)]
+    [0.361, 0.09, 0.019]
+    """
+    return max(13.0 / cells**2, 0.9 / cells)
+
+
+def check_cells(cells: int | None, ridged: bool) -> None:
+    """Refuse `cells_per_ridge` that are odd, or of a pad without ridges."""
+    if cells is not None and not ridged:
+        raise InputError("finger.cells_per_ridge", f"{cells} without ridges", "a pad with ridges")
+    if cells is not None and cells % 2:
+        raise InputError("finger.cells_per_ridge", cells, CELLS)
 
 
 def check_bone(name: str, from_bone: Floats, axes: tuple[float, ...]) -> None:

@@ -18,6 +18,7 @@ import numpy as np
 from evfem.contact.friction import Coulomb
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
+from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.core import core_of, unseen
@@ -191,6 +192,9 @@ def _tissue(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Term:
 
 def _contact(scene: Scene) -> Term:
     shape = "a flat surface" if scene.ground.is_flat else "a textured surface: its slope and curvature enter"
+    if cells := getattr(scene.finger, "ridge_cells", 0.0):
+        error = f"{100.0 * area_error(cells):.2g} %"
+        shape += f"; with {cells:g} cells per ridge the real contact area is known to {error}"
     return Term("contact", True, shape)
 
 

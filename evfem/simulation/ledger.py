@@ -129,7 +129,10 @@ def shares(model: Model, position: Floats) -> Floats:
     """Current tributary lengths or areas of the pad nodes (P,) in mm or mm2; infinite where there
     is none.
     """
-    share = model.pad.tributary(position)
+    return _positive(model.pad.tributary(position))
+
+
+def _positive(share: Floats) -> Floats:
     return np.where(share > 0, share, np.inf)
 
 
@@ -138,6 +141,8 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
     size, nodes = model.body.space.size, model.pad.nodes
     position, withheld = model.equilibrium.positions(state.u), model.equilibrium.interface.withheld(state)
     surface, share = surface_state(model.surface, position), shares(model, position)
+
+    pulled = share if model.attraction is None else _positive(model.attraction.weights(position))
 
     def on_pad(values: Any, off: float) -> Any:
         field = np.full(size, off)
@@ -154,7 +159,7 @@ def frame_of(model: Model, state: State, row: Row) -> Frame:
         gap=on_pad(surface.gap, np.nan),
         contact_pressure=on_pad((state.contact_force[:, 0] + withheld) / share, 0.0),
         shear_traction=on_pad(_shear(state) / share, 0.0),
-        electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / share, 0.0),
+        electrostatic_traction=on_pad((reduce(np.hypot, state.attraction.T) + withheld) / pulled, 0.0),
         contact_status=on_pad(status, 0).astype(np.int64),
         von_mises=_von_mises(stress),
         cauchy_stress=stress,

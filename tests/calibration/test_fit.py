@@ -281,6 +281,20 @@ def test_a_trial_that_is_not_solved_is_stepped_back_from(path, monkeypatch):
         ev.fit(path, measured(path, friction=0.3)[0], {E: (0.02, 0.5)}, workers=1)
 
 
+def test_outputs_that_are_counted_are_said(path, monkeypatch):
+    """Forces in whole multiples of half a per cent of .01 N/mm: ten steps of a difference cross some."""
+    work = runs.work
+
+    def counted(job):
+        answer = work(job)
+        outputs = {name: 5e-5 * round(value / 5e-5) for name, value in answer.outputs.items()}
+        return Answer(answer.status, answer.seconds, answer.message, outputs)
+
+    monkeypatch.setattr(runs, "work", counted)
+    found = ev.fit(path, measured(path, friction=0.3)[0], {E: ev.Parameter(0.02, 0.5, start=0.09)}, workers=1)
+    assert [text for text in found.warnings if text.startswith(f"what is compared is not smooth in {E}")]
+
+
 @pytest.mark.parametrize(
     ("free", "sentence"),
     [

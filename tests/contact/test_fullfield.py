@@ -450,3 +450,26 @@ def test_the_stiffness_under_an_electrode_that_ends_is_solved_anew(monkeypatch):
     ends = [full.forces(points + sign * way, 300.0, None).ravel() for sign in (1.0, -1.0)]
     exact = (ends[0] - ends[1]) / (2.0 * step)
     assert found[:, 2 * node + 1] == pytest.approx(exact, abs=1e-4 * np.abs(exact).max())
+
+
+@pytest.mark.parametrize("element", ["q2p1", "q1_fbar"])
+def test_traction_below_a_smooth_pad_is_smooth_and_normal(element):
+    """A hovering conductor: by the lengths of the edges its traction zigzags by a fifth on quadratic ones."""
+    pad, above = ev.FingerPad(ridges=False, resolution="coarse"), ev.Hover(gap=0.05)
+    film, solver = ev.Display(friction=0.0), ev.Solver(element=element)
+    scene = ev.Scene(pad, film, ev.StrongTroxel(), 300.0, above, field="full", solver=solver)
+    result = ev.simulate(scene)
+    frame, model = result.frames[-1], make_model(scene)
+    place = (model.mesh.points + frame.displacement)[model.pad.nodes]
+    order = np.argsort(place[:, 0])
+    middle = order[np.abs(place[order, 0]) < 1.5]
+    traction = frame.electrostatic_traction[model.pad.nodes][middle]
+    np.testing.assert_allclose(traction[1:-1], 0.5 * (traction[2:] + traction[:-2]), rtol=0.006)
+    forces = model.attraction.forces(place, 300.0, np.zeros(len(place), bool))
+    weights = model.attraction.weights(place)
+    np.testing.assert_allclose(np.hypot(*forces[middle].T), traction * weights[middle], rtol=1e-6)
+    along = np.array([place[middle[2:]] - place[middle[:-2]]])[0]
+    pulled = forces[middle[1:-1]]
+    tangential = np.sum(along * pulled, axis=1) / np.linalg.norm(along, axis=1)
+    assert np.abs(tangential).max() < 0.01 * np.linalg.norm(pulled, axis=1).max()
+    np.testing.assert_allclose(weights.sum(), model.pad.tributary(place).sum(), rtol=1e-3)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
+import evfem as ev
 from evfem import data
 from evfem.common.checks import Within, keys_of
 from evfem.errors import InputError, readable
 from evfem.finger import fingerpad
 from evfem.finger.fingerpad import RESOLUTIONS, Electrical, FingerPad, MeshedFinger
+from evfem.finger.fingertip import Fingertip
 from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
 from evfem.mesh.faces import layer_thickness
 from evfem.mesh.quality import check, scaled_jacobian
@@ -26,7 +28,7 @@ NUMBERS = {"stratum_corneum": 0, "epidermis": 1, "dermis": 2, "hypodermis": 3, "
 RANGES = {
     key.name: (key.rule["test"].low, key.rule["test"].high, key.rule["unit"])
     for key in keys_of(FingerPad)
-    if isinstance(key.rule.get("test"), Within)
+    if isinstance(key.rule.get("test"), Within) and "unit" in key.rule
 }
 UNITS = {"ridge_crest": "of the pitch", "ridge_groove": "of the pitch"}
 
@@ -452,3 +454,44 @@ def test_an_unknown_participant_is_refused():
     for name in ("xii", 3):
         with pytest.raises(InputError, match=r"finger\.participant: given .*; allowed: i \| ii \| iii"):
             FingerPad.participant(name)
+
+
+@pytest.mark.parametrize(("finger", "cells"), [(FingerPad, 20), (Fingertip, 8)])
+def test_cells_per_ridge_are_distances_of_nodes_from_crest_to_crest(finger, cells):
+    pad = finger(resolution="coarse", ridge_width=0.6, cells_per_ridge=cells)
+    mesh = pad.mesh()
+    points = mesh.points[mesh.node_sets["pad"]]
+    middle = points[np.abs(points[:, 2:]).sum(axis=1) < 1e-9, 0]
+    # three ridges and half a distance on both sides
+    assert np.count_nonzero(np.abs(middle) < 0.9 + 0.3 / cells) == 3 * cells + 1
+    assert len(finger(resolution="coarse", cells_per_ridge=2 * cells).mesh().points) > len(mesh.points)
+
+
+@pytest.mark.parametrize("cells", [5, 2, 98, 6.5, "many"])
+def test_cells_per_ridge_that_no_mesh_has_are_refused(cells):
+    for finger in (FingerPad, Fingertip):
+        with pytest.raises(
+            InputError, match=r"finger.cells_per_ridge: given .*an even whole number from 4 to 96"
+        ):
+            finger(cells_per_ridge=cells)
+        with pytest.raises(InputError, match="8 without ridges; allowed: a pad with ridges"):
+            finger(ridges=False, cells_per_ridge=8)
+
+
+def test_the_plan_says_an_error_of_the_real_area_that_holds():
+    def pressed(cells):
+        pad = FingerPad(resolution="coarse", cells_per_ridge=cells)
+        motion = [ev.Press(force=0.02, steps=1), ev.Press(force=0.05, steps=1)]
+        scene = ev.Scene(pad, ev.Flat(friction=0.0), motion=motion)
+        return scene, ev.simulate(scene).real_contact_width
+
+    _, fine = pressed(48)
+    for cells, error in ((6, 0.36), (12, 0.09)):
+        scene, found = pressed(cells)
+        told = f"with {cells} cells per ridge the real contact area is known to {100 * error:.2g} %"
+        assert told in " ".join(str(ev.plan(scene)).split())
+        np.testing.assert_allclose(found, fine, rtol=error)
+    text = (
+        "[finger]\ncells_per_ridge = 20\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.02\n"
+    )
+    assert ev.scenefile.loads("version = 1\n" + text).finger.cells_per_ridge == 20
