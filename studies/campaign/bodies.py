@@ -80,6 +80,8 @@ def _ridges(random: Draw, wide: float, skin: float) -> Tables:
     table: Tables = {"ridge_width": pitch, "ridge_phase": random.between(-1.0, 1.0)}
     exponent = random.between(2.0, 8.0)
     table["ridge_exponent"] = exponent
+    if exponent > 7.0:  # no draw of its own: the scenes of a seed stay what they are
+        table["cells_per_ridge"] = 16
     # the slope of the wall is at most about 2 exponent height / pitch
     steepest = min(0.3 * pitch, 0.25, 2.0 * pitch / exponent)
     if random.chance(0.15):  # flat crests and grooves leave less to the wall

@@ -468,7 +468,7 @@ def test_traction_below_a_smooth_pad_is_smooth_and_normal(element):
     forces = model.attraction.forces(place, 300.0, np.zeros(len(place), bool))
     weights = model.attraction.weights(place)
     np.testing.assert_allclose(np.hypot(*forces[middle].T), traction * weights[middle], rtol=1e-6)
-    along = np.array([place[middle[2:]] - place[middle[:-2]]])[0]
+    along = place[middle[2:]] - place[middle[:-2]]
     pulled = forces[middle[1:-1]]
     tangential = np.sum(along * pulled, axis=1) / np.linalg.norm(along, axis=1)
     assert np.abs(tangential).max() < 0.01 * np.linalg.norm(pulled, axis=1).max()
