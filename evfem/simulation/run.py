@@ -222,7 +222,7 @@ class Run:
                 "min_gap": 0.0,
                 "loose": 0.0,
             }
-        row = {"position_z": 0.0} | self.rows[rows_before - 1]
+        row = {"position_z": 0.0, "min_gap": 0.0} | self.rows[rows_before - 1]
         names = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap")
         start = {name: row[name] for name in names}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
