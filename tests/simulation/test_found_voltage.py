@@ -102,10 +102,9 @@ def test_the_balance_closes_on_the_way_beyond_a_third(dim):
     found = ev.simulate(charging(dim)[0])
     spent = found.field_energy + found.electrostatic_work + found.stretch_work
     np.testing.assert_allclose(found.source_work, spent, rtol=1e-5)
-    # while the pad moves, charges and voltage are those before: the integrator takes the rest
-    names = ("stored_energy", "friction_dissipation", "integrator_dissipation", "snap_dissipation")
-    kept = sum(found[name] for name in names)
-    np.testing.assert_allclose(found.electrostatic_work + found.external_work, kept, rtol=1e-5, atol=1e-12)
+    # the columns store k x^2 / 2; the works of the bone are left out, whose remainder is a column itself
+    travel, (k, _) = charging(dim)[1], spring(dim)
+    np.testing.assert_allclose(found.stored_energy, 0.5 * k * travel**2, rtol=3e-3, atol=1e-12)
     # without leak the field's energy is Q U / 2
     charge = 2.0 * found.field_energy[1:] / found.voltage[1:]
     np.testing.assert_allclose(charge, charging(dim)[2][1:], rtol=1e-7)
