@@ -4,6 +4,7 @@ what may be tried.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from evfem.errors import InputError
 from evfem.scene.scene import Scene
 from evfem.scene.sense import weakens
 from evfem.simulation.model import Model
+from evfem.solver.control import Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 
 
@@ -44,6 +46,25 @@ def _lost(model: Model, failed: StepFailed) -> str:
     return (
         f"there is no equilibrium {rest} near here: {verge.cause}, {verge.share:.3g} times as hard as its "
         f"tissue holds it at {_place(model, state)}, and harder beyond{released}"
+    )
+
+
+def unheld(model: Model, state: State, rows: Sequence[Mapping[str, float]]) -> str:
+    """The sentence on an equilibrium at a given gap that its voltage alone does not hold; empty where it may.
+
+    In three dimensions the last two `rows` tell: the voltage falls as the gap closes.
+    """
+    verge = model.equilibrium.verge(state, Target.held(state.bone, state.voltage))
+    if verge is None and len(rows) > 1:
+        ways = [rows[-1][name] - rows[-2][name] for name in ("voltage", "min_gap")]
+        lost = abs(rows[-2]["voltage"]) > 0.0 and ways[0] * np.sign(state.voltage) * ways[1] > 0.0
+    else:
+        lost = verge is not None and verge.share > 1.0
+    if not lost:
+        return ""
+    return (
+        f"the gap of {rows[-1]['min_gap']:.4g} mm was given, and {state.voltage:.4g} V alone do not hold it: "
+        "the equilibrium is not stable, and where the finger goes from there is by chance"
     )
 
 

@@ -34,7 +34,7 @@ from evfem.simulation.checkpoint import (
     usable,
 )
 from evfem.simulation.doubtful import deepest, doubtful, outside, through
-from evfem.simulation.failure import advice
+from evfem.simulation.failure import advice, unheld
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
@@ -193,6 +193,9 @@ class Run:
             if step <= done:
                 continue
             start = self._start_of(first)
+            let_go = index and follows_gap(self.scene.motion[index - 1]) and not follows_gap(motion)
+            if let_go and done <= first and (said := unheld(self.model, self.state, self.rows)):
+                notices.warn(f"motion {index}: {said}")
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
                 seconds, now = _duration(motion, start), self.time
                 begin = self._target(motion, start, (k - 1) / motion.steps, now)
@@ -219,7 +222,7 @@ class Run:
                 "min_gap": 0.0,
                 "loose": 0.0,
             }
-        row = {"position_z": 0.0} | self.rows[rows_before - 1]
+        row = {"position_z": 0.0, "min_gap": 0.0} | self.rows[rows_before - 1]
         names = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap")
         start = {name: row[name] for name in names}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE

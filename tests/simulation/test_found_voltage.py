@@ -102,10 +102,9 @@ def test_the_balance_closes_on_the_way_beyond_a_third(dim):
     found = ev.simulate(charging(dim)[0])
     spent = found.field_energy + found.electrostatic_work + found.stretch_work
     np.testing.assert_allclose(found.source_work, spent, rtol=1e-5)
-    # while the pad moves, charges and voltage are those before: the integrator takes the rest
-    names = ("stored_energy", "friction_dissipation", "integrator_dissipation", "snap_dissipation")
-    kept = sum(found[name] for name in names)
-    np.testing.assert_allclose(found.electrostatic_work + found.external_work, kept, rtol=1e-5, atol=1e-12)
+    # the columns store k x^2 / 2; the works of the bone are left out, whose remainder is a column itself
+    travel, (k, _) = charging(dim)[1], spring(dim)
+    np.testing.assert_allclose(found.stored_energy, 0.5 * k * travel**2, rtol=3e-3, atol=1e-12)
     # without leak the field's energy is Q U / 2
     charge = 2.0 * found.field_energy[1:] / found.voltage[1:]
     np.testing.assert_allclose(charge, charging(dim)[2][1:], rtol=1e-7)
@@ -168,7 +167,7 @@ def test_a_voltage_is_found_for_every_gap_through_the_pull_in_and_back(dim):
 
 
 def test_a_gap_is_reached_in_a_run_that_goes_on_after_an_interruption():
-    whole = scene(2, 0.0, [ev.VoltageRamp(gap=0.03, steps=4), ev.VoltageRamp(0.0, steps=2)])
+    whole = scene(2, 0.0, [ev.VoltageRamp(gap=0.08, steps=4), ev.VoltageRamp(0.0, steps=2)])
     saved = []
 
     class Keep:
@@ -180,6 +179,15 @@ def test_a_gap_is_reached_in_a_run_that_goes_on_after_an_interruption():
     for name in ("voltage", "min_gap", "electrostatic_force", "stored_energy"):
         np.testing.assert_array_equal(resumed[name], straight[name])
     assert straight.voltage[-1] == 0.0
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_a_gap_that_its_voltage_does_not_hold_is_told_when_it_is_let_go(dim):
+    """Beyond a third the equilibrium under the same voltage is not stable; before it is."""
+    ramp = ev.VoltageRamp(gap=0.08, steps=2)
+    ev.simulate(scene(dim, 0.0, [ramp, ev.Slide(0.01, steps=1)]))
+    with pytest.warns(UserWarning, match="motion 2: the gap of 0.05 mm was given, and .* do not hold it"):
+        ev.simulate(scene(dim, 0.0, [replace(ramp, gap=0.05, steps=5), ev.Slide(0.01, steps=1)]))
 
 
 def test_a_wider_gap_than_without_a_voltage_is_refused_with_a_sentence():
