@@ -20,15 +20,15 @@ _NAMES = {
     "calibration.measured": ("MeasuredCurve", "MeasuredValues"),
     "calibration.parameters": ("Parameter",),
     "calibration.result": ("FitResult",),
-    "contact.friction": (
+    "surface.friction": (
         "AdhesiveFriction",
         "AgeingFriction",
         "Coulomb",
         "LoadIndexFriction",
         "RateFriction",
     ),
-    "contact.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
-    "contact.textures": ("Grating", "SelfAffine"),
+    "surface.surfaces": ("Display", "Flat", "Profile", "Sinusoid"),
+    "surface.textures": ("Grating", "SelfAffine"),
     "electrostatics.dielectrics": ("Dielectric", "DielectricTable"),
     "electrostatics.laws": (
         "FILM",
@@ -53,7 +53,7 @@ _NAMES = {
     "mesh.mesh": ("Mesh",),
     "scene.motion": ("Hover", "Press", "Slide", "VoltageRamp", "Wait"),
     "scene.options": ("Output", "Solver"),
-    "scene.plan": ("plan",),
+    "planning.plan": ("plan",),
     "scene.scene": ("Scene", "default_scene"),
     "scene.terms": ("Boundary", "Region"),
     "simulation.checkpoint": ("Checkpoint",),
@@ -87,7 +87,7 @@ _MODULES = {
     "result": "simulation.result",
     "scenefile": "scene.file",
     "signals": "electrostatics.signals",
-    "surfaces": "contact.surfaces",
+    "surfaces": "surface.surfaces",
     "tensor": "tensor",
 }
 _HOME = {name: module for module, names in _NAMES.items() for name in names}

@@ -291,7 +291,7 @@ class _Milestones:
 
 def _plan(given: argparse.Namespace) -> int:
     from evfem.export import FieldFiles
-    from evfem.scene.plan import plan_on, scene_mesh
+    from evfem.planning.plan import plan_on, scene_mesh
 
     scene = _scene(given.scene)
     with notices.status("building the mesh"):
@@ -364,7 +364,7 @@ def _sweep(given: argparse.Namespace) -> int:
 def _mesh(given: argparse.Namespace) -> int:
     scene = _scene(given.scene)
     from evfem.mesh.file import write
-    from evfem.scene.plan import scene_mesh
+    from evfem.planning.plan import scene_mesh
 
     with notices.status("building the mesh"):
         mesh, _ = scene_mesh(scene)

@@ -9,8 +9,8 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import replacing
 from evfem.contact.fullfield import FieldAttraction
-from evfem.electrostatics.rigid import FieldSolution
 from evfem.errors import InputError
+from evfem.field.rigid import FieldSolution
 from evfem.mesh.file import three
 from evfem.scene.scene import Scene
 from evfem.simulation.model import make_model

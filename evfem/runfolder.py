@@ -199,7 +199,7 @@ class RunFolder:
 
     def _complete(self) -> list[str]:
         """Names of the files that were missing, and are written now."""
-        from evfem.scene.plan import scene_mesh
+        from evfem.planning.plan import scene_mesh
 
         assert self.resume is not None
         names = (HISTORY, SUMMARY, PICTURE) if self.plots else (HISTORY, SUMMARY)
@@ -315,8 +315,8 @@ def result_in(path: Path) -> Result:
     Raises InputError for another folder, a run that has not ended, or damaged files.
     """
     allowed = "a folder that `evfem run` left, at its end"
+    from evfem.planning.plan import scene_mesh
     from evfem.scene.file import loads
-    from evfem.scene.plan import scene_mesh
 
     if not (path / SUMMARY).is_file() or not (path / HISTORY).is_file():
         raise InputError("path", f"{path}, without {SUMMARY} or {HISTORY}", allowed)

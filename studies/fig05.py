@@ -87,11 +87,11 @@ def hover_force(ridges: bool, gap: float, voltage: float, resolution: str = "med
     """Attraction in N/mm of Table 2's deformable finger held `gap` mm above the display,
     Kaczmarek's law.
     """
-    from evfem.contact.surfaces import Display
     from evfem.finger.fingerpad import FingerPad
     from evfem.scene.motion import Hover
     from evfem.scene.scene import Scene
     from evfem.simulation.run import simulate
+    from evfem.surface.surfaces import Display
 
     table = data.load("table2")
     display = Display(insulator=Layer(table.value("d_i"), table.value("eps_i")), friction=table.value("mu"))

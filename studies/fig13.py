@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
 from evfem.plotting import side_by_side
@@ -24,6 +23,7 @@ from evfem.scene.motion import Slide
 from evfem.scene.scene import Output
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.simulation.result import Frame, Result
+from evfem.surface.surfaces import Display
 
 from .common import Series, Study, make_folder
 from .rendered import (

@@ -30,11 +30,11 @@ import numpy as np
 import evfem as ev
 from evfem import data
 from evfem.common.arrays import Floats
-from evfem.contact.skin import Skin, make_skin
 from evfem.electrostatics.encoding import AreaLaw
 from evfem.finger.layers import TABLE_2
 from evfem.finger.solid import Ellipsoid, Grid
 from evfem.simulation.model import make_attraction, placed
+from evfem.surface.skin import Skin, make_skin
 
 from .common import CASES, LAWS, Series, Study, participants
 from .fingertip_panels import draw

@@ -37,9 +37,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import evfem as ev
-from evfem.electrostatics.columns import Columns
-from evfem.electrostatics.outlines import graded
-from evfem.electrostatics.rigid import rigid_field
+from evfem.field.columns import Columns
+from evfem.field.outlines import graded
+from evfem.field.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
 from .common import CASES, COLOURS, Series, Study, new_figure, panel_letter, participants

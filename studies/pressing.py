@@ -15,8 +15,6 @@ import numpy as np
 
 from evfem import data
 from evfem.common.arrays import Floats
-from evfem.contact.edge import outline_nodes
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Layer, Layers
 from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
@@ -25,6 +23,8 @@ from evfem.scene.motion import Press, VoltageRamp
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Frame, Result, Saved
 from evfem.simulation.run import simulate
+from evfem.surface.edge import outline_nodes
+from evfem.surface.surfaces import Display
 from evfem.tissue.laws import NeoHookean
 
 from .common import LAWS

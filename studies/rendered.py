@@ -12,7 +12,6 @@ import warnings
 from dataclasses import dataclass, field, replace
 
 from evfem.common.arrays import Floats
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.finger.fingerpad import Electrical, FingerPad
@@ -30,6 +29,7 @@ from evfem.simulation.rendering import (
     replay,
     voltage_for,
 )
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import NeoHookean
 
 #: where friction rises, from what to what, how far the finger slides (mm)

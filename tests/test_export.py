@@ -11,7 +11,6 @@ from tools.fakes import fake_frame, fake_result, fake_row
 from tools.meshes import KINDS, square_mesh
 from tools.solids import block
 
-from evfem.contact.surfaces import Flat
 from evfem.errors import InputError, StorageError
 from evfem.export import (
     TAGS,
@@ -29,6 +28,7 @@ from evfem.mesh.mesh import raised
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import POINT_FIELDS, Frame
+from evfem.surface.surfaces import Flat
 
 POINT_DATA = (
     "displacement",

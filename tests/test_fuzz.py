@@ -19,12 +19,12 @@ from tools.fakes import fake_result
 from tools.meshes import square_mesh
 
 from evfem.common import tables
-from evfem.contact.surfaces import Flat, Profile, Sinusoid
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.scene.file import load, loads
 from evfem.simulation import result
+from evfem.surface.surfaces import Flat, Profile, Sinusoid
 
 SCENE = "version = 1\n[surface]\nkind = 'flat'\n[[motion]]\nkind = 'press'\nforce = 0.05\n"
 

@@ -71,7 +71,7 @@ def fit(
     prints a line for each step of the fit. Raises InputError for what cannot be used, before
     anything is computed as far as it can be known, and for a start at which the scene is not solved.
 
-    >>> from evfem.contact.surfaces import Display
+    >>> from evfem.surface.surfaces import Display
     >>> from evfem.electrostatics.laws import Kaczmarek
     >>> from evfem.finger.fingerpad import FingerPad
     >>> from evfem.scene.motion import Hover

@@ -14,7 +14,7 @@ Trial states that penetrate count as touching, g = 0.
 
 Without an air layer only touching nodes carry force. Forces act on the finger; N per mm of depth.
 
-In three dimensions A_j is the node's projected area (`evfem.contact.skin`), forces are in N, and the
+In three dimensions A_j is the node's projected area (`evfem.surface.skin`), forces are in N, and the
 direction is vertical.
 
 Rough faces keep a separation s(p) where they touch (`evfem.electrostatics.roughness`): the law then
@@ -32,11 +32,11 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
-from evfem.contact.pad import Pad, surface_state
-from evfem.contact.skin import Skin
 from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
 from evfem.electrostatics.roughness import separation_derivative
+from evfem.surface.pad import Pad, surface_state
+from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
 from evfem.tissue.forms import deformation_gradient, form
 

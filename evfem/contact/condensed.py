@@ -36,7 +36,6 @@ from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
 from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.follower import FollowerStiffness, local
-from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
@@ -47,6 +46,7 @@ from evfem.contact.signorini import (
     Unstable,
     solve_with_attraction,
 )
+from evfem.surface.pad import SurfaceState
 
 #: why there is no solution where the compliance is not positive
 LOST_STABILITY = "the body gives way the more, the more it is loaded"

@@ -13,7 +13,7 @@ the same for all positive r; taken is the inverse of the node's own compliance. 
 grows with areas that follow the nodes, that may vanish or be negative: r is then bounded by what is
 usual among the nodes, and g = 0 to rounding stays a small p. A node is open if
 :math:`p \le 0`, sticks if :math:`|z| \le \mu p`, and slips else. A law of friction other than Coulomb's,
-linearised (`evfem.contact.friction`), makes the disc of a closed node :math:`\mu\lambda_n + c` wide, with
+linearised (`evfem.surface.friction`), makes the disc of a closed node :math:`\mu\lambda_n + c` wide, with
 a `cohesion` c. The attraction of an open node
 weakens with its gap; its drop is a force of its own, as in `evfem.contact.signorini`.
 """

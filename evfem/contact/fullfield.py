@@ -2,7 +2,7 @@ r"""The attraction of the pad from the full field instead of column by column.
 
 Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
 problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes,
-on quadratic edges between them too, and move with them (`evfem.electrostatics.columns`). The
+on quadratic edges between them too, and move with them (`evfem.field.columns`). The
 electrode is at the voltage, living tissue at 0; the skin's layer is as thick above each node as it
 is undeformed. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what
 rough faces keep, as a gap in series.
@@ -33,11 +33,11 @@ import scipy.sparse as sparse
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import FIELD_ROUNDING
 from evfem.contact.attraction import TOUCHING, Attraction
-from evfem.contact.pad import Pad, surface_state
-from evfem.electrostatics.bounds import columns_sum, least_upper_sum
-from evfem.electrostatics.columns import Capacitance, Columns, Nearby
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import Unresolved
+from evfem.field.bounds import columns_sum, least_upper_sum
+from evfem.field.columns import Capacitance, Columns, Nearby
+from evfem.surface.pad import Pad, surface_state
 
 #: gap of touching nodes, as a share of the insulator's reduced thickness
 SERIES_GAP = 1e-4
@@ -128,7 +128,7 @@ def certificate(x: Floats, levels: Floats, insulator: Layer, skin: Floats, gap_e
     below; `skin` (L,) is the skin's layer, reduced (mm).
 
     Below: the vertical flux through all layers, the column law. Above: the energy of potentials that
-    are linear along verticals, with the skin's layer a conductor (`evfem.electrostatics.bounds`).
+    are linear along verticals, with the skin's layer a conductor (`evfem.field.bounds`).
     C is proportional to all permittivities, and the bounds are those of a gap of air.
     """
     eps_r, gap = float(insulator.eps_r) / gap_eps_r, levels[1] - levels[0]

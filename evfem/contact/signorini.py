@@ -40,7 +40,7 @@ other slip) when it moves along its own friction. It passes through slip between
 one that sticks beside a pulling shear force would seem to open. No constant has to be chosen. What
 has not converged is never used.
 
-A bound of friction that is no multiple of the contact force (`evfem.contact.friction`) is linear
+A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
 
 If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no

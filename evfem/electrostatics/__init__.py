@@ -18,7 +18,7 @@ from evfem.electrostatics.dielectrics import SKINS, Dielectric, DielectricTable
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 
 if TYPE_CHECKING:
-    from evfem.electrostatics.rigid import FieldSolution, rigid_field
+    from evfem.field.rigid import FieldSolution, rigid_field
 
 __all__ = [
     "SKINS",
@@ -44,6 +44,6 @@ def __getattr__(name: str) -> Any:
     """PEP 562: what needs scipy and scikit-fem."""
     if name not in ("FieldSolution", "rigid_field"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from evfem.electrostatics import rigid
+    from evfem.field import rigid
 
     return getattr(rigid, name)

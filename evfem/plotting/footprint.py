@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.skin import Skin, make_skin
 from evfem.errors import InputError, quoted
 from evfem.mesh.faces import PLACES, shape_functions
 from evfem.plotting.colours import TISSUE
@@ -24,6 +23,7 @@ from evfem.plotting.finger import Near, checked_window, figure_height, label_bar
 from evfem.plotting.labels import field_label
 from evfem.plotting.outline import TRACTIONS
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
+from evfem.surface.skin import Skin, make_skin
 
 #: where a node's share of a face ends, each way: at halves of a bilinear face, sixths of a biquadratic one
 ENDS = {4: {-1.0: (-1.0, 0.0), 1.0: (0.0, 1.0)}}

@@ -15,8 +15,6 @@ from pathlib import Path
 from typing import Any
 
 from evfem.common.checks import MOST_STEPS
-from evfem.contact.friction import KINDS as FRICTIONS
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
 from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
@@ -37,6 +35,8 @@ from evfem.scene.motion import MOTIONS, Motion, VoltageRamp
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.written import dump
 from evfem.solver.hand import Hand
+from evfem.surface.friction import KINDS as FRICTIONS
+from evfem.surface.surfaces import Display
 
 #: largest file in bytes
 LARGEST_SCENE = 4 * 2**20

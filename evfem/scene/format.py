@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from evfem.common.checks import Within, among, instance, keys_of, number, one_of, yes_or_no
-from evfem.contact import textures
-from evfem.contact.surfaces import Flat, Friction, Insulator, Profile, Shift
 from evfem.electrostatics import timesignals
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Conductivity, Drive, DriveFrequency, Skin, Waveform
@@ -35,6 +33,8 @@ from evfem.scene.scene import (
     RoughnessGap,
     Solver,
 )
+from evfem.surface import textures
+from evfem.surface.surfaces import Flat, Friction, Insulator, Profile, Shift
 
 Table = Mapping[str, Any]
 Pairs = list[list[float]]

@@ -70,7 +70,7 @@ class Slide(Checked):
     """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
-    which the load drifts (`evfem.scene.drift`). A finger that touches nothing and is not attracted has
+    which the load drifts (`evfem.planning.drift`). A finger that touches nothing and is not attracted has
     no force at any height: in every motion with `hold` it stays where it is, and gives way to what
     touches it. `speed` sets how much time passes.
 

@@ -24,8 +24,6 @@ from evfem.common.checks import (
 )
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
-from evfem.contact.friction import Coulomb
-from evfem.contact.own import completed
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import RoughnessGap
@@ -47,6 +45,8 @@ from evfem.scene.motion import (
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
+from evfem.surface.friction import Coulomb
+from evfem.surface.own import completed
 from evfem.tissue.forms import Form
 
 DIRECTIONS = ("vertical", "normal")
@@ -346,9 +346,9 @@ def _check_dynamics(scene: Scene) -> None:
 
 def default_scene() -> Scene:
     """Table 2's finger (medium) pressed to 0.05 N/mm and slid 5 mm over a display at 1000 V."""
-    from evfem.contact.surfaces import Display
     from evfem.electrostatics.laws import Kaczmarek, Layer
     from evfem.finger.fingerpad import FingerPad
+    from evfem.surface.surfaces import Display
 
     display = Display(insulator=Layer(thickness=0.09, eps_r=3.35), friction=0.3)
     motion = (Press(force=0.05), Slide(distance=5.0, steps=100))

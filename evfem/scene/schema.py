@@ -14,7 +14,6 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, get_args, get_origin
 
 from evfem.common.checks import Key, Within, keys_of
-from evfem.contact.friction import KINDS as FRICTIONS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.electrostatics.roughness import LAWS as ROUGHNESS
 from evfem.finger.fingerpad import Electrical, MeshedFinger
@@ -25,6 +24,7 @@ from evfem.scene.motion import MOTIONS
 from evfem.scene.scene import Output, Solver
 from evfem.solver.hand import Hand
 from evfem.solver.strategy import Strategy
+from evfem.surface.friction import KINDS as FRICTIONS
 from evfem.tissue.laws import LAWS
 
 DRAFT = "http://json-schema.org/draft-07/schema#"

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 
-from evfem.contact.friction import AgeingFriction, RateFriction
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, Mistakes
@@ -16,6 +15,7 @@ from evfem.mesh.mesh import Mesh
 from evfem.protocols import FrictionLaw
 from evfem.scene.motion import Slide
 from evfem.scene.scene import Scene
+from evfem.surface.friction import AgeingFriction, RateFriction
 
 SOLID = "with a finger in three dimensions"
 #: memory of a run (bytes): of Python and its packages; of mesh, tangent and factors, which grow with the

@@ -14,9 +14,6 @@ import numpy as np
 import tomli_w
 
 from evfem.common.checks import keys_of
-from evfem.contact.friction import KINDS, Coulomb
-from evfem.contact.surfaces import Display, Profile
-from evfem.contact.textures import SURFACES
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.laws import FORCE_LAWS
@@ -26,6 +23,9 @@ from evfem.errors import InputError
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.keys import VERSION
 from evfem.scene.scene import Scene
+from evfem.surface.friction import KINDS, Coulomb
+from evfem.surface.surfaces import Display, Profile
+from evfem.surface.textures import SURFACES
 
 
 def dump(scene: Scene) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import surface_state
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
+from evfem.surface.pad import surface_state
 
 #: share of the energy of motions that take time that their finite steps may dissipate
 DISSIPATED = 0.05

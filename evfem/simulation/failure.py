@@ -11,8 +11,8 @@ import numpy as np
 
 from evfem.common.constants import VERGE, VERGE_LOST
 from evfem.errors import InputError
+from evfem.planning.sense import weakens
 from evfem.scene.scene import Scene
-from evfem.scene.sense import weakens
 from evfem.simulation.model import Model
 from evfem.solver.control import Target
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.pad import Pad, reach, surface_state
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.scene.motion import Slide
 from evfem.simulation.history import SUMS, WIDTHS
@@ -19,6 +18,7 @@ from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
 from evfem.simulation.works import Books, Part, tells_source, unloaded
 from evfem.solver.state import State
+from evfem.surface.pad import Pad, reach, surface_state
 
 
 @dataclass

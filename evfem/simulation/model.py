@@ -14,17 +14,14 @@ from evfem.common import notices
 from evfem.common.arrays import Floats
 from evfem.contact.attraction import Attraction
 from evfem.contact.charging import Charging
-from evfem.contact.friction import Coulomb
-from evfem.contact.pad import Pad, make_pad
-from evfem.contact.skin import Skin, make_skin
 from evfem.electrostatics.laws import Layers
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.scene.core import Core, core_of, electrics_of
+from evfem.planning.core import Core, core_of, electrics_of
+from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.motion import Press
-from evfem.scene.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
@@ -33,6 +30,9 @@ from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.spatial import SkinInterface
 from evfem.solver.state import Limits
+from evfem.surface.friction import Coulomb
+from evfem.surface.pad import Pad, make_pad
+from evfem.surface.skin import Skin, make_skin
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import make_dynamics
 from evfem.tissue.space import make_space
@@ -159,7 +159,7 @@ def make_attraction(
     if scene.field == "local":
         return Attraction(*local)
     from evfem.contact.fullfield import FieldAttraction, facing
-    from evfem.scene.fieldchoice import chosen_field
+    from evfem.planning.fieldchoice import chosen_field
 
     if not chosen_field(scene, mesh).full:
         return Attraction(*local)

@@ -20,10 +20,10 @@ from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
+from evfem.planning.way import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, follows_gap
 from evfem.scene.scene import Scene
-from evfem.scene.way import allowed_error
 from evfem.simulation.checkpoint import (
     ledger_arrays,
     ledger_of,

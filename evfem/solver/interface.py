@@ -25,12 +25,12 @@ from evfem.common.constants import (
     SMALLEST_FORCE,
 )
 from evfem.contact.condensed import Candidates, LinearContactStep
-from evfem.contact.friction import Slipping, with_core
-from evfem.contact.pad import Pad, SurfaceState, fold, surface_state
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
 from evfem.solver.slipping import Returned
 from evfem.solver.state import State
+from evfem.surface.friction import Slipping, with_core
+from evfem.surface.pad import Pad, SurfaceState, fold, surface_state
 
 
 class Pins:

@@ -13,9 +13,9 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import BACK, NEAR
-from evfem.contact.friction import Linearised, Slipping
 from evfem.contact.signorini import FORWARD, OPEN, STICK
 from evfem.protocols import FrictionLaw
+from evfem.surface.friction import Linearised, Slipping
 
 #: of an interval of speeds: to the last digit of a double
 HALVINGS = 60

@@ -16,13 +16,13 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.coulomb import SLIP
-from evfem.contact.pad import surface_state
 from evfem.contact.signorini import STICK
-from evfem.contact.skin import Skin
 from evfem.contact.spatial import SpatialCandidates, SpatialContactStep
 from evfem.protocols import FrictionLaw
 from evfem.solver.interface import Interface, Pins, nothing_restored
 from evfem.solver.state import State
+from evfem.surface.pad import surface_state
+from evfem.surface.skin import Skin
 
 
 class SkinInterface(Interface):

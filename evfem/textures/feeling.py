@@ -22,7 +22,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, among, check_fields, number, one_of
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
@@ -38,6 +37,7 @@ from evfem.simulation.rendering import (
     exact,
     voltage_for,
 )
+from evfem.surface.surfaces import Display
 from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to

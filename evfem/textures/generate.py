@@ -22,8 +22,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from evfem.common.checks import Within, check_fields, choice, number
-from evfem.contact.textures import Grating
 from evfem.errors import InputError, quoted
+from evfem.surface.textures import Grating
 from evfem.tensor import Array
 from evfem.textures.texture import Texture
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, check_fields, number, yes_or_no
-from evfem.contact.surfaces import Sinusoid
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
+from evfem.surface.surfaces import Sinusoid
 
 #: name -> smallest and largest value of the database, and whether its logarithm is interpolated
 RANGES = {

@@ -14,7 +14,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, check_fields, number, yes_or_no
-from evfem.contact.surfaces import Flat, Profile
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.protocols import Observer
@@ -22,6 +21,7 @@ from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat, Profile
 from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 from evfem.textures.texture import Texture
 

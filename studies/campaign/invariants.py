@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.friction import Coulomb
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.history import WIDTHS
 from evfem.simulation.result import COLUMNS, Frame, Result
+from evfem.surface.friction import Coulomb
 
 #: below these, N/mm and N, forces and energies are rounding: of the skin's stiffness, 1e-12 N/mm
 FORCE, ENERGY = 1e-5, 1e-9

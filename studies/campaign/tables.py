@@ -15,9 +15,9 @@ from evfem.meshes import FOLDER
 
 from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_text
-from evfem.contact.textures import SelfAffine
 from evfem.scene.file import loads
 from evfem.scene.scene import Scene
+from evfem.surface.textures import SelfAffine
 
 Tables = dict[str, Any]
 #: keys of a surface of the kind self_affine alone

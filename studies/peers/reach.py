@@ -23,8 +23,8 @@ import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.skin import make_skin
 from evfem.finger.layers import LAYERS
+from evfem.surface.skin import make_skin
 
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE
 from .problem import TOLERANCE

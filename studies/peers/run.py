@@ -15,10 +15,10 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from evfem.contact.surfaces import Display
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.surface.surfaces import Display
 
 from .apart import measured
 from .problem import (

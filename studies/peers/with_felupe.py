@@ -20,10 +20,10 @@ from pypardiso import PyPardisoSolver
 
 from evfem.common.arrays import Floats, Ints
 from evfem.contact.attraction import Attraction
-from evfem.contact.pad import make_pad
-from evfem.contact.surfaces import Flat
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.mesh.mesh import Mesh
+from evfem.surface.pad import make_pad
+from evfem.surface.surfaces import Flat
 
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
 from .problem import (

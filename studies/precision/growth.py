@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Flat
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.surface.surfaces import Flat
 
 from ..benchmark import divided_mesh
 from ..common import Series

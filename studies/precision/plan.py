@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Press
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import Result
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display
 
 from ..peers.problem import INSULATOR, PLANE
 from .apart import import_s

@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
+from evfem.surface.surfaces import Display
 
 from ..benchmark import benchmark_mesh
 from ..peers.problem import (

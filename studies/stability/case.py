@@ -221,9 +221,9 @@ def judge(case: Case) -> Found:
 @cache
 def warm_up() -> None:
     """Load and compile what the first simulation of a process would have to pay for."""
-    from evfem.contact.surfaces import Display
     from evfem.electrostatics.laws import Kaczmarek
     from evfem.scene.motion import Hover, Motion, Press, Slide
+    from evfem.surface.surfaces import Display
 
     from .scenes import block, finger
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
+from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
 
 from .case import Group, Log, Verdict
 from .scenes import block, finger, pad, scene

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -18,6 +17,7 @@ from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene
 from evfem.scene.terms import Boundary
 from evfem.simulation.result import Result
+from evfem.surface.surfaces import Display
 from evfem.tissue.forms import form
 from evfem.tissue.laws import NeoHookean
 

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.finger.fingerpad import Electrical, MeshedFinger
 from evfem.mesh.mesh import Mesh
 from evfem.scene.motion import Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.result import COLUMNS, Result
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import NeoHookean
 
 from .case import Group, Log, Verdict

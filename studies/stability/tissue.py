@@ -11,14 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem.contact.surfaces import Flat, Profile, Sinusoid
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.file import read
 from evfem.mesh.quality import check
+from evfem.planning.plan import plan
 from evfem.scene.motion import Press, Slide
-from evfem.scene.plan import plan
 from evfem.scene.scene import Solver
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat, Profile, Sinusoid
 
 from .case import Group, Log, Verdict
 from .scenes import (

@@ -8,11 +8,11 @@ from tools.builders import finger
 from tools.meshes import block
 
 from evfem.calibration.measured import MeasuredCurve, MeasuredValues, along
-from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import pytest
 from tools.grids import assembled
 
 from evfem.contact.attraction import Attraction, attraction
-from evfem.contact.pad import Pad, make_pad
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.finger.fingerpad import FingerPad
+from evfem.surface.pad import Pad, make_pad
+from evfem.surface.surfaces import Flat, Sinusoid
 from evfem.tissue.assembly import Integral
 from evfem.tissue.fields import Parts
 from evfem.tissue.space import make_space

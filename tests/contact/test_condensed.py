@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
-from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, Unstable
+from evfem.surface.pad import SurfaceState
 
 K = 5
 

@@ -5,8 +5,8 @@ outlines.
 import numpy as np
 import pytest
 
-from evfem.contact.edge import outline_nodes
 from evfem.finger.fingerpad import FingerPad
+from evfem.surface.edge import outline_nodes
 from studies.pressing import contact_spans
 
 

@@ -8,14 +8,14 @@ from tools.builders import benchmark_finger, finger
 from tools.meshes import block
 
 import evfem as ev
-from evfem.contact.friction import KINDS, Slipping
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.errors import InputError
+from evfem.planning.plan import plan
 from evfem.protocols import FrictionLaw
 from evfem.scene.file import dump, loads
-from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
 from evfem.solver.slipping import Returned, speed_under
+from evfem.surface.friction import KINDS, Slipping
 
 pytestmark = pytest.mark.solver
 LOAD_INDEX = ev.LoadIndexFriction(pressure=0.005, index=0.7)

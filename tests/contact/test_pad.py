@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from tools.meshes import block
 
-from evfem.contact.pad import Pad, _near, fold, make_pad, reach, surface_state
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh, raised
+from evfem.surface.pad import Pad, _near, fold, make_pad, reach, surface_state
+from evfem.surface.surfaces import Flat, Sinusoid
 
 CHAIN = np.array([[0, 1], [1, 2], [2, 3]])
 

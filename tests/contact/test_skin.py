@@ -9,12 +9,12 @@ from scipy.integrate import dblquad
 from tools.solids import block
 
 from evfem.contact.attraction import Attraction
-from evfem.contact.pad import surface_state
-from evfem.contact.skin import Skin, make_skin
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.errors import InputError
 from evfem.mesh.faces import PLACES, shape_functions
+from evfem.surface.pad import surface_state
+from evfem.surface.skin import Skin, make_skin
+from evfem.surface.surfaces import Flat, Sinusoid
 
 FACES = {4: "bilinear", 9: "biquadratic"}
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from evfem.contact.condensed import Candidates, CondensedTangent, ExtraUnknown, LinearContactStep
-from evfem.contact.pad import SurfaceState
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import ATTRACTION, FALLING, FASTER, SLOPES, verge
+from evfem.surface.pad import SurfaceState
 
 KX, KY, LOAD = 0.4, 1.5, 0.3
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from evfem.common.tables import numbers, piecewise_linear, read_columns
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import Layer
 from evfem.errors import InputError
+from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.tensor import complex_step
 
 X = np.linspace(-1.7137, 2.3071, 41)  # meets no sample, where curvatures jump

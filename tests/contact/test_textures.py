@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from evfem.contact.textures import Grating, SelfAffine
 from evfem.errors import InputError
+from evfem.surface.textures import Grating, SelfAffine
 from evfem.tensor import complex_step
 
 X = np.linspace(-1.7137, 2.3071, 41)

@@ -48,7 +48,7 @@ FORMS = "docs/howto/form.md"
 LONG = {"gallery.md", *(f"howto/{p}.md" for p in ("element", "field", "fit", "pictures", "rough", "texture"))}
 #: pages that are still to be filled to the width of the others
 UNFILLED = {"docs/theory.md", FORMS}
-#: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.contact.pad`
+#: a public or a full name in a sentence: `ev.simulate(...)`, `evfem.surface.pad`
 NAME = re.compile(r"`((?:ev|evfem)(?:\.\w+)+)")
 DOI = re.compile(r"\b10\.\d{4,}/(?:[\w.-]|\(\w+\)|/)*\w")
 FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
@@ -170,9 +170,9 @@ def test_names_in_sentences_exist(name):
 
 
 def test_the_resolver_refuses_what_is_not_there():
-    assert resolved("evfem.contact.pad.Pad.nodes").name == "nodes"
+    assert resolved("evfem.surface.pad.Pad.nodes").name == "nodes"
     assert resolved("evfem.Scene") is evfem.Scene
-    for wrong in ("evfem.contact.pat", "evfem.contact.pad.Pad.knots"):
+    for wrong in ("evfem.contact.pat", "evfem.surface.pad.Pad.knots"):
         with pytest.raises(AttributeError):
             resolved(wrong)
 

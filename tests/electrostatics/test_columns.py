@@ -5,8 +5,8 @@ import pytest
 
 from evfem import FILM
 from evfem.electrostatics import eps_0, rigid_field
-from evfem.electrostatics.bounds import columns_sum, least_upper_sum, upper_sum
-from evfem.electrostatics.columns import Columns
+from evfem.field.bounds import columns_sum, least_upper_sum, upper_sum
+from evfem.field.columns import Columns
 
 ROWS = np.linspace(0.0, 1.0, 5)
 FINE = 1.0 - (1.0 - ROWS) ** 2

@@ -6,11 +6,11 @@ from tools.fields import FILM, carter, cylinder, grooves, numbers, ridges, wave
 
 from evfem import Layer
 from evfem.electrostatics import eps_0, rigid_field
-from evfem.electrostatics.bounds import columns_sum
-from evfem.electrostatics.curves import curved
-from evfem.electrostatics.fieldmesh import make_mesh
-from evfem.electrostatics.outlines import Outline
-from evfem.electrostatics.poisson import Potential, Space
+from evfem.field.bounds import columns_sum
+from evfem.field.curves import curved
+from evfem.field.fieldmesh import make_mesh
+from evfem.field.outlines import Outline
+from evfem.field.poisson import Potential, Space
 
 
 def bottom(radius, gap, points, by="angle"):

@@ -8,10 +8,10 @@ from tools.fields import FILM, carter, cylinder, grooves, numbers, ridges, wave
 
 from evfem import EvfemError, InputError, Layer
 from evfem.electrostatics import eps_0, rigid, rigid_field
-from evfem.electrostatics.bounds import capacitance_bounds
-from evfem.electrostatics.fieldmesh import FieldMesh, make_mesh
-from evfem.electrostatics.outlines import Outline
-from evfem.electrostatics.poisson import Potential, Space
+from evfem.field.bounds import capacitance_bounds
+from evfem.field.fieldmesh import FieldMesh, make_mesh
+from evfem.field.outlines import Outline
+from evfem.field.poisson import Potential, Space
 
 #: of random outlines that are ones: their walls go one way
 SEEDS = (0, 1, 2, 4, 5, 6, 8, 9, 12, 13, 14, 15)

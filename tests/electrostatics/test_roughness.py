@@ -7,8 +7,6 @@ import pytest
 from tools.builders import benchmark_finger, coarse_pad
 
 from evfem.contact.attraction import Attraction
-from evfem.contact.pad import Pad
-from evfem.contact.surfaces import Display, Flat
 from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.roughness import (
     ConstantRoughness,
@@ -18,12 +16,14 @@ from evfem.electrostatics.roughness import (
     separation_derivative,
 )
 from evfem.errors import InputError
+from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
 from evfem.scene.motion import Press, Slide
 from evfem.scene.options import Solver
-from evfem.scene.plan import plan
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.run import simulate
+from evfem.surface.pad import Pad
+from evfem.surface.surfaces import Display, Flat
 
 POWER = PowerRoughness(gap=0.001, pressure=0.01, exponent=0.3, open_gap=0.004)
 EXPONENTIAL = ExponentialRoughness(decay=0.0008, pressure=1.0, open_gap=0.006)

@@ -15,7 +15,6 @@ from PIL import Image
 from scipy.io import wavfile
 
 from evfem import cli
-from evfem.contact.surfaces import Display
 from evfem.electrostatics import signalfile
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.electrostatics.signalfile import Playback, read_signal, write_signal
@@ -25,6 +24,7 @@ from evfem.finger.fingerpad import FingerPad
 from evfem.scene.file import dump, loads
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
+from evfem.surface.surfaces import Display
 
 JUMP = VoltageProfile([1.0, 3.5, 6.0, 6.0, 11.0], [0.0, 2000.0, 500.0, 1500.0, -1500.0])
 DEVICE = Playback(full_scale=2000.0, speed=20.0, friction=(0.5, 0.6), rate=8000)

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from tools.fakes import fake_result
 from tools.meshes import KINDS, square_mesh
 
-from evfem.contact.surfaces import Sinusoid
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.plotting import FIELDS, contact_pressure, deformed, regions, side_by_side
@@ -20,6 +19,7 @@ from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.model import placed
 from evfem.simulation.result import POINT_FIELDS
+from evfem.surface.surfaces import Sinusoid
 
 WINDOW = (-0.5, 0.7, -0.1, 0.4)
 

@@ -8,11 +8,11 @@ from tools.domes import Dome, dome, dome_scene
 from tools.fakes import fake_result
 
 import evfem as ev
-from evfem.contact.skin import make_skin
 from evfem.errors import InputError
 from evfem.plotting import animate, contact_area, contact_pressure, deformed, footprint, forces
 from evfem.plotting.fields import values_of
 from evfem.simulation.run import simulate
+from evfem.surface.skin import make_skin
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.scene.drift import load_drift
-from evfem.scene.plan import plan
+from evfem.planning.drift import load_drift
+from evfem.planning.plan import plan
 from evfem.simulation.history import load_drift as measured
 
 pytestmark = pytest.mark.solver

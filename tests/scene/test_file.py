@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from tools.meshes import square_mesh
 
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
-from evfem.contact.textures import Grating, SelfAffine
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -19,6 +17,8 @@ from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
 from evfem.scene.terms import Boundary
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.surface.textures import Grating, SelfAffine
 from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 

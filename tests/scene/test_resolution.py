@@ -9,12 +9,12 @@ from tools.builders import finger
 from tools.meshes import block
 
 from evfem.cli import main
-from evfem.contact.surfaces import Flat, Profile, Sinusoid
-from evfem.contact.textures import Grating, SelfAffine
+from evfem.planning.plan import plan
 from evfem.scene.motion import Press
-from evfem.scene.plan import plan
 from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Flat, Profile, Sinusoid
+from evfem.surface.textures import Grating, SelfAffine
 
 X = np.arange(-5.0, 5.001, 0.05)
 #: grooves 0.05 mm deep, 0.1 mm wide, 0.5 mm apart

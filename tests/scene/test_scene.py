@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from evfem.common.digest import digest
-from evfem.contact.surfaces import Display, Flat
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
@@ -18,6 +17,7 @@ from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
 from evfem.scene.terms import Boundary, Region
+from evfem.surface.surfaces import Display, Flat
 from evfem.tissue.forms import form
 
 FINGER = FingerPad()

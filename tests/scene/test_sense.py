@@ -15,11 +15,11 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.cli import main
+from evfem.planning.parts import check_parts
+from evfem.planning.plan import plan, scene_mesh
+from evfem.planning.sense import doubts, locking
 from evfem.scene import file as scenefile
-from evfem.scene.parts import check_parts
-from evfem.scene.plan import plan, scene_mesh
 from evfem.scene.scene import default_scene
-from evfem.scene.sense import doubts, locking
 from evfem.tissue.splitlaw import split
 
 ROOT = Path(__file__).parents[2]
@@ -234,7 +234,9 @@ def test_the_cases_of_the_stability_study_are_as_silent_as_they_are_hard():
             case.function(Looking())
     assert len(seen) > 100
     told = ("touching skin", "mm across")
-    loud = {key.split("_x_")[0] for key, said in seen if [one for one in said if not any(t in one for t in told)]}
+    loud = {
+        key.split("_x_")[0] for key, said in seen if [one for one in said if not any(t in one for t in told)]
+    }
     assert loud == {"same_answer.units_lengths"}  # which silences it itself
 
 

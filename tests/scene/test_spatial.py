@@ -6,12 +6,12 @@ from numpy.testing import assert_allclose
 from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
-from evfem.contact.edge import outline_nodes
 from evfem.errors import InputError
+from evfem.planning.plan import plan
 from evfem.scene import spatial
-from evfem.scene.plan import plan
 from evfem.scene.spatial import needed_memory
 from evfem.simulation.model import make_model
+from evfem.surface.edge import outline_nodes
 
 PRESS = ev.Press(indentation=0.1)
 

@@ -6,8 +6,8 @@ from scipy.io import wavfile
 
 import evfem as ev
 from evfem.errors import InputError
+from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
-from evfem.scene.plan import plan
 
 HEAD = """
 version = 1

@@ -8,19 +8,19 @@ import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
-from evfem.contact.friction import RateFriction
 from evfem.contact.stability import SLOPES, Verge
-from evfem.contact.surfaces import Flat
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.errors import NotConverged
+from evfem.planning.plan import plan
 from evfem.scene.motion import Press, Slide
-from evfem.scene.plan import plan
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.failure import advice
 from evfem.simulation.run import Run, simulate
 from evfem.solver.control import Target
 from evfem.solver.state import Folded, LiftedOff, StepFailed
 from evfem.solver.strategy import Strategy
+from evfem.surface.friction import RateFriction
+from evfem.surface.surfaces import Flat
 
 
 def said(

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.contact.pad import surface_state
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.measures import Seen, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.run import Run
+from evfem.surface.pad import surface_state
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
 SCREEN = ev.Display(ev.Layer(0.01, 3.0), friction=0.0)

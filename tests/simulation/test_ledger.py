@@ -12,13 +12,13 @@ from tools.builders import INSULATOR, SKIN
 from tools.grids import fine_points
 from tools.meshes import block
 
-from evfem.contact.surfaces import Sinusoid
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Sinusoid
 from evfem.tissue.laws import NeoHookean
 
 LAW = NeoHookean(E=0.1, nu=0.4, density=1e-6)

@@ -7,7 +7,6 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
@@ -24,6 +23,7 @@ from evfem.simulation.rendering import (
     replay,
     voltage_for,
 )
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)
 LAYERS = Layers.of(Layer(0.38, 1650.0), Layer(0.09, 3.35))

@@ -8,13 +8,13 @@ from threadpoolctl import threadpool_info, threadpool_limits
 from tools.builders import INSULATOR, balance, benchmark_scene, finger
 from tools.meshes import block
 
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, StrongTroxel
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import Run, simulate
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))

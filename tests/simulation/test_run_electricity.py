@@ -5,13 +5,13 @@ import pytest
 from tools.builders import INSULATOR, balance, benchmark_finger, benchmark_scene, finger
 from tools.meshes import block
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Display
 
 ROUND = finger(block(8, 3, sag=0.4))
 PRESS_AND_SLIDE = (Press(indentation=0.3, steps=3), Slide(0.4, steps=4))

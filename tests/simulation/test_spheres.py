@@ -17,9 +17,9 @@ from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
 from evfem.contact.signorini import STICK
-from evfem.contact.skin import make_skin
 from evfem.mesh.mesh import raised
 from evfem.simulation.run import simulate
+from evfem.surface.skin import make_skin
 
 E, NU, RADIUS, SIZE, FINE = 1.0, 0.495, 1000.0, 48.0, 0.6
 STIFF = E / (1.0 - NU**2)

@@ -12,7 +12,6 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layers, StrongTroxel
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.finger.fingerpad import MeshedFinger
@@ -25,6 +24,7 @@ from evfem.simulation.run import simulate
 from evfem.simulation.works import Part
 from evfem.solver.control import GivenVoltage, Indentation, Target
 from evfem.solver.spatial import SkinInterface
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
 ROUND, SOFT = finger(block(8, 3, sag=0.4)), finger(block(8, 3, sag=0.4), viscosity=2e-3)

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, accepted, legal, node, pushed, shifted
 
-from evfem.contact.friction import RateFriction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.contact.stability import SLOPES, Verge
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.solver.control import FollowFriction, GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import PenaltyInterface
 from evfem.solver.state import Folded, Limits, StepFailed
 from evfem.solver.strategy import Strategy
+from evfem.surface.friction import RateFriction
+from evfem.surface.surfaces import Flat, Sinusoid
 
 SURFACES = [Flat(friction=MU, y=0.0), Sinusoid(friction=MU, terms=[[0.1, 2.0, 0.4]], y=0.0)]
 surfaces = pytest.mark.parametrize("surface", SURFACES, ids=["flat", "sinusoid"])

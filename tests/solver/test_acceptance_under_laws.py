@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from tools.steps import GAP, MESH, MU, PAD, SLIP, TOLERANCE, Script, legal, node, pushed, shifted
 
-from evfem.contact.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
-from evfem.contact.surfaces import Flat
 from evfem.solver.control import GivenVoltage, Indentation, Target
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import Interface, PenaltyInterface
 from evfem.solver.state import Limits
 from evfem.solver.strategy import Strategy
+from evfem.surface.friction import AdhesiveFriction, AgeingFriction, LoadIndexFriction, RateFriction
+from evfem.surface.surfaces import Flat
 
 SECONDS, PENALTIES, X = 0.5, (50.0, 20.0), MESH.points[PAD.nodes, 0]
 LAWS = {

@@ -10,11 +10,11 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
+from evfem.surface.surfaces import Display
 
 HERE = Path(__file__).parent
 NAMES = (

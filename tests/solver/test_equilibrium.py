@@ -12,7 +12,6 @@ from tools.meshes import block
 
 from evfem.contact import condensed
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
-from evfem.contact.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
 from evfem.scene.motion import Hover, Press, Slide
@@ -22,6 +21,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
+from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
 GENTLE = Sinusoid(friction=0.3, terms=[[0.02, 2.0, 0.4]], insulator=INSULATOR)

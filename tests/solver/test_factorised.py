@@ -11,7 +11,6 @@ from tools.meshes import block
 
 from evfem.contact.signorini import FORWARD, OPEN, ContactNotSolved
 from evfem.contact.stability import Verge
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.scene.motion import Hover, Press
 from evfem.scene.scene import Scene, Solver
@@ -21,6 +20,7 @@ from evfem.solver.anderson import Anderson
 from evfem.solver.control import FollowFriction, Force, GivenVoltage, Indentation, Target
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.state import StepFailed
+from evfem.surface.surfaces import Display
 
 ROUND = finger(block(8, 3, sag=0.4))
 

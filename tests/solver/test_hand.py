@@ -10,8 +10,8 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
+from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
-from evfem.scene.plan import plan
 from evfem.simulation.result import Saved
 from evfem.solver.hand import Grip
 

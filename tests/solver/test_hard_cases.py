@@ -14,7 +14,6 @@ from scipy.optimize import brentq
 from tools.builders import coarse_pad
 from tools.meshes import between, held
 
-from evfem.contact.surfaces import Display, Flat, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel, eps_0
 from evfem.errors import NotConverged
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
@@ -22,6 +21,7 @@ from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.run import Run, simulate
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
 HARD = (

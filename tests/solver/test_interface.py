@@ -11,11 +11,11 @@ from tools.meshes import block
 
 from evfem.common.constants import CHANGES, HAIR
 from evfem.contact.signorini import FORWARD, OPEN, STICK
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.solver.interface import Pins, steps_of_friction
+from evfem.surface.surfaces import Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
 SURFACES = [Flat(y=-0.1), Sinusoid(terms=[[0.02, 2.0, 0.4]], y=-0.1)]

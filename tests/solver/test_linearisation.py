@@ -11,7 +11,6 @@ from tools.meshes import block
 
 from evfem.common.constants import STABLE
 from evfem.contact.signorini import OPEN, STICK
-from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer, StrongTroxel
 from evfem.electrostatics.roughness import PowerRoughness
 from evfem.scene.motion import Press
@@ -21,6 +20,7 @@ from evfem.solver.condensation import Singular
 from evfem.solver.linearisation import in_vain, steadied
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display, Sinusoid
 
 #: voltages that no insulator stands, to see far attractions from near
 pytestmark = pytest.mark.filterwarnings("ignore:.* V make a field")

@@ -14,7 +14,6 @@ from tools.builders import SKIN, finger
 from tools.meshes import between, block, held
 
 from evfem.common.constants import RELEASED
-from evfem.contact.surfaces import Display, Sinusoid
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.electrostatics.timesignals import Sampled
 from evfem.errors import NotConverged
@@ -30,6 +29,7 @@ from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import StepFailed
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Display, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
 HEIGHT, LENGTH, DEPTH = 0.007, 1.0, 0.2

@@ -9,11 +9,11 @@ from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
 from evfem.contact.coulomb import SLIP
-from evfem.contact.pad import surface_state
 from evfem.contact.signorini import OPEN, STICK
 from evfem.contact.spatial import SpatialCandidates, Turning
 from evfem.simulation.model import make_model
 from evfem.solver.control import Force, GivenVoltage, Target
+from evfem.surface.pad import surface_state
 
 RAMP = ev.Sinusoid(terms=[[0.4, 1.0, 0.0]], friction=0.3)
 

@@ -8,7 +8,6 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.contact.surfaces import Flat
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
@@ -16,6 +15,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.state import Record, StepFailed
 from evfem.solver.stepping import Stepper, Unbooked
 from evfem.solver.strategy import Strategy
+from evfem.surface.surfaces import Flat
 
 WRONG = {
     "iterations": (0, -1, 10_001, 2.5, "many", True, np.nan),

@@ -6,8 +6,8 @@ from evfem.studies import fingertip
 
 import evfem as ev
 from evfem import studies
-from evfem.contact.skin import make_skin
 from evfem.electrostatics.laws import Layers
+from evfem.surface.skin import make_skin
 
 SKIN = ev.Layer(0.38, 1650.0)
 

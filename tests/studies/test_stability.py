@@ -9,9 +9,9 @@ import json
 import numpy as np
 import pytest
 
-from evfem.contact.surfaces import Flat, Sinusoid
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
+from evfem.surface.surfaces import Flat, Sinusoid
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
 stability, case, scenes, figure = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evfem.contact.surfaces import Flat, Sinusoid
+from evfem.surface.surfaces import Flat, Sinusoid
 from evfem.textures.correction import corrected, corrections, importance
 from evfem.textures.database import linear_curve, shipped
 from evfem.textures.pressed import FRICTIONS, LOADS, PressedPad, remember, shipped_pad

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from evfem.contact.surfaces import Display
 from evfem.electrostatics.laws import Kaczmarek, Layer
 from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Output, Scene, Solver
+from evfem.surface.surfaces import Display
 from evfem.tissue.laws import NeoHookean
 from tools.meshes import half_finger
 

@@ -4,8 +4,8 @@ contact, and pads without a body.
 
 import numpy as np
 
-from evfem.contact.pad import Pad
 from evfem.mesh.mesh import Mesh
+from evfem.surface.pad import Pad
 
 KINDS = ("quad", "quad9", "triangle", "triangle6")
 #: kind -> corners (row, column) of the cells in a square of points, in the order of the kind

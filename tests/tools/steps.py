@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from evfem.contact.pad import make_pad
 from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
 from evfem.mesh.mesh import raised
 from evfem.solver.control import Target
@@ -12,6 +11,7 @@ from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.interface import Interface
 from evfem.solver.state import Balance, Limits, Record
 from evfem.solver.strategy import Strategy
+from evfem.surface.pad import make_pad
 from tools.meshes import block
 
 TOLERANCE, MU = 1e-6, 0.5

@@ -29,7 +29,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.outlines import Outline, spread, spread_around
+from evfem.field.outlines import Outline, spread, spread_around
 
 #: steepest slopes of the lower envelopes that are tried for the upper bound
 SLOPES = (0.125, 0.25, 0.5, 1.0, 2.0, 4.0, 16.0)

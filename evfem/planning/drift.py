@@ -25,8 +25,8 @@ import numpy as np
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
+from evfem.planning.resolution import way
 from evfem.scene.motion import Press, Slide
-from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
 
 #: a drift of the load that is worth a word

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.checks import set_frozen
-from evfem.contact.surfaces import Flat
 from evfem.errors import InputError, quoted
 from evfem.protocols import CompleteSurface, Surface
+from evfem.surface.surfaces import Flat
 from evfem.tensor import Array, derivative, difference
 
 #: step of differences in mm

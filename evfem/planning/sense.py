@@ -1,7 +1,7 @@
 """What a scene says, but hardly means.
 
 `doubts` says in a sentence each what may be meant, but hardly is: units, fields that no insulator
-withstands, slides that never touch. Mistakes that no run could use are found by `evfem.scene.parts`.
+withstands, slides that never touch. Mistakes that no run could use are found by `evfem.planning.parts`.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.surfaces import Profile
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.electrostatics.timesignals import ChargeControl
 from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
+from evfem.planning.resolution import way
 from evfem.scene.motion import Hover, Press, Slide, follows_gap
-from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
+from evfem.surface.surfaces import Profile
 from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.splitlaw import nearly_incompressible, split

@@ -3,7 +3,7 @@ r"""Poisson's problem between a grounded body and an electrode under a slab, and
 .. math:: \int \varepsilon\, \nabla\varphi\cdot\nabla v = 0, \qquad
           \varphi = 0 \text{ on the body}, \quad \varphi = U \text{ on the electrode},
 
-with elements of order `ORDER` on the mapped quadrilaterals of `evfem.electrostatics.fieldmesh`.
+with elements of order `ORDER` on the mapped quadrilaterals of `evfem.field.fieldmesh`.
 The co-energy at unit voltage is half the capacitance,
 
 .. math:: C = \varepsilon_0 \int \varepsilon\, |\nabla\varphi|^2 ,
@@ -28,8 +28,8 @@ import numpy as np
 import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.fieldmesh import FieldMesh
 from evfem.electrostatics.laws import eps_0
+from evfem.field.fieldmesh import FieldMesh
 from evfem.tensor import ddot, dot, identity
 
 #: polynomial order of the elements

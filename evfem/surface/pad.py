@@ -63,7 +63,7 @@ class Pad:
         return found.astype(float, copy=False).reshape(x.shape)
 
     def tributary(self, position: Floats) -> Floats:
-        """`length` of positions (..., P, 2); the name that `evfem.contact.skin.Skin` has for areas."""
+        """`length` of positions (..., P, 2); the name that `evfem.surface.skin.Skin` has for areas."""
         return self.length(position[..., 0])
 
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:

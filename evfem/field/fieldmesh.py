@@ -20,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.outlines import (
+from evfem.errors import InputError
+from evfem.field.outlines import (
     Outline,
     Run,
     corner_sizes,
@@ -29,7 +30,6 @@ from evfem.electrostatics.outlines import (
     spread,
     spread_around,
 )
-from evfem.errors import InputError
 
 #: how fast cells grow away from a corner, per length
 GROWTH = 0.7

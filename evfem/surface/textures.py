@@ -26,7 +26,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from evfem.common.checks import SEED, Within, number, real, set_frozen
-from evfem.contact.surfaces import (
+from evfem.errors import InputError
+from evfem.surface.surfaces import (
     FARTHEST,
     HIGHEST,
     MOST_TERMS,
@@ -38,7 +39,6 @@ from evfem.contact.surfaces import (
     Shift,
     Sinusoid,
 )
-from evfem.errors import InputError
 from evfem.tensor import Array
 
 #: shortest length of a texture (mm)

@@ -1,5 +1,5 @@
 r"""The skin that faces the surface, in three dimensions: pad nodes, tributary areas projected on the
-plane of the display, gross and real contact areas. The twin of `evfem.contact.pad`.
+plane of the display, gross and real contact areas. The twin of `evfem.surface.pad`.
 
 A face of the pad with the shape functions N and its outward normal down carries for its node j
 
@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.pad import OVERSHOT, sides_of_pad, widened
 from evfem.mesh.faces import shape_functions
 from evfem.mesh.mesh import Mesh
+from evfem.surface.pad import OVERSHOT, sides_of_pad, widened
 
 #: the faces between neighbouring nodes of a biquadratic one
 QUARTERS = np.array([[0, 4, 8, 7], [4, 1, 5, 8], [8, 5, 2, 6], [7, 8, 6, 3]])

@@ -15,22 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from evfem.contact.friction import Coulomb
 from evfem.electrostatics.roughness import ConstantRoughness, roughness_of
 from evfem.errors import InputError
 from evfem.finger.sizes import area_error
 from evfem.mesh.mesh import Mesh
+from evfem.planning.core import core_of, unseen
+from evfem.planning.drift import drifting
+from evfem.planning.parts import check_parts
+from evfem.planning.resolution import oscillating, too_fast, unresolved
+from evfem.planning.sense import doubts, locking, touching_traction, weakens
+from evfem.planning.timescales import left_out, time_scales
+from evfem.planning.way import said
 from evfem.protocols import TimeSignal
-from evfem.scene.core import core_of, unseen
-from evfem.scene.drift import drifting
-from evfem.scene.parts import check_parts
-from evfem.scene.resolution import oscillating, too_fast, unresolved
 from evfem.scene.scene import Scene
-from evfem.scene.sense import doubts, locking, touching_traction, weakens
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
-from evfem.scene.timescales import left_out, time_scales
-from evfem.scene.way import said
+from evfem.surface.friction import Coulomb
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
@@ -230,7 +230,7 @@ def _field(scene: Scene, mesh: Mesh) -> tuple[Term, ...]:
     """What bounds say of the full field, where a scene asks for it or leaves the choice."""
     if scene.field == "local" or not scene.electrics.acts:
         return ()
-    from evfem.scene.fieldchoice import chosen_field
+    from evfem.planning.fieldchoice import chosen_field
 
     choice = chosen_field(scene, mesh)
     return (Term("full field", choice.full, choice.reason),)

@@ -24,9 +24,9 @@ from evfem.electrostatics.laws import traction_derivative
 from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
+from evfem.planning.resolution import way
 from evfem.scene.electrics import Electrics
 from evfem.scene.motion import Hover, follows_gap
-from evfem.scene.resolution import way
 from evfem.scene.scene import Scene
 from evfem.tissue.splitlaw import plane_modulus, split
 
@@ -132,7 +132,7 @@ def _full(scene: Scene, mesh: Mesh) -> bool:
     """Whether the attraction is that of the full field."""
     if scene.field == "local":
         return False
-    from evfem.scene.fieldchoice import chosen_field
+    from evfem.planning.fieldchoice import chosen_field
 
     return chosen_field(scene, mesh).full
 

@@ -1,7 +1,7 @@
 """Mistakes in a user's parts of a scene, found before it is solved.
 
 `check_parts` evaluates a user's laws once, near rest and at three gaps, and what contact asks of
-them (`evfem.scene.partchecks`), and raises InputError for what no run could use. Built-in parts
+them (`evfem.planning.partchecks`), and raises InputError for what no run could use. Built-in parts
 are not evaluated.
 """
 
@@ -17,9 +17,7 @@ import numpy as np
 from evfem.electrostatics.laws import StrongTroxel
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.protocols import RoughnessLaw, TimeSignal
-from evfem.scene.motion import Slide, VoltageRamp, Wait
-from evfem.scene.partchecks import (
+from evfem.planning.partchecks import (
     check_arguments,
     check_friction_law,
     check_roughness,
@@ -27,6 +25,8 @@ from evfem.scene.partchecks import (
     check_surface,
     evaluated,
 )
+from evfem.protocols import RoughnessLaw, TimeSignal
+from evfem.scene.motion import Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.tensor import STEP, Array, complex_step, det, difference, inv, trace, transpose
 from evfem.tissue.forms import Form

@@ -10,7 +10,7 @@ lines are as dense as the outline's own nodes) and quadratic across it,
 
 with the share :math:`\sigma` running over the row with :math:`\eta`. The potential is U on the
 lowest curve and 0 on the highest one; on the two ends its normal derivative is zero. With unknowns
-numbered along the lines the matrix of `evfem.electrostatics.poisson.poisson` is a narrow band: it
+numbered along the lines the matrix of `evfem.field.poisson.poisson` is a narrow band: it
 needs neither ordering nor symbolic analysis, whatever the outline does.
 
 The derivatives of the discrete C = eps_0 times the minimal integral of ``eps |grad phi|^2`` by all
@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.columncells import AT, WEIGHTS, Cells
 from evfem.electrostatics.laws import eps_0
+from evfem.field.columncells import AT, WEIGHTS, Cells
 
 #: share of the lowest layer that is taken to the second order on electrodes that end
 THIN = 0.2

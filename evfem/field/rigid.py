@@ -1,9 +1,9 @@
 """The full field of a rigid grounded outline over an electrode: capacitance, force, fields.
 
 The column law takes the field as vertical. Here Poisson's problem is solved in slab and air below
-(and, where the outline ends, around) a rigid body; `evfem.electrostatics.poisson` has the problem
-and the force, `evfem.electrostatics.fieldmesh` the mesh, `evfem.electrostatics.bounds` the bounds
-between which the capacitance must be, `evfem.electrostatics.outlines` what an outline is.
+(and, where the outline ends, around) a rigid body; `evfem.field.poisson` has the problem
+and the force, `evfem.field.fieldmesh` the mesh, `evfem.field.bounds` the bounds
+between which the capacitance must be, `evfem.field.outlines` what an outline is.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, finite, plain, real
-from evfem.electrostatics.bounds import capacitance_bounds
-from evfem.electrostatics.curves import curved
-from evfem.electrostatics.fieldmesh import make_mesh
 from evfem.electrostatics.laws import Layer
-from evfem.electrostatics.outlines import Outline
-from evfem.electrostatics.poisson import Potential, Space
 from evfem.errors import EvfemError, InputError, quoted
+from evfem.field.bounds import capacitance_bounds
+from evfem.field.curves import curved
+from evfem.field.fieldmesh import make_mesh
+from evfem.field.outlines import Outline
+from evfem.field.poisson import Potential, Space
 
 #: touching places keep this share of the slab's thickness / permittivity as a gap in series
 SERIES_GAP = 1e-6
@@ -90,12 +90,12 @@ def rigid_field(x: Values, height: Values, *, slab: Layer | None = None, voltage
 
     `x` and `height` (N,) in mm are points of the outline above the slab's upper face, from left to
     right. Points that turn by less than 15 degrees each, ever the same way, are taken as those of a
-    curve (`evfem.electrostatics.curves`), the others are joined by straight lines. An `x` given
+    curve (`evfem.field.curves`), the others are joined by straight lines. An `x` given
     twice is a vertical wall, as is a chord steeper than 20 between two corners, which then stands on
     its foot. With `periodic` the outline
     repeats from its last x on. Without, it ends in the air over an endless slab and electrode: as a
     thin sheet where it is flat, as a bar where it ends in walls, and as the lower half of a
-    symmetric body where both ends rise steeply (see `evfem.electrostatics.outlines`). The force
+    symmetric body where both ends rise steeply (see `evfem.field.outlines`). The force
     is the derivative of the discrete energy when the body is lifted. Touching places need a slab.
 
     The capacitance, always found from above, is compared with its bounds; EvfemError if it is

@@ -23,7 +23,7 @@ values, it is for a velocity V that is 1 on the pad and 0 on the insulator
 A node's force is that of its shape function V. In the skin's layer V does not change with the
 height, and with the same stress, of the layer's :math:`\varepsilon'`, the forces between skin and
 tissue inside the pad are shared out: they cancel in the sum, whatever that stress is. Without
-conduction this is the derivative of the energy (`evfem.electrostatics.columns`), and below a flat
+conduction this is the derivative of the energy (`evfem.field.columns`), and below a flat
 pad the law of the complex length (`evfem.electrostatics.laws`). Along x the lines lean, as the
 insulator stays where it is: with losses it has charges of its own, which are pulled too. Only the
 two end lines are taken whole, as without losses: what is beyond them is not known.
@@ -36,8 +36,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.electrostatics.columns import Columns
 from evfem.electrostatics.laws import eps_0
+from evfem.field.columns import Columns
 
 
 @dataclass(frozen=True, eq=False)

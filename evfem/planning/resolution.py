@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Ints
-from evfem.contact.textures import SelfAffine
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
 from evfem.scene.motion import Motion, Slide, Wait
 from evfem.scene.scene import Scene
+from evfem.surface.textures import SelfAffine
 from evfem.tissue.laws import split
 
 #: share of a profile's height that may lie between two neighbouring nodes and be missed by both

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.electrostatics.outlines import FLANK, SAME, TURN, Outline
+from evfem.field.outlines import FLANK, SAME, TURN, Outline
 
 #: largest ratio of the curvatures at the two ends of a chord
 RATIO = 3.0

@@ -1,0 +1,1 @@
+"""The full electrostatic field below outlines: meshes, Poisson's problem, columns, bounds."""
