@@ -170,12 +170,7 @@ def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
         steps=scene.total_steps,
         terms=terms,
         solver=_solver(scene, mesh, terms),
-        warnings=(
-            *doubts(scene, mesh, moduli),
-            *locked,
-            *(text for text in others if text),
-            *drifting(scene, mesh, moduli),
-        ),
+        warnings=(*doubts(scene, mesh, moduli), *locked, *filter(None, others)),
     )
 
 

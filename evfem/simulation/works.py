@@ -115,7 +115,7 @@ def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
 #: where the attraction is taken on the way, and where it is if that does not resolve it: the layers below a
 #: thin insulator's nodes are thinner than their ways by orders
 WAY, SHARE = _along((0.0, 1.0))
-FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, 1 / 4, 3 / 4, 15 / 16, 63 / 64, 1.0))
+FINE_WAY, FINE_SHARE = _along((0.0, 1 / 64, 1 / 16, *np.linspace(1 / 8, 7 / 8, 7), 15 / 16, 63 / 64, 1.0))
 #: the places see an integrand whose highest Legendre coefficients are below this share of the largest
 SEEN = 1e-3
 #: its two ends

@@ -377,7 +377,7 @@ DRY = ev.Drive(frequency=250.0, skin="gabriel_dry", gap_conductivity=1e-8)
 
 
 def driven(field, drive, motion, voltage=50.0, insulator=ev.TOUCHSCREEN):
-    given = {"direction": "normal", "field": field, "drive": drive}
+    given = {"direction": "normal", "field": field, "drive": drive, "solver": ev.Solver(core="off")}
     display = ev.Display(insulator, friction=0.3)
     return ev.Scene(SMOOTH, display, ev.StrongTroxel(), voltage, motion, **given)
 

@@ -7,7 +7,8 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 from tools.fields import FILM, carter, cylinder, grooves, numbers, ridges, wave
 
 from evfem import EvfemError, InputError, Layer
-from evfem.electrostatics import eps_0, rigid, rigid_field
+from evfem.electrostatics import eps_0, rigid_field
+from evfem.field import rigid
 from evfem.field.bounds import capacitance_bounds
 from evfem.field.fieldmesh import FieldMesh, make_mesh
 from evfem.field.outlines import Outline

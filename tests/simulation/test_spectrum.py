@@ -110,6 +110,7 @@ def test_rows_that_are_not_evenly_spaced_are_refused(make, options, key):
     assert caught.value.key == key
 
 
+@pytest.mark.filterwarnings("ignore:the shear modulus of tissue")
 def test_a_rigid_gap_under_a_sine_attracts_at_its_frequency_and_twice_that():
     """F ~ U^2: mean, line at f, line at 2 f as B^2 + A^2/2, 2 A B, A^2/2; with modulation as
     1 + m^2/2, 2 m, m^2/2.

@@ -35,7 +35,7 @@ def made(surface=None, voltage=0.0, law=None, body=ROUND, **options):
     """A linearisation at rest, its model and its state."""
     surface = Display(y=-0.1, insulator=INSULATOR) if surface is None else surface
     law = Kaczmarek() if voltage and law is None else law
-    options |= {"solver": Solver(core="off")}  # the law itself
+    options = {"solver": Solver(core="off")} | options  # the law itself
     model = make_model(Scene(body, surface, law, voltage, motion=[Press(force=0.1)], **options))
     state = model.equilibrium.rest(np.zeros(2), voltage)
     model.equilibrium.body.linearisation.begin(state, False)
