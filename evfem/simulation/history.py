@@ -84,6 +84,7 @@ class History:
     substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
     newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
     relaxations: Ints = field(metadata=column("", "releases where no equilibrium is near"))
+    jumps: Ints = field(metadata=column("", "releases, and snaps that iterations made by themselves"))
     seconds: Floats = field(metadata=column("s", "wall time"))
 
     @property

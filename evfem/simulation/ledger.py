@@ -31,13 +31,15 @@ class Ledger:
     sums: dict[str, float] = field(default_factory=lambda: dict.fromkeys(SUMS, 0.0))
     end: Books | None = None
 
-    def accept(self, old: State, new: State) -> None:
-        """Add the works of one converged part."""
+    def accept(self, old: State, new: State) -> bool:
+        """Add the works of one converged part; says whether stability was lost in it."""
         part = Part(self.model, old if self.end else unloaded(old), new)
         begin = self.end or Books.nothing(old.u.shape)
         self.end = part.end()
-        for name, work in part.works(begin, self.end).items():
+        works = part.works(begin, self.end)
+        for name, work in works.items():
             self.sums[name] += work
+        return works["snap_dissipation"] > 0.0
 
     def mark(self) -> tuple[dict[str, float], Books | None]:
         """Where sums and books stand."""

@@ -242,6 +242,7 @@ class Result(History):
             "substeps": int(self.substeps.sum()),
             "newton_iterations": int(self.newton_iterations.sum()),
             "relaxations": int(self.relaxations.sum()),
+            "jumps": int(self.jumps.sum()),
             "seconds": float(self.seconds.sum()),
             "units": {
                 "length": "mm",

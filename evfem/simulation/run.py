@@ -332,7 +332,7 @@ class Run:
         wanted.
         """
         begin, iterations = clock.perf_counter(), self.model.equilibrium.record.iterations
-        released = self.stepper.relaxations
+        released, snapped = self.stepper.relaxations, self.stepper.snaps
         try:
             self.state, substeps = self.stepper.follow(self.state, request.path, self.ledger)
         except StepFailed as error:
@@ -346,6 +346,7 @@ class Run:
         row["substeps"] = substeps
         row["newton_iterations"] = self.model.equilibrium.record.iterations - iterations
         row["relaxations"] = self.stepper.relaxations - released
+        row["jumps"] = row["relaxations"] + self.stepper.snaps - snapped
         row["seconds"] = clock.perf_counter() - begin
         self.rows.append(row)
         if request.step % (self.scene.output.every or 1) and request.step != self.scene.total_steps:

@@ -91,7 +91,7 @@ class Relaxation:
         """
         return target.duration == 0.0 or self.body.dynamics is None
 
-    def follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
+    def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         """The equilibrium at `target` where the body comes to rest when released at `state`;
         `accept(old, new)` sees every step on the way.
 
@@ -102,7 +102,7 @@ class Relaxation:
         finally:
             self.body.release(state.u, 0.0)
 
-    def _follow(self, state: State, target: Target, accept: Callable[[State, State], None]) -> State:
+    def _follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
         end, held = target, self._held(state, target)
         pace, begin = Pace(), state.u + self._imperfection
         for _ in range(DRAG_STEPS):

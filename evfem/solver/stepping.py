@@ -49,8 +49,8 @@ Parts = list[tuple[Target, State]]
 class Accounts(Protocol):
     """Receives every accepted part: the bookkeeping of works and energies."""
 
-    def accept(self, old: State, new: State) -> None:
-        """A part was accepted, from `old` to `new`."""
+    def accept(self, old: State, new: State) -> object:
+        """A part was accepted, from `old` to `new`; says whether stability was lost in it."""
 
     def mark(self) -> Any:
         """Where the accounts stand."""
@@ -97,9 +97,10 @@ class Release:
 class Stepper:
     """Follows paths with an equilibrium solver; remembers the substep, as a fraction of a step,
     that worked last. `body` is what is released where no equilibrium is near; without it such a
-    step fails. `unsettled`: parts solved monolithically because staggered rounds did not settle;
-    `together`: whether the rest of this step is. Where the error of the path of a part is limited it
-    is at most `allowed`, and `path_error` the largest accepted.
+    step fails. `snaps`: parts in which stability was lost without a release; `unsettled`: parts
+    solved monolithically because staggered rounds did not settle; `together`: whether the rest of
+    this step is. Where the error of the path of a part is limited it is at most `allowed`, and
+    `path_error` the largest accepted.
     """
 
     equilibrium: Equilibrium
@@ -108,6 +109,7 @@ class Stepper:
     cuts: int = 0
     body: Body | None = None
     relaxations: int = 0
+    snaps: int = 0
     unsettled: int = 0
     together: bool = False
     allowed: float | None = None
@@ -144,7 +146,7 @@ class Stepper:
             for target, new in parts:
                 if len(parts) > 1:
                     self._restart(state, target)
-                accounts.accept(state, new)
+                self.snaps += bool(accounts.accept(state, new))
                 state, substeps = new, substeps + 1
             if self.allowed is not None:
                 self._set_length(error, fraction - done)

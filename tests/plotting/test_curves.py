@@ -248,6 +248,6 @@ def test_what_can_be_drawn_over_is_in_the_history():
 
 def test_every_column_has_a_kind_and_a_unit():
     """All but counts end in a word that says their unit."""
-    counts = {"step", "motion_index", "motion", "substeps", "newton_iterations", "relaxations"}
+    counts = {"step", "motion_index", "motion", "substeps", "newton_iterations", "relaxations", "jumps"}
     assert {name for name in COLUMNS if not kind_of(name)[1]} == counts
     assert kind_of("electrostatic_force_x") == kind_of("normal_force") == ("force per depth", "N/mm")

@@ -26,7 +26,7 @@ CONTRACT = (
     "external_work, electrostatic_work, stored_energy, "
     "friction_dissipation, viscous_dissipation, kinetic_energy, integrator_dissipation, snap_dissipation, "
     "source_work, leakage_dissipation, stretch_work, field_energy, "
-    "substeps, newton_iterations, relaxations, seconds"
+    "substeps, newton_iterations, relaxations, jumps, seconds"
 )
 
 

@@ -149,6 +149,7 @@ def test_a_plate_that_snaps_sets_free_what_the_closed_form_says(gap):
     assert not result.contact_width[-2]
     assert result.contact_width[-1] == pytest.approx(width)
     assert result.snap_dissipation[-2] == 0.0
+    assert result.jumps.tolist() == [0] * 61 + [1]  # also where iterations snap without a release
     pulled = [StrongTroxel().potential(g, critical.voltage, layers) for g in (gap - critical.travel, 0.0)]
     freed = width * (pulled[0] - pulled[1]) - 0.5 * stiffness * (gap**2 - critical.travel**2)
     assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.02)
