@@ -42,6 +42,7 @@ def block(distance):
 
 
 def simulated(motion, voltage, **solver):
+    solver = {"core": "auto"} | solver
     law = {"block": ev.LinearElastic(E=0.1, nu=0.3)}
     finger = ev.MeshedFinger(block(0.1), law, electrical=SKIN)
     display = ev.Display(ev.Layer(GAP - 1e-7, 1.0), friction=0.0)  # and the skin
@@ -121,6 +122,7 @@ def test_a_core_that_would_reach_a_hovering_gap_is_refused_by_the_plan():
             ev.StrongTroxel(),
             100.0,
             [ev.Hover(gap=gap), ev.Press(indentation=0.1)],
+            solver=ev.Solver(core="auto"),
         )
         for gap in (0.01, 0.1)
     )

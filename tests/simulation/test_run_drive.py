@@ -109,6 +109,7 @@ def test_a_skin_with_debye_poles_closes_its_balance_and_has_the_mean_of_the_phas
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_the_balance_of_a_sliding_pad_closes_with_the_source():
     drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-8, resolved=True)
     motion = [

@@ -114,6 +114,7 @@ def reference(hand, speed):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
     """The slip is followed in 600 steps, the sticking spring before and after it in few: it is as
     straight as they are. Backward Euler takes a part of the swing that falls with the step.

@@ -67,6 +67,7 @@ def test_a_thin_insulator_by_strong_troxels_law():
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_a_micrometre_of_insulator_takes_few_iterations():
     """300 V on 1 um by Strong-Troxel's law, medium mesh: before, 197 iterations with 102 tangents."""
     pad, surface = FingerPad(resolution="medium", ridges=False), Display(Layer(1e-3, 3.35), friction=0.3)

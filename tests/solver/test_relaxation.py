@@ -323,6 +323,7 @@ def test_tissue_without_time_snaps_below_a_heavy_hand_that_stays_where_it_is(poi
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_motion_without_time_in_a_scene_with_time_ends_at_rest(point):
     """Lifted without speed after a slide that takes time, the tip loses the trough: time stands
     still, so there is no inertia to carry it on, and nothing but rest is asked for.

@@ -31,14 +31,14 @@ def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid():
 
 @pytest.mark.slow
 def test_areas_and_widths_and_what_would_bring_them_to_adams(tmp_path):
-    """The quick study: Adams' area is 1.6 times the pad's at 0.5 N, half the moduli give 1.4, and a
+    """The quick study: Adams' area is twice the pad's at 0.5 N, half the moduli give 1.4, and a
     cross-section needs a wider pad under more load; ridges and laws order the hovering forces.
     """
     numbers = studies.run("fingertip", quick=True, out=tmp_path)["numbers"]
     assert (tmp_path / "fingertip.png").stat().st_size > 10_000
     wanted = numbers["variant.wanted_over_unchanged"]
     assert 1.0 / numbers["verdict.smooth.gross_over_adams.0.5N"] == pytest.approx(wanted)
-    assert 1.2 < numbers["variant.all moduli x 0.5.area_over_unchanged"] < wanted < 1.8
+    assert 1.2 < numbers["variant.all moduli x 0.5.area_over_unchanged"] < wanted < 2.4
     assert 4.5 < numbers["width_mm.smooth.0.1N"] < numbers["width_mm.smooth.0.5N"] < 8.0
     for law in ("kaczmarek", "strong_troxel"):
         for case in ("HVHD", "HVLD", "LVLD"):

@@ -21,6 +21,7 @@ def test_ridges_make_a_line_in_the_spectrum_of_friction(tmp_path):
     assert (tmp_path / "friction_spectrum.png").stat().st_size > 10_000
 
 
+@pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_stick_slip_has_the_period_of_the_equation_of_motion(tmp_path):
     """With few steps in a slip; the error is of first order in them."""
     found = studies.run("stick_slip", quick=True, out=tmp_path)["numbers"]
