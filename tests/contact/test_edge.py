@@ -4,10 +4,10 @@ outlines.
 
 import numpy as np
 import pytest
+from evfem.studies.pressing import contact_spans
 
 from evfem.finger.fingerpad import FingerPad
 from evfem.surface.edge import outline_nodes
-from studies.pressing import contact_spans
 
 
 def spans(x, gap):
