@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 import urllib.request
 
 import pytest
@@ -150,19 +149,29 @@ def test_a_run_whose_process_dies_says_so(monkeypatch):
     assert "without a result" in lines[-1]["error"]
 
 
-def _say_the_last_and_stay(line, text, exact):
-    """The work of a process that needs a while to go."""
-    line.send({"animation": ""})
-    time.sleep(0.3)
+class SlowToGo:
+    """A process that says its last and needs a while to go."""
+
+    def __init__(self, *given):
+        self.line, self.lines, self.there = self, [{"animation": ""}], [True, False]
+
+    def poll(self, seconds):
+        return self.there.pop(0) if self.there else True
+
+    def recv(self):
+        if not self.lines:
+            raise EOFError
+        return self.lines.pop()
+
+    def end(self):
+        pass
 
 
 def test_a_run_whose_process_goes_slowly_has_a_result(monkeypatch):
     lines = []
-    monkeypatch.setattr(runs, "EVERY", 0.05)
-    monkeypatch.setattr(runs, "_work", _say_the_last_and_stay)
+    monkeypatch.setattr(runs, "Worker", SlowToGo)
     runs.run("{}", False, lines.append)
-    assert {"alive": True} in lines[lines.index({"animation": ""}) :]
-    assert not any("error" in line for line in lines)
+    assert lines == [{"animation": ""}, {"alive": True}]
 
 
 def test_no_more_than_two_runs_at_once(monkeypatch):
