@@ -45,7 +45,7 @@ STUCK                   a step is given up, after twice as many iterations, if s
                         the last ones, have no residual below
 FALLING                 this fraction of those before
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
-ACTIVE_SET_LIMIT        solves of an active set; a third of them may change many nodes at once    attraction
+ACTIVE_SET_LIMIT        solves of an active set                                                   attraction
 DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
                         as many each time that they come again
 DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs

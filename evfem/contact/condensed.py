@@ -104,6 +104,17 @@ class Candidates:
         turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
         return turned + self.friction_growth(own)[:, None] * axes[:, 1]
 
+    def by_chords(self, near: Ints, status: Ints, compliance: Floats) -> Floats:
+        """Coefficients (k,) of the `near` nodes by the chords of their friction law from no force to the
+        present one, none so steep that friction presses a slipping node on without end.
+        """
+        normal, index = np.maximum(self.force[near, 0], 0.0), np.arange(near.size)
+        cohesion: Any = 0.0 if self.cohesion is None else self.cohesion[near]
+        chord = self.friction[near] + cohesion / np.where(normal > 0.0, normal, np.inf)
+        pressed = compliance[index, near.size + index] / compliance[index, index]
+        on = np.where(status >= FORWARD, np.where(status == FORWARD, pressed, -pressed), np.abs(pressed))
+        return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
+
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force per x displacement, (c,)."""
         sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
@@ -307,7 +318,14 @@ class LinearContactStep:
         extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
         cohesion = None if known.cohesion is None else known.cohesion[near]
         problem = ContactProblem(
-            start, compliance, known.friction[near], extra_unknowns, None, cohesion, give
+            start,
+            compliance,
+            known.friction[near],
+            extra_unknowns,
+            None,
+            cohesion,
+            give,
+            None if cohesion is None else known.by_chords(near, status, compliance),
         )
         attraction = AttractionStiffness(
             known.negative_stiffness[near],

@@ -31,8 +31,8 @@ Algorithm (`solve_contact`), a primal-dual active set::
         gaps, slips <- start + C (forces + drops) + e d
         wanted <- the status that each node's forces, gap and slip ask for
         if wanted = status: done
-        change all violated nodes; the worst one alone where these statuses have been met before,
-            and always after many solves; give up where these go round in a circle
+        change all violated nodes; from the first statuses on that have been met before, the worst one
+            alone; give up where these go round in a circle
 
 A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
 slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
@@ -56,6 +56,7 @@ Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -68,10 +69,22 @@ from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
 from evfem.contact.attracted import AttractionStiffness, feedback
 
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
+#: how often the attraction's stiffness is scaled down, by at least which factor, before that of a pad
+#: without closed nodes decides
+SCALINGS, SOFTER = 2, 1.1
+
+
+NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
 class ContactNotSolved(ArithmeticError):
-    """The sub-problem cycles: it has no solution near the start, or several."""
+    """The sub-problem cycles: it has no solution near the start, or several. `softest` (k,): the last
+    statuses, those that keep changing open.
+    """
+
+    def __init__(self, message: str, softest: Ints = NO_NODES) -> None:
+        super().__init__(message)
+        self.softest = softest
 
 
 class Unstable(ContactNotSolved):
@@ -116,6 +129,13 @@ class ContactProblem:
     attraction: AttractionStiffness | None = None
     cohesion: Floats | None = None
     give: Floats | None = None
+    chords: Floats | None = None
+
+    @property
+    def by_chords(self) -> ContactProblem:
+        """The problem with the chords of its friction laws in the place of their tangents."""
+        assert self.chords is not None
+        return replace(self, friction=self.chords, cohesion=None)
 
     @property
     def size(self) -> int:
@@ -167,11 +187,11 @@ class ContactSolution:
 
 def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
     """Signorini-Coulomb, started from `status` (k,); raises `ContactNotSolved` when the active set does
-    not end within `ACTIVE_SET_LIMIT` solves and one per node.
+    not end within `ACTIVE_SET_LIMIT` solves.
     """
     status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    met, alone, violated = set[bytes](), set[bytes](), np.zeros(0, dtype=np.int64)
-    for solves in range(1, ACTIVE_SET_LIMIT + problem.size + 1):
+    met, alone, late, violated = set[bytes](), set[bytes](), False, np.zeros(0, dtype=np.int64)
+    for solves in range(1, ACTIVE_SET_LIMIT + 1):
         force, attraction_drop, extra = _solve_statuses(problem, status)
         state = problem.start + problem.compliance @ (force + attraction_drop)
         if problem.give is not None:
@@ -182,14 +202,17 @@ def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
         violated = np.flatnonzero(wanted != status)
         if not violated.size:
             return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        late, key = solves > ACTIVE_SET_LIMIT // 3, status.tobytes()
-        if late and key in alone:
+        key = status.tobytes()
+        late = late or key in met
+        if key in alone:
             break
-        changed = violation.argmax() if late or key in met else violated
+        changed = violation.argmax() if late else violated
         (alone if late else met).add(key)
         status = status.copy()
         status[changed] = wanted[changed]
-    raise ContactNotSolved(f"{violated.size} of {problem.size} nodes keep changing")
+    raise ContactNotSolved(
+        f"{violated.size} of {problem.size} nodes keep changing", np.where(wanted != status, OPEN, status)
+    )
 
 
 def solve_with_attraction(
@@ -200,30 +223,43 @@ def solve_with_attraction(
     If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
     linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
     `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, or where that does not do, of the much softer one without them.
+    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
+    one without them. The law of friction is taken by its tangents first, then by its chords: the
+    tangent of one that levels off soon grows so fast that there may be no solution.
     """
+    laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:
-        return solve_contact(problem, status)
-    attracted = replace(problem, attraction=attraction)
+        return _first(laws, status)
+    attracted = [replace(law, attraction=attraction) for law in laws]
     root = np.sqrt(attraction.negative_stiffness)
     gain = root[:, None] * problem.compliance[: problem.size, : problem.size] * root
     if np.abs(gain).sum(axis=1).max() < STABLE:
-        return solve_contact(attracted, status)
-    with suppress(ContactNotSolved):
-        found = solve_contact(attracted, status)
-        if _feedback(problem, attraction, found.status) < 1.0:
-            return found
+        return _first(attracted, status)
 
     def scaled(most: float) -> AttractionStiffness:
         return replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
 
-    most = max(STABLE, _feedback(problem, attraction, status))
-    with suppress(ContactNotSolved):
-        found = solve_contact(replace(problem, attraction=scaled(most)), status)
-        if _feedback(problem, scaled(most), found.status) < 1.0:
-            return replace(found, reduced=True)
+    most = _feedback(problem, attraction, status)
+    for law in (*laws, *[laws[-1]] * SCALINGS):
+        pulled = scaled(most) if most >= 1.0 else attraction
+        try:
+            found = solve_contact(replace(law, attraction=pulled), status)
+            softest = found.status
+            if _feedback(problem, pulled, softest) < 1.0:
+                return replace(found, reduced=most >= 1.0)
+        except ContactNotSolved as error:
+            softest = error.softest
+        most = max(SOFTER * most, float(law is laws[-1]), _feedback(problem, attraction, softest))
     most = max(most, _feedback(problem, attraction, np.full(problem.size, OPEN)))
-    return replace(solve_contact(replace(problem, attraction=scaled(most)), status), reduced=True)
+    return replace(_first([replace(law, attraction=scaled(most)) for law in laws], status), reduced=True)
+
+
+def _first(problems: Sequence[ContactProblem], status: Ints) -> ContactSolution:
+    """The solution of the first of these problems that has one."""
+    for problem in problems[:-1]:
+        with suppress(ContactNotSolved):
+            return solve_contact(problem, status)
+    return solve_contact(problems[-1], status)
 
 
 def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
@@ -284,7 +320,7 @@ def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floa
     try:
         x = np.linalg.solve(matrix, right)
     except np.linalg.LinAlgError as error:
-        raise ContactNotSolved(str(error)) from error
+        raise ContactNotSolved(str(error), status) from error
     force = np.zeros(2 * k)
     contact = rows.size - attracted.size
     force[rows[:contact]] = x[:contact]
