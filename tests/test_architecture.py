@@ -53,7 +53,7 @@ ROOMS = {
     "solver": (
         {"numpy", "scipy", "pypardiso"},
         "strategy state hand control condensation slipping interface spatial linearisation pressure anderson "
-        "travel findings factorised equilibrium relaxation path stepping",
+        "travel findings factorised equilibrium relaxation hold path stepping",
     ),
     "scene": (
         {"numpy", "tomli_w"},
@@ -65,7 +65,7 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works ledger checkpoint failure run rendering",
+        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run rendering",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},

@@ -52,7 +52,7 @@ class Solver:
         float | str,
         {"allowed": _CORE, "check": _core},
         "gap below which a line of the same work takes the place of a law too steep for the mesh",
-    ] = "off"
+    ] = "auto"
     symmetry: InitVar[object] = None
 
     def __post_init__(self, symmetry: object) -> None:

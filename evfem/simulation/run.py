@@ -24,6 +24,7 @@ from evfem.planning.way import allowed_error
 from evfem.protocols import Observer, TimeSignal
 from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, follows_gap
 from evfem.scene.scene import Scene
+from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
     ledger_arrays,
     ledger_of,
@@ -38,6 +39,7 @@ from evfem.simulation.failure import advice, unheld
 from evfem.simulation.ledger import Ledger, frame_of
 from evfem.simulation.model import Model, make_model
 from evfem.simulation.result import Frame, Result, Saved, provenance
+from evfem.simulation.works import Part
 from evfem.solver.control import (
     FollowFriction,
     Force,
@@ -140,7 +142,11 @@ class Run:
         self.model: Model = make_model(scene)
         self.ledger = Ledger(self.model)
         self.stepper = Stepper(
-            self.model.equilibrium, scene.coupling, body=self.model.body, allowed=allowed_error(scene)
+            self.model.equilibrium,
+            scene.coupling,
+            body=self.model.body,
+            allowed=allowed_error(scene),
+            rise=lambda old, new: rise(Part(self.model, old, new)),
         )
         self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.rows: list[dict[str, Any]] = []
@@ -370,6 +376,8 @@ class Run:
             "contact_solves": record.contact_solves,
             "cuts": self.stepper.cuts,
             "relaxations": self.stepper.relaxations,
+            "barriers": self.stepper.barriers,
+            "held": self.stepper.held,
             "unsettled": self.stepper.unsettled,
             "candidates": int(self.model.equilibrium.reusable().candidates.size),
             "backend": record.backend,

@@ -76,6 +76,8 @@ The first part begins without any load: voltage and user's forms count as raised
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -173,7 +175,7 @@ class Part:
         body, new = self.model.body, self.new
         given = body.given_forces(new.u)
         kinetic = 0.0 if body.dynamics is None else body.dynamics.kinetic_energy(new.velocity)
-        springs = float(0.5 * np.sum(self._compliance * new.contact_force**2))
+        springs = float(0.5 * np.sum(self.compliance * new.contact_force**2))
         if (hand := self.model.scene.hand) is not None:
             springs, kinetic = springs + hand.stored(new), kinetic + hand.kinetic(new)
         return Books(body.forces(new.u) - given, given, body.energy(new.u), springs, kinetic)
@@ -225,15 +227,15 @@ class Part:
         voltages = (old.voltage, new.voltage)
         ends = _mean_work(old.attraction, new.attraction, along)
         if model.attraction.has_fringes:
-            ends = float(np.mean(self._pulls(along, ENDS, voltages)))
+            ends = float(np.mean(self.pulls(along, ENDS, voltages)))
         return trapezoidal + self._on_the_way(along, voltages) - ends
 
     def _on_the_way(self, along: Floats, voltages: tuple[float, float]) -> float:
         """Work of the attraction along `along` (P, dim) of the straight way between two voltages."""
-        values = self._pulls(along, WAY, voltages)
+        values = self.pulls(along, WAY, voltages)
         size = np.abs(_LEGENDRE @ values)
         if size[-2:].max() > SEEN * size.max():
-            return float(FINE_SHARE @ self._pulls(along, FINE_WAY, voltages))
+            return float(FINE_SHARE @ self.pulls(along, FINE_WAY, voltages))
         return float(SHARE @ values)
 
     def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
@@ -245,6 +247,21 @@ class Part:
         work = self._on_the_way(moved, (begin.voltage, begin.voltage))
         charging.begin(begin, seconds)
         return work
+
+    @contextmanager
+    def charges_held(self) -> Iterator[None]:
+        """Within, the charges are those of the end."""
+        attraction, new = self.model.attraction, self.new
+        if attraction is None or (charging := attraction.charging) is None:
+            yield
+            return
+        begin, seconds = charging.old, charging.seconds
+        position = self.model.equilibrium.interface.resting(new)
+        charging.begin(attraction.charged(position, new.voltage, new.contact_force[:, 0], new.charges), 0.0)
+        try:
+            yield
+        finally:
+            charging.begin(begin, seconds)
 
     def _flow(self) -> Flow:
         """What the source gave, and what leaked; the first voltage is raised before anything moves."""
@@ -275,7 +292,7 @@ class Part:
             work += share * float(charging.energy_density(at) @ grown)
         return work
 
-    def _pulls(self, along: Floats, ways: Floats, voltages: tuple[float, float]) -> Floats:
+    def pulls(self, along: Floats, ways: Floats, voltages: tuple[float, float]) -> Floats:
         """Attraction, where there are fringes that of the columns, times the way `along` (P, dim) at the
         parts `ways` (w,) of the straight way, the squared voltage growing evenly: (w,) in N mm per mm of
         depth.
@@ -293,7 +310,7 @@ class Part:
 
     def friction(self) -> float:
         """Dissipation by friction D_f, N mm per mm of depth."""
-        length, x0, x1 = self._slip_length, self._x[0], self._x[1]
+        length, x0, x1 = self.slip_length, self.x[0], self.x[1]
         if not length.any():
             return 0.0
         before, after = (np.maximum(state.contact_force[:, 0], 0.0) for state in (self.old, self.new))
@@ -310,13 +327,13 @@ class Part:
         return float(self.model.equilibrium.interface.duration)
 
     @cached_property
-    def _x(self) -> tuple[Floats, Floats]:
+    def x(self) -> tuple[Floats, Floats]:
         """x of the pad nodes (P,) before and after."""
         x0, x1 = (self.model.equilibrium.positions(state.u)[:, 0] for state in (self.old, self.new))
         return x0, x1
 
     @cached_property
-    def _compliance(self) -> Floats:
+    def compliance(self) -> Floats:
         """Compliance of the interface (P, 2) in this part, mm per N/mm."""
         return self.model.equilibrium.interface.compliance(self.old)
 
@@ -327,8 +344,8 @@ class Part:
         """
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         stretch = [interface.surface_at(state).stretch for state in (old, new)]
-        slip = 0.5 * (stretch[0] + stretch[1]) * (self._x[1] - self._x[0])
-        slip = slip + self._compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
+        slip = 0.5 * (stretch[0] + stretch[1]) * (self.x[1] - self.x[0])
+        slip = slip + self.compliance[:, 1] * (new.contact_force[:, 1] - old.contact_force[:, 1])
         status = np.where(new.touching | (old.status == STICK), new.status, old.status)
         # a node may stick at a jump of friction that it has slipped up to
         carried = (status == STICK) & (np.abs(slip) > interface.tolerance * interface.length)
@@ -336,7 +353,7 @@ class Part:
         return np.where(forward | ((status == BACKWARD) & (slip < 0.0)), slip, 0.0)
 
     @cached_property
-    def _slip_length(self) -> Floats:
+    def slip_length(self) -> Floats:
         """How far the pad nodes (P,) slip, in mm."""
         interface = self.model.equilibrium.interface
         if isinstance(interface, SkinInterface):
@@ -379,14 +396,14 @@ class Part:
             at = [model.equilibrium.attraction_at(old, state, new.voltage) for state in (carried, new)]
             work += float(np.sum((at[1] - at[0]) * along))
         x = model.equilibrium.positions(carried.u)[:, 0]
-        less = self._coefficient(x) - self._coefficient(self._x[1])
+        less = self._coefficient(x) - self._coefficient(self.x[1])
         return work + float(np.sum(less * new.contact_force[:, 0] * self._with_slip(along)))
 
     def _with_slip(self, along: Floats) -> Floats:
         """The share (P,) of the way `along` (P, dim) that the pad nodes go the way they slip."""
         interface = self.model.equilibrium.interface
         if isinstance(interface, SkinInterface):
-            slip = slipped(interface, self.old, self.new) / np.maximum(self._slip_length, 1e-300)[:, None]
+            slip = slipped(interface, self.old, self.new) / np.maximum(self.slip_length, 1e-300)[:, None]
             return np.asarray(np.sum(slip * along[:, ::2], axis=1))
         return np.sign(self._slip) * along[:, 0]
 

@@ -34,12 +34,15 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.solver.control import Met, Target
 from evfem.solver.equilibrium import Equilibrium
+from evfem.solver.hold import BARRIER, Hold
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
 from evfem.tissue.body import Body
 
+#: a climb that is rounding, as a share of the stored energy
+CLIMB = 1e-3
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
 Path = Callable[[float, float], Target]
 #: steps that were solved one after the other: their targets and ends
@@ -114,6 +117,10 @@ class Stepper:
     together: bool = False
     allowed: float | None = None
     path_error: float = 0.0
+    rise: Callable[[State, State], float] | None = None
+    barriers: int = 0
+    held: int = 0
+    releasing: bool = False
 
     def __post_init__(self) -> None:
         self._release = Release(RELEASED, self.substep)
@@ -241,7 +248,7 @@ class Stepper:
             raise failed
         if not relaxation.applies(target):
             return None
-        failed.released, mark = True, accounts.mark()
+        failed.released, mark, self.releasing = True, accounts.mark(), True
         try:
             rest = relaxation.follow(state, target, accounts.accept)
         except StepFailed as error:
@@ -250,6 +257,8 @@ class Stepper:
                 error.last = failed.last
                 raise
             return None
+        finally:
+            self.releasing = False
         self.relaxations += 1
         return rest
 
@@ -273,9 +282,30 @@ class Stepper:
             return
 
     def solve(self, state: State, target: Target, start: State | None = None) -> State:
-        """One equilibrium with the coupling asked for; where charges move, they follow. Iterations
-        begin at `start` (default `state`).
+        """One equilibrium that the body can reach from `state` without climbing, found from `start` (default
+        `state`). Where iterations come to one behind a barrier the body is held (`evfem.solver.hold`); in a
+        step that takes time or is part of a release already, it fails.
         """
+        new = self._found(state, target, start)
+        if not self._climbs(state, new):
+            return new
+        self.barriers += 1
+        assert self.body is not None
+        if self.releasing or not self._relaxation(self.body).applies(target):
+            raise StepFailed(BARRIER, self.equilibrium.record.residuals)
+        new = Hold(self.body, self._found, self._climbs).follow(state, target)
+        self.held += 1
+        return new
+
+    def _climbs(self, old: State, new: State) -> bool:
+        """Whether a barrier lies between two states; without attraction there is none to come over."""
+        attraction = self.equilibrium.attraction
+        if self.rise is None or self.body is None or attraction is None or not attraction.acts(new.voltage):
+            return False
+        return self.rise(old, new) > CLIMB
+
+    def _found(self, state: State, target: Target, start: State | None = None) -> State:
+        """One equilibrium with the coupling asked for; where charges move, they follow."""
         attraction = self.equilibrium.attraction
         if attraction is None or attraction.charging is None:
             return self._coupled(state, target, start)

@@ -283,7 +283,7 @@ def test_between_rough_faces_the_attraction_on_the_way_is_that_of_the_forces_on_
         "way_forces",
         lambda self, places, volts, touching, p: seen.append(p) or places,
     )
-    Part(model, old, new)._pulls(np.zeros((nodes, 2)), np.array([0.0, 0.5, 1.0]), (140.0, 140.0))
+    Part(model, old, new).pulls(np.zeros((nodes, 2)), np.array([0.0, 0.5, 1.0]), (140.0, 140.0))
     np.testing.assert_allclose(seen[0], [loads[0][:, 0], 2.5 * loads[0][:, 0], loads[1][:, 0]], rtol=1e-12)
 
 
@@ -293,7 +293,7 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     monkeypatch.setattr(works, "slipped", lambda *_: slips)
     interface = object.__new__(SkinInterface)
     model = SimpleNamespace(equilibrium=SimpleNamespace(interface=interface))
-    part = SimpleNamespace(model=model, old=None, new=None, _slip_length=np.array([5.0, 2.0]))
+    part = SimpleNamespace(model=model, old=None, new=None, slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
     np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
 

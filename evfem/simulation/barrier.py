@@ -1,0 +1,109 @@
+r"""Whether the finger could get from one equilibrium to the next without climbing.
+
+A part leads from u_0 to u_1. With the loads of its END held it has the potential
+
+.. math:: \Phi(u) = \psi(u) - W_e(u_0 \to u;\,U_1) - r_1\cdot(b - b_0) + D_f(\lambda_1)
+          + \tfrac{1}{2} D_v(u - u_0) + \tfrac{1}{2}\,|u - u_0 - h v_0|^2_M / h^2 ,
+
+of which u_1 is a stationary point: tissue and springs, attraction, the reaction on the bone, friction
+under the contact forces of the end, and of a step in time its viscosity, drag and inertia, as backward
+Euler has them. Where it is convex it falls all along the straight way from u_0 to u_1, however long the
+part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a barrier: iterations have
+come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
+lie downhill.
+
+Nodes that touch at both ends follow the surface, not the chord; to first order that adds
+:math:`-\lambda_1 g` on the chord. A spring of the hand adds its own stiffness. Charges are those of the
+end. An attraction without a potential (the vertical one on changing tributary lengths, that of touching
+nodes alone, the full field beside its columns) is asked for its work along the straight way alone; where
+another way would give another work, a barrier of that difference may be missed.
+
+The potential with the loads of the end is the upper estimate of the energy in the theory of
+rate-independent systems; asked along the way it selects the branch that begins at the last state. A.
+Mielke, T. Roubicek, Rate-Independent Systems (2015), doi:10.1007/978-1-4939-2706-7.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.contact.pad import surface_state
+from evfem.simulation.works import Part
+
+#: where the potential is taken on the way, and, denser at its ends, the attraction
+PLACES = np.linspace(0.0, 1.0, 9)
+FINE = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
+#: energy (N mm) below which there is none to compare with
+LEAST = 1e-9
+
+
+def rise(part: Part) -> float:
+    """The highest climb of the potential on the straight way of a part, as a share of the stored energy."""
+    body, old, new = part.model.body, part.old, part.new
+    way = new.u - old.u
+    tissue = np.array([body.energy(old.u + s * way) for s in PLACES])
+    springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
+    stored = tissue + springs[0] + (springs[1] - springs[0]) * PLACES**2
+    given = float(new.reaction @ (new.bone - old.bone)) - float(np.sum(body.given_forces(new.u) * way))
+    potential = stored - stored[0] - _pulled(part) + (_rubbed(part) - given) * PLACES
+    potential = potential + _lifted(part) + _in_time(part) + _hand(part)
+    climbed = potential - np.minimum.accumulate(potential)
+    return float(climbed.max()) / max(stored[0], stored[-1], LEAST)
+
+
+def _pulled(part: Part) -> Floats:
+    """Work of the attraction up to `PLACES` under the voltage, or the charges, of the end."""
+    attraction, old, new = part.model.attraction, part.old, part.new
+    if attraction is None or not attraction.acts(new.voltage):
+        return np.zeros_like(PLACES)
+    along = (new.u - old.u)[part.model.pad.nodes]
+    with part.charges_held():
+        power = part.pulls(along, FINE, (new.voltage, new.voltage))
+    work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
+    fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
+    return np.interp(PLACES, FINE, work) + fringes * PLACES
+
+
+def _rubbed(part: Part) -> float:
+    """Dissipation of the slips under the contact forces of the end."""
+    length = part.slip_length
+    if not length.any():
+        return 0.0
+    interface, normal = part.model.equilibrium.interface, np.maximum(part.new.contact_force[:, 0], 0.0)
+    return float(np.sum(interface.resistance((part.old, part.new), part.x[1], normal, length) * length))
+
+
+def _lifted(part: Part) -> Floats:
+    """What nodes that touch at both ends have to climb beside the chord between their places."""
+    model, old, new = part.model, part.old, part.new
+    touching = old.touching & new.touching
+    if model.surface.is_flat or not touching.any():
+        return np.zeros_like(PLACES)
+    begin, end = (model.equilibrium.positions(state.u)[touching] for state in (old, new))
+    normal = new.contact_force[touching, 0]
+    lifts = [-normal @ surface_state(model.surface, begin + s * (end - begin)).gap for s in PLACES]
+    return np.array(lifts) - lifts[0] * (1.0 - PLACES) - lifts[-1] * PLACES
+
+
+def _in_time(part: Part) -> Floats:
+    """Drag, viscosity and inertia as potentials of an implicit step; drag counts from where the body was
+    let go.
+    """
+    body, old, new = part.model.body, part.old, part.new
+    way, dynamics = new.u - old.u, part.model.body.dynamics
+    held = np.array([0.5 * body.drag_dissipation(old.u + s * way) for s in PLACES])
+    if dynamics is not None and dynamics.step > 0.0:
+        held = held + 0.5 * dynamics.dissipation(new.u) * PLACES**2
+        speed = way / dynamics.step
+        held = held + [dynamics.kinetic_energy(s * speed - old.velocity) for s in PLACES]
+    return held - held[0]
+
+
+def _hand(part: Part) -> Floats:
+    """What a hand's spring adds to the constant force of the end."""
+    hand = part.model.scene.hand
+    if hand is None:
+        return np.zeros_like(PLACES)
+    short = float(part.new.bone[0] - part.old.bone[0]) * (1.0 - PLACES)
+    return 0.5 * hand.stiffness * (short**2 - short[0] ** 2)
