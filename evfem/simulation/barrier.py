@@ -28,7 +28,7 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.contact.pad import surface_state
+from evfem.surface.pad import surface_state
 from evfem.simulation.works import Part
 
 #: where the potential is taken on the way, and, denser at its ends, the attraction
