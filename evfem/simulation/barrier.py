@@ -12,7 +12,8 @@ part, whatever slips, lands or leaves. So a rise on that way (`rise`) shows a ba
 come to u_1 over it, the body never would. The reverse does not hold: of several equilibria some may all
 lie downhill.
 
-Nodes that touch at both ends follow the surface, not the chord; to first order that adds
+A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
+begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first order that adds
 :math:`-\lambda_1 g` on the chord. A spring of the hand adds its own stiffness. Charges are those of the
 end. An attraction without a potential (the vertical one on changing tributary lengths, that of touching
 nodes alone, the full field beside its columns) is asked for its work along the straight way alone; where
@@ -28,38 +29,57 @@ from __future__ import annotations
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.surface.pad import surface_state
 from evfem.simulation.works import Part
+from evfem.solver.control import Target
+from evfem.surface.pad import surface_state
 
 #: where the potential is taken on the way, and, denser at its ends, the attraction
 PLACES = np.linspace(0.0, 1.0, 9)
 FINE = np.linspace(0.0, 1.0, 33) ** 2 * (3.0 - 2.0 * np.linspace(0.0, 1.0, 33))
-#: energy (N mm) below which there is none to compare with
-LEAST = 1e-9
+#: stored energy (N mm) that a climb is compared with at least: below it is the rounding of stiff cells
+LEAST = 1e-6
 
 
-def rise(part: Part) -> float:
+def rise(part: Part, target: Target) -> float:
     """The highest climb of the potential on the straight way of a part, as a share of the stored energy."""
     body, old, new = part.model.body, part.old, part.new
     way = new.u - old.u
     tissue = np.array([body.energy(old.u + s * way) for s in PLACES])
     springs = [float(0.5 * np.sum(part.compliance * state.contact_force**2)) for state in (old, new)]
     stored = tissue + springs[0] + (springs[1] - springs[0]) * PLACES**2
-    given = float(new.reaction @ (new.bone - old.bone)) - float(np.sum(body.given_forces(new.u) * way))
-    potential = stored - stored[0] - _pulled(part) + (_rubbed(part) - given) * PLACES
+    carried = _carried(part, target)
+    given = float(new.reaction @ (new.bone - old.bone)) + float(np.sum(new.attraction * carried))
+    given = given - float(np.sum(body.given_forces(new.u) * way))
+    potential = stored - stored[0] - _pulled(part, carried) + (_rubbed(part) - given) * PLACES
     potential = potential + _lifted(part) + _in_time(part) + _hand(part)
     climbed = potential - np.minimum.accumulate(potential)
     return float(climbed.max()) / max(stored[0], stored[-1], LEAST)
 
 
-def _pulled(part: Part) -> Floats:
-    """Work of the attraction up to `PLACES` under the voltage, or the charges, of the end."""
+def _carried(part: Part, target: Target) -> Floats:
+    """How far the bone carries the pad's nodes (P, dim), where it is held and not loaded: all but those that
+    touch at both ends.
+    """
+    travel = part.new.bone - part.old.bone
+    if target.height.free:
+        travel[1] = 0.0
+    if target.hand is not None:
+        travel[0] = 0.0
+    return np.where((part.old.touching & part.new.touching)[:, None], 0.0, travel)
+
+
+def _pulled(part: Part, carried: Floats) -> Floats:
+    """Work of the attraction up to `PLACES` under the voltage, or the charges, of the end, from where the
+    bone has carried the nodes to.
+    """
     attraction, old, new = part.model.attraction, part.old, part.new
     if attraction is None or not attraction.acts(new.voltage):
         return np.zeros_like(PLACES)
-    along = (new.u - old.u)[part.model.pad.nodes]
+    along = (new.u - old.u)[part.model.pad.nodes] - carried
+    begin = part.model.equilibrium.interface.resting(old) + carried
+    begin[:, 1] -= np.minimum(surface_state(part.model.surface, begin).gap, 0.0)
     with part.charges_held():
-        power = part.pulls(along, FINE, (new.voltage, new.voltage))
+        power = part.pulls(along, FINE, (new.voltage, new.voltage), begin)
     work = np.append(0.0, np.cumsum(0.5 * (power[1:] + power[:-1]) * np.diff(FINE)))
     fringes = float(np.sum(new.attraction * along)) - float(power[-1]) if attraction.has_fringes else 0.0
     return np.interp(PLACES, FINE, work) + fringes * PLACES

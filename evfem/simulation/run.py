@@ -146,7 +146,7 @@ class Run:
             scene.coupling,
             body=self.model.body,
             allowed=allowed_error(scene),
-            rise=lambda old, new: rise(Part(self.model, old, new)),
+            rise=lambda old, new, target: rise(Part(self.model, old, new), target),
         )
         self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.rows: list[dict[str, Any]] = []

@@ -292,14 +292,17 @@ class Part:
             work += share * float(charging.energy_density(at) @ grown)
         return work
 
-    def pulls(self, along: Floats, ways: Floats, voltages: tuple[float, float]) -> Floats:
+    def pulls(
+        self, along: Floats, ways: Floats, voltages: tuple[float, float], begin: Floats | None = None
+    ) -> Floats:
         """Attraction, where there are fringes that of the columns, times the way `along` (P, dim) at the
-        parts `ways` (w,) of the straight way, the squared voltage growing evenly: (w,) in N mm per mm of
-        depth.
+        parts `ways` (w,) of the straight way, from `begin` (P, dim) if that is given, the squared voltage
+        growing evenly: (w,) in N mm per mm of depth.
         """
         attraction, old, new = self.model.attraction, self.old, self.new
         assert attraction is not None
-        begin, end = (self.model.equilibrium.interface.resting(state) for state in (old, new))
+        begin = self.model.equilibrium.interface.resting(old) if begin is None else begin
+        end = self.model.equilibrium.interface.resting(new)
         volts = np.sqrt((1.0 - ways) * voltages[0] ** 2 + ways * voltages[1] ** 2)
         if attraction.charging is not None:
             volts = np.full(ways.shape, voltages[0])  # its sign counts where there are charges

@@ -26,6 +26,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -117,7 +118,7 @@ class Stepper:
     together: bool = False
     allowed: float | None = None
     path_error: float = 0.0
-    rise: Callable[[State, State], float] | None = None
+    rise: Callable[[State, State, Target], float] | None = None
     barriers: int = 0
     held: int = 0
     releasing: bool = False
@@ -287,22 +288,26 @@ class Stepper:
         step that takes time or is part of a release already, it fails.
         """
         new = self._found(state, target, start)
-        if not self._climbs(state, new):
+        if not self._climbs(target, state, new):
             return new
         self.barriers += 1
         assert self.body is not None
         if self.releasing or not self._relaxation(self.body).applies(target):
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        new = Hold(self.body, self._found, self._climbs).follow(state, target)
+        new = Hold(self.body, self._found, partial(self._climbs, target)).follow(state, target)
         self.held += 1
         return new
 
-    def _climbs(self, old: State, new: State) -> bool:
-        """Whether a barrier lies between two states; without attraction there is none to come over."""
-        attraction = self.equilibrium.attraction
-        if self.rise is None or self.body is None or attraction is None or not attraction.acts(new.voltage):
+    def _climbs(self, target: Target, old: State, new: State) -> bool:
+        """Whether a barrier lies between two states; without attraction there is none to come over, and where
+        a voltage is found it is no load whose potential could rise.
+        """
+        attraction, drive = self.equilibrium.attraction, target.drive
+        if self.rise is None or self.body is None or drive.free or drive.follows:
             return False
-        return self.rise(old, new) > CLIMB
+        if attraction is None or not attraction.acts(new.voltage):
+            return False
+        return self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow."""
