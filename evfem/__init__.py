@@ -62,6 +62,7 @@ _NAMES = {
     "simulation.spectrum": ("spectrum",),
     "solver.hand": ("Hand",),
     "solver.strategy": ("Strategy",),
+    "sweeps.check": ("check",),
     "sweeps.file": ("Sweep",),
     "sweeps.run": ("SweepResult", "sweep"),
     "sweeps.samples": ("Normal", "Samples", "Uniform"),

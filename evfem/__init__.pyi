@@ -88,6 +88,7 @@ from evfem.surface.surfaces import Profile as Profile
 from evfem.surface.surfaces import Sinusoid as Sinusoid
 from evfem.surface.textures import Grating as Grating
 from evfem.surface.textures import SelfAffine as SelfAffine
+from evfem.sweeps.check import check as check
 from evfem.sweeps.file import Sweep as Sweep
 from evfem.sweeps.run import SweepResult as SweepResult
 from evfem.sweeps.run import sweep as sweep

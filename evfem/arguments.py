@@ -20,7 +20,10 @@ from evfem.errors import InputError
 from evfem.templates import TEMPLATES
 
 BAD_INPUT = 2
-STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
+STATUS = (
+    "exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk failed, "
+    "130 interrupted"
+)
 #: what a shell completes an argument with, as shtab wants it: `shtab --shell bash evfem.cli.parser`
 FILES = {"bash": "_shtab_compgen_files", "zsh": "_files", "tcsh": "f"}
 FOLDERS = {"bash": "_shtab_compgen_dirs", "zsh": "_files -/", "tcsh": "d"}
@@ -60,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
         ("run", "run a scene and write history, fields, summary and picture", _run_options),
         ("init", "write a commented scene to begin with", _init_options),
         ("plan", "print terms, unknowns and solver of a scene; compute nothing", _scene_argument),
+        ("check", "run a scene by several ways and compare where they end", _scene_argument),
         ("study", "run studies and write their numbers, series and pictures", _study_options),
         ("sweep", "run many scenes side by side and write one table of all", _sweep_options),
         ("mesh", "write the finger's mesh as .vtu or .msh", _mesh_options),

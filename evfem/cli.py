@@ -1,8 +1,8 @@
 """The command `evfem`: arguments in, exit status out. What is heavy is imported by the command
 that needs it.
 
-Exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk or folder failed, 130
-interrupted.
+Exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk or folder
+failed, 130 interrupted.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from evfem.scene.scene import Scene
     from evfem.simulation.result import Row
 
-DONE, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 3, 4, 130
+DONE, DIFFERENT, NOT_CONVERGED, DISK_FAILED, INTERRUPTED = 0, 1, 3, 4, 130
 #: what the system says where our output cannot be written; of a file it is a `StorageError`
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
@@ -156,6 +156,7 @@ def _command(name: str | None) -> Callable[[argparse.Namespace], int]:
         "run": _run,
         "init": _init,
         "plan": _plan,
+        "check": _check,
         "study": _study,
         "sweep": _sweep,
         "mesh": _mesh,
@@ -300,6 +301,14 @@ def _plan(given: argparse.Namespace) -> int:
     files = FieldFiles.of(scene, mesh)
     print(f"{needed}\n\nFiles of a run\n  {files}", flush=True)
     return DONE
+
+
+def _check(given: argparse.Namespace) -> int:
+    from evfem.sweeps.check import check
+
+    found = check(_scene(given.scene))
+    print(found, flush=True)
+    return DONE if found.agrees else DIFFERENT
 
 
 def _study(given: argparse.Namespace) -> int:

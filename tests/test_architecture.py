@@ -69,7 +69,7 @@ ROOMS = {
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
-        "samples file units schema folder run",
+        "samples file units schema folder run check",
     ),
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (

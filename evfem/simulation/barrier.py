@@ -13,11 +13,11 @@ come to u_1 over it, the body never would. The reverse does not hold: of several
 lie downhill.
 
 A bone that is held and not loaded has its place at the end already: nodes that do not touch at both ends
-begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first order that adds
-:math:`-\lambda_1 g` on the chord. A spring of the hand adds its own stiffness. Charges are those of the
-end. An attraction without a potential (the vertical one on changing tributary lengths, that of touching
-nodes alone, the full field beside its columns) is asked for its work along the straight way alone; where
-another way would give another work, a barrier of that difference may be missed.
+begin where it carries them. Nodes that touch at both ends follow the surface, not the chord; to first
+order that adds :math:`-\lambda_1 g` on the chord. A spring of the hand adds its own stiffness. Charges
+are those of the end. An attraction without a potential (the vertical one on changing tributary lengths,
+that of touching nodes alone, the full field beside its columns) is asked for its work along the straight
+way alone; where another way would give another work, a barrier of that difference may be missed.
 
 The potential with the loads of the end is the upper estimate of the energy in the theory of
 rate-independent systems; asked along the way it selects the branch that begins at the last state. A.

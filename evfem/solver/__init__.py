@@ -12,11 +12,27 @@ contact forces :math:`\lambda` along the profile's normal and tangent, the state
 With viscosity or inertia :math:`f_{int}` has their forces by backward Euler; another law of friction
 takes the place of :math:`\mu\lambda_n`. A step that fails leaves the accepted state as it was.
 
+**Which of several states.** Under a strong attraction several states obey these laws. The answer is
+the limit of vanishing drag [5]_ [6]_: with a drag of rate :math:`\epsilon`
+
+.. math:: \epsilon\,\dot u + R(u, \lambda;\, t) = 0, \qquad \epsilon \to 0 ,
+
+the body follows the branch of stable states that begins at the last one. Where that branch ends it snaps:
+it is released under the loads that it has there, and rests at the state that drag leads to. All that
+follows are ways to find that state; none decides which it is. A state that iterations found elsewhere
+is refused where the potential with the loads of the part's end,
+
+.. math:: \Phi(u) = \psi(u) - W_{el}(u) - W_{bone}(u) + D_{friction}(u) ,
+
+rises on the straight way to it (`evfem.simulation.barrier`): the body would have to climb. That is
+necessary, not sufficient: where several states lie downhill, the nearest branch is not told from others.
+
 **1. A step is cut into parts** (`stepping`; the user's numbers: `strategy`)::
 
     part <- the length that worked last
     repeat until the step's end is reached
         find the equilibrium at the end of the part (2)
+        found behind a barrier: find it held, by drag from the old state that is taken away (`hold`)
         found: accept it; after few iterations the next part is longer
         not found: halve the part; from 1/32 of the step on, release the body (5); where it does not
             come to rest, halve on, and fail at the smallest part
@@ -97,4 +113,6 @@ Every constant is in `evfem.common.constants`; none decides what is accepted.
 .. [2] S. Hueeber, G. Stadler, B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
 .. [3] D. G. Anderson, J. ACM 12 (1965) 547, doi:10.1145/321296.321305.
 .. [4] C. T. Kelley, D. E. Keyes, SIAM J. Numer. Anal. 35 (1998) 508, doi:10.1137/S0036142996304796.
+.. [5] M. A. Efendiev, A. Mielke, J. Convex Anal. 13 (2006) 151.
+.. [6] L. Minotti, G. Savare, Arch. Ration. Mech. Anal. 227 (2018) 477, doi:10.1007/s00205-017-1165-5.
 """

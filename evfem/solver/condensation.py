@@ -17,6 +17,9 @@ from __future__ import annotations
 import ctypes
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cache
 from importlib import metadata
 from pathlib import Path
@@ -250,10 +253,29 @@ class SuperLU:
         return state + self._solve(b)
 
 
-def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
-    """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
+#: whether the sparse solver is the one that is not chosen by itself
+_OTHER = ContextVar("_OTHER", default=False)
+
+
+@contextmanager
+def other_solver() -> Iterator[str]:
+    """Within, SuperLU is taken in PARDISO's place; its name, "" where it is the only one."""
+    token = _OTHER.set(True)
+    try:
+        yield "SuperLU" if _has_pardiso() else ""
+    finally:
+        _OTHER.reset(token)
+
+
+def _has_pardiso() -> bool:
     try:
         pardiso_library()
     except ImportError:
-        return SuperLU(pattern, kept, threads)
-    return Pardiso(pattern, kept, threads)
+        return False
+    return True
+
+
+def make_condensation(pattern: Pattern, kept: Ints, threads: int = 1) -> Pardiso | SuperLU:
+    """PARDISO where evfem[fast] is installed, else SuperLU; the same numbers to rounding."""
+    kind = Pardiso if _has_pardiso() and not _OTHER.get() else SuperLU
+    return kind(pattern, kept, threads)

@@ -6,7 +6,7 @@ to an equilibrium behind a barrier, which the potential with the loads of the en
 (`evfem.simulation.barrier`). Then the part is solved again, held by drag that counts from the old state,
 as does friction, and is taken away bit by bit (`Hold.follow`)::
 
-    rate <- `FIRST`; last <- none; iterations begin at the old state, without extrapolation
+    rate <- the strategy's `hold`; last <- none; iterations begin at the old state, without extrapolation
     until the rate is below `LEAST`:
         new <- the equilibrium at the target with drag of this rate from the old state, found from `last`
         not found, or behind a barrier from `last`:
@@ -35,19 +35,20 @@ from evfem.tissue.body import Body
 
 #: why an equilibrium is refused that lies behind a barrier
 BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
-#: the first rate of drag, its largest and its least, by how much it falls, and when it falls no further
-FIRST, MOST, LEAST, FALL, STUCK = 16.0, 1e4, 1e-3, 4.0, 1.05
+#: the largest rate of drag and the least, by how much it falls, and when it falls no further
+MOST, LEAST, FALL, STUCK = 1e4, 1e-3, 4.0, 1.05
 
 
 @dataclass
 class Hold:
     """Holds `body`; `find(old, target, start)` finds the equilibrium at a target, drag included, and
-    `climbs(old, new)` says whether it lies behind a barrier.
+    `climbs(old, new)` says whether it lies behind a barrier; `first` is the first rate of the drag.
     """
 
     body: Body
     find: Callable[[State, Target, State], State]
     climbs: Callable[[State, State], bool]
+    first: float
 
     def follow(self, state: State, target: Target) -> State:
         """The equilibrium at `target` on the branch that begins at `state`; raises `StepFailed` where that
@@ -60,7 +61,7 @@ class Hold:
 
     def _follow(self, state: State, target: Target) -> State:
         last = replace(state, last_increment=np.zeros_like(state.last_increment))
-        rate, before = FIRST, 0.0
+        rate, before = self.first, 0.0
         while not 0.0 < before <= LEAST:
             self.body.release(state.u, rate)
             try:

@@ -294,7 +294,8 @@ class Stepper:
         assert self.body is not None
         if self.releasing or not self._relaxation(self.body).applies(target):
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        new = Hold(self.body, self._found, partial(self._climbs, target)).follow(state, target)
+        hold = Hold(self.body, self._found, partial(self._climbs, target), self.equilibrium.strategy.hold)
+        new = hold.follow(state, target)
         self.held += 1
         return new
 

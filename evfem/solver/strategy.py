@@ -22,6 +22,7 @@ _PATIENCE = number("a number of iterations, not negative", Within(0.0))
 _PART = number("a share of a step, above 0, at most 1", Within(0.0, 1.0, above=True))
 _GROWTH = number("a factor from 1 to 10", Within(1.0, 10.0))
 _ERROR = number("a share of a force, above 0, at most 1", Within(0.0, 1.0, above=True))
+_RATE = number("a rate, larger than 0, at most 1e3", Within(0.0, 1e3, above=True))
 _REACH = number("a factor from 0 to 10", Within(0.0, 10.0))
 
 
@@ -50,6 +51,9 @@ class Strategy:
     reach: Annotated[
         float, _REACH, "first guess: so many of the last part's displacements ahead, 0: none"
     ] = 1.5
+    hold: Annotated[
+        float, _RATE, "first rate of the drag that holds a finger whose iterations came over a barrier"
+    ] = 16.0
     relaxation: Annotated[bool, yes_or_no(), "whether a finger without an equilibrium near is released"] = (
         True
     )

@@ -1,0 +1,135 @@
+r"""Whether a scene has one answer: its end by other ways that physics does not tell apart.
+
+A scene is run as it is, in twice the steps, with other drag where a barrier was met
+(`evfem.solver.hold`), with the other sparse solver, and with one input changed by a billionth. Each end
+is compared with the scene's own: the largest difference of its forces, as a share of the largest force,
+and of its indentation. Equal ends do not show that the answer is right: twice as many steps may miss the
+same branch. Different ones show that the answer depends on the way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from warnings import catch_warnings, simplefilter
+
+import numpy as np
+
+from evfem.common import notices
+from evfem.errors import NotConverged
+from evfem.scene.file import load
+from evfem.scene.scene import Scene
+from evfem.simulation.result import Result
+from evfem.simulation.run import simulate
+from evfem.solver.condensation import other_solver
+
+#: what is compared, and by how much it may differ
+FORCES = ("applied_force", "normal_force", "tangential_force", "electrostatic_force")
+AGREE = 1e-3
+#: first rates of drag beside a scene's own, as shares of it, and by how much an input is changed
+HOLDS, HAIR = (0.25, 4.0), 1e-9
+#: an indentation (mm) below which differences are no longer relative to it
+SMALL = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Checked:
+    """What came out. Each of the `rows` has a `way`, the forces (N/mm) and the indentation (mm) at its end,
+    and its `difference` from the scene's own end; where it did not get there `why` says it, and the
+    difference is inf.
+    """
+
+    rows: list[dict[str, Any]]
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all ends are the same to 1e-3."""
+        return all(row["difference"] <= AGREE for row in self.rows)
+
+    def table(self) -> str:
+        """All ends side by side, as text."""
+        names = ["way", *FORCES, "indentation", "difference"]
+        lines = [[name.replace("_", " ") for name in names]]
+        for row in self.rows:
+            shown = [f"{row[name]:.6g}" if name in row else "-" for name in names[1:-1]]
+            lines.append([row["way"], *shown, row["why"] or f"{row['difference']:.1e}"])
+        widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+        return "\n".join(
+            "  ".join([line[0].ljust(widths[0]), *map(str.rjust, line[1:-1], widths[1:-1]), line[-1]])
+            for line in lines
+        )
+
+    def __str__(self) -> str:
+        said = "the ends agree" if self.agrees else "the ends differ: the answer depends on the way"
+        return f"{self.table()}\n{said} (allowed: {AGREE:g})"
+
+
+def check(scene: Scene | str | Path) -> Checked:
+    """Run a scene, or the scene file at a path, by several ways and compare the ends; takes some five times
+    as long as the scene.
+
+    Raises InputError for what is no scene, NotConverged where the scene itself does not come to its end.
+
+    >>> import evfem as ev
+    >>> pad, press = ev.FingerPad(resolution="coarse"), ev.Press(indentation=0.1, steps=1)
+    >>> scene = ev.Scene(pad, ev.Display(), motion=[press])
+    >>> ev.check(scene).agrees
+    True
+    """
+    given = scene if isinstance(scene, Scene) else load(scene)
+    with notices.status("the scene"):
+        own = simulate(given)
+    rows = [_row("the scene", own, own)]
+    for way, other in _others(given, own):
+        with notices.status(way), other_solver() if way.startswith("sparse") else nullcontext():
+            rows.append(_ended(way, other, own))
+    return Checked(rows)
+
+
+def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
+    """How a way ends; its warnings are the scene's own, said once."""
+    with catch_warnings():
+        simplefilter("ignore", UserWarning)
+        try:
+            return _row(way, simulate(scene), own)
+        except NotConverged as error:
+            return {"way": way, "why": f"ends early: {error}", "difference": np.inf}
+
+
+def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
+    """The ways, each with its scene."""
+    twice = tuple(replace(motion, steps=2 * motion.steps) for motion in scene.motion)
+    yield "twice the steps", replace(scene, motion=twice)
+    strategy = scene.solver.strategy
+    for share in HOLDS if own.provenance["solver"]["barriers"] else ():
+        hold = replace(strategy, hold=share * strategy.hold)
+        yield f"held by {share:g} of the drag", replace(scene, solver=replace(scene.solver, strategy=hold))
+    with other_solver() as name:
+        if name:
+            yield f"sparse solver {name}", scene
+    if (changed := _changed(scene)) is not None:
+        yield f"an input changed by {HAIR:g}", changed
+
+
+def _changed(scene: Scene) -> Scene | None:
+    """The scene with the first target of its motions changed a little, None where it has none."""
+    motion: Any
+    for i, motion in enumerate(scene.motion):
+        for name in ("indentation", "force", "gap", "distance", "voltage"):
+            if isinstance(value := getattr(motion, name, None), float | int) and value:
+                other = replace(motion, **{name: value * (1.0 + HAIR)})
+                return replace(scene, motion=(*scene.motion[:i], other, *scene.motion[i + 1 :]))
+    return None
+
+
+def _row(way: str, found: Result, own: Result) -> dict[str, Any]:
+    """How a way ends beside the scene's own end."""
+    end = {name: float(getattr(found, name)[-1]) for name in (*FORCES, "indentation")}
+    known = {name: float(getattr(own, name)[-1]) for name in end}
+    largest = max(abs(known[name]) for name in FORCES)
+    off = [abs(end[name] - known[name]) / max(largest, 1e-12) for name in FORCES]
+    deeper = abs(end["indentation"] - known["indentation"]) / max(abs(known["indentation"]), SMALL)
+    return {"way": way, **end, "why": "", "difference": max(*off, deeper)}
