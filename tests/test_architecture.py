@@ -65,7 +65,8 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run rendering",
+        "provenance history result spectrum model doubtful works barrier ledger checkpoint failure run "
+        "rendering",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},

@@ -13,7 +13,9 @@ import evfem as ev
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.measures import Seen, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
+from evfem.simulation.barrier import rise
 from evfem.simulation.run import Run
+from evfem.simulation.works import Part
 from evfem.surface.pad import surface_state
 
 SKIN = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e5)
@@ -268,3 +270,32 @@ def test_a_stiff_plate_on_a_soft_column_stays_below_its_pull_in(dim, ratio, shar
     found = ev.simulate(ev.Scene(finger, SCREEN, ev.StrongTroxel(), motion=motion))
     assert GAP - found.min_gap[-1] == pytest.approx(roots.real.min(), rel=1e-4)
     assert found.relaxations.sum() == 0
+
+
+def ended(motion):
+    """A run of the plate on its spring that is done, and its last target."""
+    run, target = Run(scene(2, 0.0, motion), None), None
+    for request in run.requests():
+        target = request.path(0.0, 1.0)
+        run.advance(request)
+    return run, target
+
+
+def test_the_barrier_of_a_plate_is_that_of_its_potential():
+    """k x^2 / 2 - eps_0 A U^2 / (2 (g + s - x)) between the stable height and the top, at half the voltage
+    of pull-in, found at nine places of the way; back from contact the closed plate has one of its own.
+    """
+    k, area = spring(2)
+    whole = GAP + SOLIDS
+    pull_in = np.sqrt(8.0 * k * whole**3 / (27.0 * eps_0 * area))
+    hovering, target = ended([ev.VoltageRamp(0.5 * pull_in)])
+    closed, _ = ended([ev.VoltageRamp(1.05 * pull_in), ev.VoltageRamp(0.5 * pull_in)])
+    x = np.linspace(0.0, GAP, 100_001)
+    potential = 0.5 * k * x**2 - eps_0 * area * (0.5 * pull_in) ** 2 / (2.0 * (whole - x))
+    stable, top = np.argmin(potential[:30_000]), np.argmax(potential)
+    assert closed.state.touching.any() and not hovering.state.touching.any()
+    stored = closed.model.body.energy(closed.state.u)
+    there = rise(Part(hovering.model, hovering.state, closed.state), target) * stored
+    back = rise(Part(hovering.model, closed.state, hovering.state), target) * stored
+    assert there == pytest.approx(potential[top] - potential[stable], rel=0.05)
+    assert back == pytest.approx(potential[top] - potential[-1], rel=0.05)
