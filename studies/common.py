@@ -1,29 +1,35 @@
-"""What the studies share: writing a study down, the two laws, the measurements, and how they are
-drawn.
-"""
+"""What the studies share: writing a study down, runs side by side, laws, measurements, drawing."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from evfem import data
 from evfem.common.arrays import Floats
+from evfem.common.notices import LOG
+from evfem.common.pools import processes
 from evfem.common.storage import disk, replacing, write_text
 from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
+from evfem.errors import InputError
+from evfem.plotting.figures import WIDTH, new_figure
 from evfem.simulation.provenance import origin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+else:  # a study that draws nothing does not load it
+    Axes = Figure = Any
 
+Argument, Answer = TypeVar("Argument"), TypeVar("Answer")
 LAWS: dict[str, StrongTroxel | Kaczmarek] = {"strong_troxel": StrongTroxel(), "kaczmarek": Kaczmarek()}
 LABELS = {"strong_troxel": "Strong-Troxel", "kaczmarek": "Kaczmarek"}
 #: told apart with any colour vision (Okabe and Ito, 2008)
@@ -36,7 +42,6 @@ COLOURS = {
 }
 #: hover cases of the measurements: voltage in V, air gap in mm
 CASES = {"HVHD": (2000.0, 0.50), "HVLD": (2000.0, 0.25), "LVLD": (1414.0, 0.25)}
-WIDTH = 7.0  # of a figure, in inches
 QUICK = "--quick: coarser and shorter than the study"
 
 
@@ -52,8 +57,9 @@ class Series:
 
 @dataclass(frozen=True)
 class Study:
-    """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw
-    it.
+    """A finished study: numbers, what the paper prints for them, assumptions, curves, how to draw it.
+
+    `tables` by their titles are lists of lines of Markdown, kept among the assumptions.
     """
 
     name: str
@@ -63,29 +69,44 @@ class Study:
     series: list[Series]
     draw: Callable[[], Figure]
     parameters: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, list[str]] = field(default_factory=dict)
 
     def finish(self, out: Path | None, quick: bool = False) -> dict[str, Any]:
-        """The study's dictionary; with `out` also NAME.json, NAME.csv and NAME.png in that folder.
+        """The study's dictionary; with `out` also NAME.json, NAME.csv, NAME.png and, where there are
+        tables, NAME.md in that folder.
 
         The picture of a `quick` study says so.
         """
+        said = {"tables": self.tables} if self.tables else {}
+        made = {"eps_0_F_per_m": eps_0, "quick": quick, "parameters": self.parameters}
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
             "paper": self.paper,
-            "assumptions": self.assumptions,
-            "provenance": provenance(self.parameters, quick),
+            "assumptions": self.assumptions | said,
+            "provenance": origin() | made,
         }
         if out is not None:
             folder = make_folder(out)
             write_text(folder / f"{self.name}.json", json.dumps(result, indent=1) + "\n")
             write_text(folder / f"{self.name}.csv", series_text(self.series))
+            if self.tables:
+                write_text(folder / f"{self.name}.md", self._page())
             figure = self.draw()
             if quick:
                 say_quick(figure)
             with replacing(folder / f"{self.name}.png") as temporary:
                 figure.savefig(temporary, format="png", dpi=160)
         return result
+
+    def _page(self) -> str:
+        """The tables with date and versions, as Markdown."""
+        made = origin()
+        versions = ", ".join(f"{name} {number}" for name, number in made["versions"].items())
+        blocks = [f"# {self.name}", f"{made['date']}; {versions}; one thread; CPU seconds."]
+        for title, lines in self.tables.items():
+            blocks += [f"## {title}", "\n".join(lines)]
+        return "\n\n".join(blocks) + "\n"
 
 
 def make_folder(out: str | Path) -> Path:
@@ -94,16 +115,6 @@ def make_folder(out: str | Path) -> Path:
     with disk(f"create the folder {folder}"):
         folder.mkdir(parents=True, exist_ok=True)
     return folder
-
-
-def provenance(parameters: Mapping[str, Any], quick: bool) -> dict[str, Any]:
-    """Versions, date, eps_0 and parameters behind a study's numbers."""
-    return {
-        **origin(),
-        "eps_0_F_per_m": eps_0,
-        "quick": quick,
-        "parameters": dict(parameters),
-    }
 
 
 def series_text(series: Iterable[Series]) -> str:
@@ -120,6 +131,39 @@ def _plain(values: Any) -> list[float] | list[str]:
     return (array if array.dtype.kind == "U" else array.astype(float)).tolist()
 
 
+def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """A table as lines of Markdown."""
+    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *rows)]
+
+
+def side_by_side(
+    function: Callable[[Argument], Answer], arguments: Sequence[Argument], workers: int = 2
+) -> list[Answer]:
+    """`function`, of a module, of each argument, in their order, by so many processes.
+
+    With one worker, and where processes cannot start (a script that runs a study outside
+    ``if __name__ == "__main__"``), everything happens in this process.
+    """
+    answers: dict[int, Any] = {}
+    if workers > 1 and len(arguments) > 1:
+        with suppress(InputError), processes(workers) as pool:
+            for place, answer in pool(function, dict(enumerate(arguments))):
+                if isinstance(answer, Exception):
+                    raise answer
+                answers[place] = answer
+                LOG.debug("case %d of %d", len(answers), len(arguments))
+    return [answers[i] if i in answers else function(one) for i, one in enumerate(arguments)]
+
+
+def alone(function: Callable[[Argument], Answer], argument: Argument) -> Answer:
+    """The answer of a function, of a module, in a process of its own: for memory, clocks and imports."""
+    with processes(1) as pool:
+        ((_, answer),) = pool(function, {0: argument})
+    if isinstance(answer, Exception):
+        raise answer
+    return answer  # type: ignore[no-any-return]
+
+
 @cache
 def participants() -> data.Table:
     """Table 1."""
@@ -134,13 +178,13 @@ def table2_layers(stratum_corneum: Any = None) -> Layers:
     return Layers.of(skin, Layer(table.value("d_i"), table.value("eps_i")))
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """An empty figure of `width` x `height` inches whose parts keep clear of each other; no
-    pyplot.
-    """
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), layout="constrained")
+def panels(height: float, columns: int, width: float = WIDTH, rows: int = 1, **grid: Any) -> Any:
+    """A figure and the axes of its panels, row by row, with their letters; keywords of `subplots`."""
+    figure = new_figure(height, width)
+    axes = figure.subplots(rows, columns, squeeze=False, **grid).ravel()
+    for ax, letter in zip(axes, "abcdefghijkl", strict=False):
+        panel_letter(ax, letter)
+    return figure, axes
 
 
 def median_interval(values: Floats) -> tuple[float, float, float]:
@@ -217,3 +261,19 @@ def panel_letter(ax: Axes, letter: str) -> None:
 def law_line(ax: Axes, law: str, x: Floats, y: Floats, **style: Any) -> Any:
     """A curve in the law's colour; further keywords of `Axes.plot`."""
     return ax.plot(x, y, color=COLOURS[law], **style)[0]
+
+
+def plain_ticks(ax: Axes) -> None:
+    """Logarithmic axes with numbers as they are spoken, over a light grid."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    for axis in (ax.xaxis, ax.yaxis):
+        low, high = axis.get_view_interval()
+        few = high < 100.0 * low
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=7))
+        axis.set_major_formatter("{x:,g}" if high > 1e3 else "{x:g}")
+        axis.set_minor_formatter(NullFormatter())  # its labels would overlap where the axis is short
+    ax.tick_params(labelsize="small")
+    ax.grid(which="major", color="#E5E5E5", linewidth=0.6)
+    ax.set_axisbelow(True)
+    ax.spines[["top", "right"]].set_visible(False)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from .common import (
     CASES,
     COLOURS,
     LABELS,
+    Figure,
     Series,
     Study,
     draw_box,
@@ -33,9 +34,6 @@ from .common import (
     participants,
 )
 from .measured import comparison, participant_forces
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAPER = {
     "measured.mean_mN.HVHD": 1.81,
@@ -76,10 +74,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             f"verdict.{model}.mm_of_width_for_median.{case}": 1e-3 * np.median(participants()[case]) / force
         }
     numbers |= comparison(forces)
-    study = Study(
+    return Study(
         "fig05", numbers, PAPER, ASSUMPTIONS, _series(forces, elements), lambda: _draw(forces, elements)
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 @cache

@@ -10,7 +10,7 @@ reached at F_n = 0.69 N.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,18 @@ from evfem import data
 from evfem.electrostatics.encoding import AreaLaw, Encoding, fit_area_to_friction
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import (
+    COLOURS,
+    LABELS,
+    LAWS,
+    Figure,
+    Series,
+    Study,
+    law_line,
+    new_figure,
+    not_shown,
+    panel_letter,
+)
 
 PAPER = {
     "kaczmarek.area_mm2_at_1N": 125.359,
@@ -65,7 +73,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [Series(f"friction {law}", force, y, "N over N") for law, y in tangential.items()]
     series += [Series(f"area {name}", force, area(force), "mm2 over N") for name, area in areas.items()]
     parameters = {"U_V": voltage, "mu": friction, "d_sc_mm": 0.1, "d_i_mm": 0.001}
-    study = Study(
+    return Study(
         "fig06",
         numbers,
         PAPER,
@@ -73,8 +81,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         series,
         lambda: _draw(force, friction, tangential, areas),
         parameters,
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _layers(meyer: data.Table) -> Layers:

@@ -8,7 +8,7 @@ recomputed (5) spans 0.036-0.360 N and (3) 6.0-602 N.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,10 +16,18 @@ from evfem import data
 from evfem.electrostatics.forces import plate_force
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import (
+    COLOURS,
+    LABELS,
+    LAWS,
+    Figure,
+    Series,
+    Study,
+    law_line,
+    new_figure,
+    not_shown,
+    panel_letter,
+)
 
 PAPER = {
     "kaczmarek.min_N": 0.05,
@@ -50,7 +58,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         numbers |= {f"verdict.{law}.lowest_over_highest_measured": values.min() / high}
         numbers |= {f"verdict.{law}.share_in_measured_range": np.mean((values >= low) & (values <= high))}
     series = [Series(f"{law} eps_i={e:g}", eps_sc, y, "N over eps_sc") for (law, e), y in lines.items()]
-    study = Study(
+    return Study(
         "fig07",
         numbers,
         PAPER,
@@ -58,8 +66,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         series,
         lambda: _draw(eps_sc, eps_i, force, lines, (low, high)),
         _given(meyer),
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _given(meyer: data.Table) -> dict[str, float]:

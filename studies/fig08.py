@@ -9,7 +9,7 @@ numbers.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,18 @@ from evfem import data
 from evfem.electrostatics.forces import plate_force
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import (
+    COLOURS,
+    LABELS,
+    LAWS,
+    Figure,
+    Series,
+    Study,
+    law_line,
+    new_figure,
+    not_shown,
+    panel_letter,
+)
 
 THICKNESS = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
 ASSUMPTIONS = {
@@ -61,10 +69,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         "eps_sc": table.value("eps_sc"),
         "eps_i": table.value("eps_i"),
     }
-    study = Study(
+    return Study(
         "fig08", numbers, {}, ASSUMPTIONS, series, lambda: _draw(voltage, curves, (low, high)), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _draw(voltage: Any, curves: dict[Any, Any], band: tuple[float, float]) -> Figure:

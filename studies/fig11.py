@@ -225,10 +225,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     numbers |= {"runs": len(runs), "newton_iterations": sum(one.iterations for one in runs.values())}
     parameters = {"U_V": VOLTAGE, "loads_N_per_mm": loads, "resolution": base.pad.resolution}
     parameters |= {"ridge_exponent": base.pad.exponent, "wall_seconds": seconds}
-    study = Study(
+    return Study(
         "fig11", numbers, PAPER, ASSUMPTIONS, _series(shown), lambda: fig11_panels.draw(shown), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _run(

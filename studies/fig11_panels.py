@@ -6,17 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .common import COLOURS, Axes, Figure, new_figure, panel_letter
 
 PAPER_FIT = {"with_ridges": (0.17, 0.49), "without_ridges": (0.03, 0.65)}
 #: marker, name and colour of the two pads

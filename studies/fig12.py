@@ -12,17 +12,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
-from .parallel import side_by_side
+from .common import COLOURS, Axes, Figure, Series, Study, new_figure, panel_letter, side_by_side
 from .rendered import ASSUMPTIONS, QUICK_STEP, QUICK_TEXTURE, STEP, TEXTURE, Case, Outcome, render
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PAPER = {
     "transition.voltage_max_V": 1776.73,
@@ -202,7 +197,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     if varied:
         numbers |= _variation_numbers(varied) | _mesh_numbers(shown, varied)
     costs = {key: outcome.costs for key, outcome in outcomes.items()}
-    study = Study(
+    return Study(
         "fig12",
         numbers,
         PAPER,
@@ -210,8 +205,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         _series(shown),
         lambda: draw(shown, numbers),
         {"costs": costs},
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _series(outcomes: Mapping[str, Outcome]) -> list[Series]:

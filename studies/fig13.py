@@ -11,21 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
 from evfem.plotting import side_by_side
-from evfem.scene.motion import Slide
-from evfem.scene.scene import Output
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
-from evfem.simulation.result import Frame, Result
-from evfem.surface.surfaces import Display
 
-from .common import Series, Study, make_folder
+from .common import Figure, Series, Study, make_folder
 from .rendered import (
     ASSUMPTIONS,
     QUICK_TEXTURE,
@@ -35,9 +31,6 @@ from .rendered import (
     display_friction,
     reference_scene,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PAPER = {"voltage_V": 1911.12}
 NEAR = 1.0  # mm from the contact
@@ -50,10 +43,10 @@ TITLES = {"reference": "on the sinusoid", "display": "on the display"}
 class Instant:
     """One step of a run: a result with that step's fields alone."""
 
-    result: Result
+    result: ev.Result
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> ev.Frame:
         """The fields."""
         return self.result.frames[0]
 
@@ -91,10 +84,12 @@ def instants(case: Case) -> dict[str, Instant]:
     signal = voltage_for(felt, display_encoding(friction))
     number = int(np.argmax(signal.profile.voltage[1:])) + 1
     press, slide = reference.scene.motion
-    assert isinstance(slide, Slide)
+    assert isinstance(slide, ev.Slide)
     short = replace(slide, distance=slide.distance * number / slide.steps, steps=number)
-    scene = replace(reference.scene, motion=(press, short), output=Output(every=1_000_000))
-    display = replay(replace(reference, scene=scene), Display(friction=friction), Kaczmarek(), signal.profile)
+    scene = replace(reference.scene, motion=(press, short), output=ev.Output(every=1_000_000))
+    display = replay(
+        replace(reference, scene=scene), ev.Display(friction=friction), ev.Kaczmarek(), signal.profile
+    )
     step = press.steps + number
     return {"reference": _instant(reference, step), "display": _instant(display, step)}
 

@@ -17,17 +17,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import COLOURS, Figure, Series, Study, new_figure, panel_letter
 
 PATTERNS = {
     "along": COLOURS["neutral"],
@@ -101,8 +98,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         if one in PATTERNS
     ]
     parameters = {"pitch_mm": PITCH, "load_N": LOAD, "voltage_V": VOLTAGE, "slides_mm": slides}
-    study = Study("fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters
+    ).finish(out, quick)
 
 
 def pattern_numbers(found: dict[tuple[str, str], Slid], patterns: list[str]) -> dict[str, float]:

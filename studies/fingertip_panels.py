@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import CASES, COLOURS, LABELS, LAWS, Series, draw_box, measured_boxes, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .common import (
+    CASES,
+    COLOURS,
+    LABELS,
+    LAWS,
+    Axes,
+    Figure,
+    Series,
+    draw_box,
+    measured_boxes,
+    new_figure,
+    panel_letter,
+)
 
 PADS = {"smooth": (COLOURS["kaczmarek"], "o"), "ridged": (COLOURS["fe"], "s")}
 #: how curves are drawn that nearly coincide: the second one open and dashed

@@ -15,7 +15,7 @@ about 190 Hz and less above it; a step rises before it decays.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,10 +30,7 @@ from evfem.electrostatics.alternating import (
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import TOUCHSCREEN, Layers, StrongTroxel, eps_0
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import COLOURS, Figure, Series, Study, new_figure, panel_letter
 
 GAP, PEAK, THICKNESS = 0.001, 100.0, 0.30  # mm, V, mm
 LEAKS = (0.0, 1e-8, 1e-7)  # S/m

@@ -16,17 +16,14 @@ neighbours; none without ridges.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import COLOURS, Figure, Series, Study, new_figure
 
 PITCH, PERIOD, RUN_IN, FRICTION = 0.5, 4.0, 1.0, 0.3
 SPEEDS = (20.0, 40.0)
@@ -93,8 +90,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             series.append(Series(f"gain.{key}", frequency[there], gain, "1/mm"))
         numbers[f"verdict.line_Hz.{speed:g}_mm_s"] = speed / PITCH
     parameters = {"steps": steps, "speeds": speeds}
-    study = Study("friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters
+    ).finish(out, quick)
 
 
 def _strongest(frequency: Floats, found: Floats, line: int) -> float:

@@ -32,7 +32,7 @@ from collections import OrderedDict
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -42,11 +42,8 @@ from evfem.field.outlines import graded
 from evfem.field.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
-from .common import CASES, COLOURS, Series, Study, new_figure, panel_letter, participants
+from .common import CASES, COLOURS, Figure, Series, Study, new_figure, panel_letter, participants
 from .measured import participant_forces
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PITCH, HEIGHT = 0.5, 0.15
 INSULATORS = {"film": ev.FILM, "touchscreen": ev.TOUCHSCREEN}
@@ -146,8 +143,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     numbers |= on_electrodes
     series += over_edge
     parameters = {"pitch_mm": PITCH, "height_mm": HEIGHT, "load_N_per_mm": LOAD}
-    study = Study("fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters
+    ).finish(out, quick)
 
 
 def finger_numbers(quick: bool) -> dict[str, float]:

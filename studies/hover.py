@@ -5,7 +5,7 @@ measured boxes.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from .common import (
     COLOURS,
     LABELS,
     LAWS,
+    Figure,
     Series,
     law_line,
     measured_boxes,
@@ -21,9 +22,6 @@ from .common import (
     panel_letter,
     participants,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: force in N of (law, parameter, gap in mm, voltage in V), vectorised over gap and voltage
 Force = Callable[[str, float, Any, Any], Any]

@@ -18,7 +18,7 @@ the pads' sizes) were not asked.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from evfem.electrostatics.laws import StrongTroxel, eps_0
 from .common import (
     CASES,
     COLOURS,
+    Figure,
     Series,
     Study,
     draw_box,
@@ -39,9 +40,6 @@ from .common import (
     table2_layers,
 )
 from .measured import participant_forces, participant_pads
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 #: field (V/mm) at which air breaks down over millimetres, and with it the charge on a face in the open
 BREAKDOWN = 3000.0
@@ -72,8 +70,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         for what, values in needed.items()
         for i, case in enumerate(CASES)
     ]
-    study = Study("hypotheses", numbers, {}, ASSUMPTIONS, series, lambda: _draw(needed))
-    return study.finish(out, quick)
+    return Study("hypotheses", numbers, {}, ASSUMPTIONS, series, lambda: _draw(needed)).finish(out, quick)
 
 
 def _needed() -> dict[str, list[Floats]]:

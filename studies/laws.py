@@ -16,7 +16,7 @@ of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, t
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from .common import (
     COLOURS,
     LABELS,
     LAWS,
+    Figure,
     Series,
     Study,
     draw_box,
@@ -40,9 +41,6 @@ from .common import (
     table2_layers,
 )
 from .measured import comparison, participant_forces
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 VOLTAGE, GAP, RADIUS = 2000.0, 0.25, 8.34
 IMAGES, CHARGES = 70, 48
@@ -80,10 +78,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             Series(f"{law} over measured {case}", names, values / participants()[case], "1 over participant")
         )
     parameters = {"U_V": VOLTAGE, "gap_mm": GAP, "radius_mm": RADIUS}
-    study = Study(
+    return Study(
         "laws", numbers, {}, ASSUMPTIONS, series, lambda: _draw(gaps, exact, by_law, forces), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _cylinder_numbers(pads: EllipsoidalPad) -> dict[str, float]:

@@ -15,20 +15,19 @@ a factor of three for fingers of the same size, are not theirs to explain.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from evfem import data
+import evfem as ev
 from evfem.electrostatics.forces import pad_force, pad_force_per_depth
-from evfem.sweeps.file import Sweep
-from evfem.sweeps.run import SweepResult, sweep
 
 from .common import (
     CASES,
     COLOURS,
     LABELS,
     LAWS,
+    Figure,
     Floats,
     Series,
     Study,
@@ -38,9 +37,6 @@ from .common import (
     table2_layers,
 )
 from .measured import participant_forces, participant_pads
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 ASSUMPTIONS = {
     "fingers": "width a_i and height b_i; nail, bone, epidermis and dermis scaled with a_i / 16.68 mm",
@@ -56,7 +52,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """
     names = participants()["participant"][: 3 if quick else None]
     # few points: starting processes costs more than they save
-    table = sweep(plan(names), workers=1 if quick else None)
+    table = ev.sweep(plan(names), workers=1 if quick else None)
     forces = widths(len(names))
     for law, case in forces:
         chosen = [
@@ -77,17 +73,16 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         for case in CASES
     ]
     parameters = {"sweep": table.provenance["scene"], "grid": table.provenance["grid"]}
-    study = Study(
+    return Study(
         "participants", numbers, {}, ASSUMPTIONS, series, lambda: _draw(names, forces, closed), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
-def plan(names: list[str]) -> Sweep:
+def plan(names: list[str]) -> ev.Sweep:
     """The sweep: a coarse finger of Table 2 hovering over its display; laws, cases and
     participants.
     """
-    values = data.load("table2")
+    values = ev.data.load("table2")
     scene = {
         "version": 1,
         "finger": {"resolution": "coarse"},
@@ -105,7 +100,7 @@ def plan(names: list[str]) -> Sweep:
         for case, (voltage, gap) in CASES.items()
     }
     grid = {"electrostatics.law": list(LAWS), "case": cases, "finger.participant": names}
-    return Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
+    return ev.Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
 
 
 def widths(count: int) -> dict[tuple[str, str], Floats]:
@@ -121,7 +116,7 @@ def widths(count: int) -> dict[tuple[str, str], Floats]:
     return found
 
 
-def _done(table: SweepResult) -> int:
+def _done(table: ev.SweepResult) -> int:
     return sum(row["status"] == "done" for row in table.rows)
 
 

@@ -13,22 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from evfem import data
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Layer, Layers
-from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.faces import layer_thickness
-from evfem.scene.motion import Press, VoltageRamp
-from evfem.scene.scene import Scene
-from evfem.simulation.result import Frame, Result, Saved
-from evfem.simulation.run import simulate
+from evfem.simulation.result import Saved
 from evfem.surface.edge import outline_nodes
-from evfem.surface.surfaces import Display
-from evfem.tissue.laws import NeoHookean
 
-from .common import LAWS
-from .parallel import side_by_side
+from .common import LAWS, side_by_side
 
 #: which length of the outline stands for A_j: its projection now, its arc now, its arc before deformation
 AREAS = ("projected", "current", "reference")
@@ -47,21 +39,21 @@ class Pad:
     stiffness: float = 1.0
     stratum_corneum_E: float = TABLE_2["stratum_corneum"][0]
 
-    def finger(self) -> FingerPad:
+    def finger(self) -> ev.FingerPad:
         """The pad with these values, else Table 2."""
         soft = {
             name: (self.stiffness * (self.stratum_corneum_E if name == "stratum_corneum" else E), nu)
             for name, (E, nu) in TABLE_2.items()
             if name != "nail"
         }
-        return FingerPad(
+        return ev.FingerPad(
             ridges=self.ridges,
             ridge_phase=self.phase,
             ridge_exponent=self.exponent,
             ridge_crest=self.crest,
             ridge_groove=self.groove,
             resolution=self.resolution,
-            materials={name: NeoHookean(E=E, nu=nu) for name, (E, nu) in soft.items()},
+            materials={name: ev.NeoHookean(E=E, nu=nu) for name, (E, nu) in soft.items()},
         )
 
 
@@ -79,12 +71,12 @@ class Case:
     friction: float = 0.0
     voltage_first: bool = False
 
-    def scene(self, *motion: Any, voltage: float) -> Scene:
+    def scene(self, *motion: Any, voltage: float) -> ev.Scene:
         """The scene of some motions, at a voltage from the start."""
-        table = data.load("table2")
-        film = Layer(table.value("d_i"), table.value("eps_i"))
-        display = Display(insulator=film, friction=self.friction)
-        return Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
+        table = ev.data.load("table2")
+        film = ev.Layer(table.value("d_i"), table.value("eps_i"))
+        display = ev.Display(insulator=film, friction=self.friction)
+        return ev.Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
 
 
 def contact_spans(x: Floats, gap: Floats, touching: Any) -> Floats:
@@ -194,9 +186,11 @@ class Pressed:
 
     def pressure(self, gap: Any, voltage: float, law: str, thickness: Any = None) -> Floats:
         """Attraction in MPa of every outline node at a gap."""
-        table = data.load("table2")
+        table = ev.data.load("table2")
         d = self.thickness if thickness is None else np.full_like(self.thickness, thickness)
-        layers = Layers.of(Layer(d, table.value("eps_sc")), Layer(table.value("d_i"), table.value("eps_i")))
+        layers = ev.Layers.of(
+            ev.Layer(d, table.value("eps_sc")), ev.Layer(table.value("d_i"), table.value("eps_i"))
+        )
         return np.asarray(LAWS[law].traction(gap, voltage, layers))
 
     def shares(self, load: int, area: str) -> Floats:
@@ -244,10 +238,10 @@ class Pressed:
 
 def run(case: Case) -> Pressed:
     """Press through the loads as the case says."""
-    motion = [Press(force=load, steps=1) for load in case.loads]
+    motion = [ev.Press(force=load, steps=1) for load in case.loads]
     if case.voltage and case.friction and not case.voltage_first:
         return _bundle(case, *_branches(case, motion))
-    result = simulate(case.scene(*motion, voltage=case.voltage))
+    result = ev.simulate(case.scene(*motion, voltage=case.voltage))
     return _bundle(case, result, result.frames, result.electrostatic_force, result.newton_iterations)
 
 
@@ -258,20 +252,20 @@ class _Keeper:
         self.rows: list[dict[str, Any]] = []
         self.arrays: list[dict[str, Any]] = []
 
-    def step(self, row: dict[str, Any], _: Frame | None, checkpoint: Any) -> None:
+    def step(self, row: dict[str, Any], _: ev.Frame | None, checkpoint: Any) -> None:
         """Called after every converged step."""
         self.rows.append(row)
         self.arrays.append({name: np.copy(array) for name, array in checkpoint().items()})
 
 
-def _branches(case: Case, motion: list[Press]) -> tuple[Result, list[Frame], Floats, Any]:
+def _branches(case: Case, motion: list[ev.Press]) -> tuple[ev.Result, list[ev.Frame], Floats, Any]:
     """Press once without voltage; from every load on, switch the voltage on with the load held."""
     kept = _Keeper()
-    result = simulate(case.scene(*motion, voltage=0.0), observers=[kept])
+    result = ev.simulate(case.scene(*motion, voltage=0.0), observers=[kept])
     frames, forces, iterations = [], [], [result.newton_iterations.sum()]
     for k, arrays in enumerate(kept.arrays):
-        switch_on = VoltageRamp(case.voltage, steps=1, hold="force")
-        branch = simulate(
+        switch_on = ev.VoltageRamp(case.voltage, steps=1, hold="force")
+        branch = ev.simulate(
             case.scene(*motion[: k + 1], switch_on, voltage=0.0), resume=Saved(arrays, kept.rows[: k + 1])
         )
         frames.append(branch.frames[-1])
@@ -280,7 +274,7 @@ def _branches(case: Case, motion: list[Press]) -> tuple[Result, list[Frame], Flo
     return result, frames, np.array(forces), np.array(iterations)
 
 
-def _bundle(case: Case, result: Result, frames: list[Frame], force: Floats, iterations: Any) -> Pressed:
+def _bundle(case: Case, result: ev.Result, frames: list[ev.Frame], force: Floats, iterations: Any) -> Pressed:
     mesh = result.mesh
     nodes = outline_nodes(mesh)
     points = mesh.points[nodes]

@@ -11,13 +11,10 @@ import time
 import warnings
 from dataclasses import dataclass, field, replace
 
+import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-from evfem.finger.fingerpad import Electrical, FingerPad
 from evfem.finger.layers import TABLE_2
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.rendering import (
     ApparentFriction,
     Recording,
@@ -29,8 +26,6 @@ from evfem.simulation.rendering import (
     replay,
     voltage_for,
 )
-from evfem.surface.surfaces import Display, Flat, Sinusoid
-from evfem.tissue.laws import NeoHookean
 
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0
@@ -120,13 +115,13 @@ class Outcome:
         return self.force / self.load
 
 
-def pad(case: Case) -> FingerPad:
+def pad(case: Case) -> ev.FingerPad:
     """The finger of a case."""
     soft = {}
     if case.softness != 1.0:
         tissue = {name: law for name, law in TABLE_2.items() if name != "nail"}
-        soft = {name: NeoHookean(E=case.softness * E, nu=nu) for name, (E, nu) in tissue.items()}
-    return FingerPad(
+        soft = {name: ev.NeoHookean(E=case.softness * E, nu=nu) for name, (E, nu) in tissue.items()}
+    return ev.FingerPad(
         ridges=case.ridges,
         resolution=case.resolution,
         ridge_exponent=case.ridge_exponent,
@@ -134,19 +129,19 @@ def pad(case: Case) -> FingerPad:
         ridge_groove=case.crest,
         materials=soft,
         viscosity=case.viscosity,
-        electrical=Electrical(stratum_corneum_thickness=case.skin),
+        electrical=ev.Electrical(stratum_corneum_thickness=case.skin),
     )
 
 
-def reference_scene(case: Case, every: int = 1_000_000) -> Scene:
+def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
     """The reference of a case, with fields of every `every`-th step."""
-    surface: Flat | Sinusoid = Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
+    surface: ev.Flat | ev.Sinusoid = ev.Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
     if case.friction is not None:
-        surface = Sinusoid(friction=case.friction)
-    slide = Slide(case.path, steps=case.steps, hold=case.hold, speed=case.speed)
-    motion = (Press(force=case.force, steps=5), slide)
-    solver, output = Solver(dynamics=case.dynamics), Output(every=every)
-    return Scene(pad(case), surface, motion=motion, solver=solver, output=output)
+        surface = ev.Sinusoid(friction=case.friction)
+    slide = ev.Slide(case.path, steps=case.steps, hold=case.hold, speed=case.speed)
+    motion = (ev.Press(force=case.force, steps=5), slide)
+    solver, output = ev.Solver(dynamics=case.dynamics), ev.Output(every=every)
+    return ev.Scene(pad(case), surface, motion=motion, solver=solver, output=output)
 
 
 def reference_of(case: Case) -> Recording:
@@ -172,8 +167,8 @@ def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tu
 
 def display_encoding(friction: float) -> Encoding:
     """(20a) with the stratum corneum and the area law that give the paper's voltage."""
-    skin, film = Layer(SKIN, 1650.0), Layer(0.09, 3.35)
-    return Encoding(Kaczmarek(), Layers.of(skin, film), AREA, friction)
+    skin, film = ev.Layer(SKIN, 1650.0), ev.Layer(0.09, 3.35)
+    return Encoding(ev.Kaczmarek(), ev.Layers.of(skin, film), AREA, friction)
 
 
 def render(case: Case) -> Outcome:
@@ -210,13 +205,13 @@ def render(case: Case) -> Outcome:
 
 
 def _replayed(kind: str, case: Case, reference: Recording, friction: float, signal: Signal) -> Recording:
-    display = Display(friction=friction)
+    display = ev.Display(friction=friction)
     if kind == "exact":
-        return exact(reference, display, Kaczmarek())
+        return exact(reference, display, ev.Kaczmarek())
     if kind == "thick":
         finger = pad(replace(case, skin=0.38))
         reference = replace(reference, scene=replace(reference.scene, finger=finger))
-    return replay(reference, display, Kaczmarek(), signal.profile)
+    return replay(reference, display, ev.Kaczmarek(), signal.profile)
 
 
 def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:

@@ -10,7 +10,7 @@ um is generally accepted.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +18,10 @@ from evfem import data
 from evfem.electrostatics.forces import effective_thickness_from_thresholds, stratum_corneum_from_thresholds
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import COLOURS, LABELS, LAWS, Figure, Series, Study, law_line, new_figure
 
 ACCEPTED_UM = 300.0  # palmar stratum corneum, section 3.2.1
-PAPER = {
-    "effective_thickness_um": 2.74,
-    "thickness_strong_troxel_mm": 5.48,
-    "thickness_kaczmarek_um": 76.2,
-}
+PAPER = {"effective_thickness_um": 2.74, "thickness_strong_troxel_mm": 5.48, "thickness_kaczmarek_um": 76.2}
 ASSUMPTIONS = {
     "area, friction": "the same in both experiments",
     "closed form (22)": "with d_i = d_i3 it gives 5.49 um; with d_i = d_i2 it agrees with (21), solved here",
@@ -64,10 +57,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         "eps_i": table.value("eps_i"),
         "eps_sc": eps_sc,
     }
-    study = Study(
+    return Study(
         "section321", numbers, PAPER, ASSUMPTIONS, series, lambda: _draw(thickness, ratio, found), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _printed_factor(lower: float, higher: float) -> float:

@@ -15,17 +15,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import COLOURS, Figure, Series, Study, new_figure
 
 LOAD, STATIC, FALL, AROUND = 0.04, 0.4, 0.5, 0.5
 HAND = ev.Hand(stiffness=0.02, mass=1e-6)
@@ -137,8 +134,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series.append(Series("error", counts, errors, "%"))
     numbers["verdict.rate"] = float(np.log(errors[-2] / errors[-1]) / np.log(counts[-1] / counts[-2]))
     parameters = {"steps": counts, "speeds": speeds}
-    study = Study("stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters
+    ).finish(out, quick)
 
 
 def remainder(result: ev.Result) -> float:

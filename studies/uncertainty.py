@@ -16,22 +16,19 @@ intervals, Strong-Troxel's above them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from evfem import data
+import evfem as ev
 from evfem.electrostatics.forces import EllipsoidalPad, pad_force, pad_force_per_depth
-from evfem.electrostatics.laws import Layer, Layers
-from evfem.sweeps.file import Sweep
-from evfem.sweeps.run import sweep
-from evfem.sweeps.samples import Normal, Samples, Uniform
 
 from .common import (
     CASES,
     COLOURS,
     LABELS,
     LAWS,
+    Figure,
     Floats,
     Series,
     Study,
@@ -41,21 +38,18 @@ from .common import (
     participants,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 COUNT, SEED = 500, 5
-INPUTS: dict[str, Uniform | Normal] = {
-    "gap_error": Uniform(-0.05, 0.05),
-    "voltage_factor": Uniform(0.99, 1.01),
-    "stratum_corneum": Uniform(0.27, 0.49),
-    "stratum_corneum_eps_r": Uniform(1000.0, 10000.0),
-    "insulator": Uniform(0.0855, 0.0945),
-    "insulator_eps_r": Uniform(3.0, 3.7),
-    "width_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "height_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "length_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "inclination": Normal(30.0, 3.0, between=(21.0, 39.0)),
+INPUTS: dict[str, ev.Uniform | ev.Normal] = {
+    "gap_error": ev.Uniform(-0.05, 0.05),
+    "voltage_factor": ev.Uniform(0.99, 1.01),
+    "stratum_corneum": ev.Uniform(0.27, 0.49),
+    "stratum_corneum_eps_r": ev.Uniform(1000.0, 10000.0),
+    "insulator": ev.Uniform(0.0855, 0.0945),
+    "insulator_eps_r": ev.Uniform(3.0, 3.7),
+    "width_error": ev.Normal(0.0, 0.3, between=(-0.9, 0.9)),
+    "height_error": ev.Normal(0.0, 0.3, between=(-0.9, 0.9)),
+    "length_error": ev.Normal(0.0, 0.3, between=(-0.9, 0.9)),
+    "inclination": ev.Normal(30.0, 3.0, between=(21.0, 39.0)),
 }
 SHOWN = {
     "gap_error": "air gap, ±0.05 mm",
@@ -81,7 +75,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Distribution of the median force by both laws in each case, what it depends on, and the
     check.
     """
-    samples = Samples(INPUTS, 60 if quick else COUNT, SEED)
+    samples = ev.Samples(INPUTS, 60 if quick else COUNT, SEED)
     drawn = samples.draw()
     medians = {(law, case): np.median(forces(drawn, law, case), axis=1) for law in LAWS for case in CASES}
     ranks = {key: _rank_correlations(drawn, values) for key, values in medians.items()}
@@ -96,8 +90,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     ]
     parameters = {"count": samples.count, "seed": SEED, "method": samples.method}
     parameters["inputs"] = {name: repr(one) for name, one in INPUTS.items()}
-    study = Study("uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters
+    ).finish(out, quick)
 
 
 def forces(drawn: dict[str, Floats], law: str, case: str) -> Floats:
@@ -111,12 +106,12 @@ def forces(drawn: dict[str, Floats], law: str, case: str) -> Floats:
     return 1e3 * pad_force(LAWS[law], pads, gaps, voltages, _layers(one))
 
 
-def _layers(one: dict[str, Any]) -> Layers:
-    skin = Layer(one["stratum_corneum"], one["stratum_corneum_eps_r"])
-    return Layers.of(skin, Layer(one["insulator"], one["insulator_eps_r"]))
+def _layers(one: dict[str, Any]) -> ev.Layers:
+    skin = ev.Layer(one["stratum_corneum"], one["stratum_corneum_eps_r"])
+    return ev.Layers.of(skin, ev.Layer(one["insulator"], one["insulator_eps_r"]))
 
 
-def check(samples: Samples, count: int) -> dict[str, float]:
+def check(samples: ev.Samples, count: int) -> dict[str, float]:
     """Deformable finite elements over the rigid cross-section, smallest and largest ratio less 1:
     the mean finger, smooth and coarse, in `count` of the samples, both laws and all cases.
     """
@@ -136,7 +131,7 @@ def check(samples: Samples, count: int) -> dict[str, float]:
         "motion": [{"kind": "hover"}],
     }
     grid = {"electrostatics.law": list(LAWS), "sample": rows}
-    table = sweep(Sweep(scene, grid, outputs=("electrostatic_force.last",)), workers=1)
+    table = ev.sweep(ev.Sweep(scene, grid, outputs=("electrostatic_force.last",)), workers=1)
     changes: dict[str, list[float]] = {law: [] for law in LAWS}
     for row in table.rows:
         pad = EllipsoidalPad(row["finger.width"], row["finger.height"], 1.0)
@@ -153,7 +148,7 @@ def check(samples: Samples, count: int) -> dict[str, float]:
 
 def _keys(case: str, one: dict[str, float]) -> dict[str, float]:
     """A sample as keys of a scene."""
-    (voltage, gap), table = CASES[case], data.load("table2")
+    (voltage, gap), table = CASES[case], ev.data.load("table2")
     return {
         "electrostatics.voltage": voltage * one["voltage_factor"],
         "electrostatics.insulator_thickness": one["insulator"],

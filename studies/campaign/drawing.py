@@ -9,12 +9,14 @@ in three dimensions (`solids`).
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 from .attractions import add_drive, add_field, add_roughness, add_voltage, electrostatics
 from .bodies import TABLE_2_WIDTH, finger, width
 from .draws import Draw
 from .grounds import add_friction_law, surface
 from .solids import draw_solid
-from .tables import Tables, copied
+from .tables import Tables
 
 #: share of the scenes whose finger has three dimensions, and the random numbers that these are drawn with
 SHARE, SOLID = 0.1, 3
@@ -43,7 +45,7 @@ def draw(seed: int, number: int) -> Tables:
     add_drive(random, tables)
     add_field(random, tables)
     _add_path(other, tables)
-    return copied(tables)
+    return deepcopy(tables)
 
 
 def _add_path(random: Draw, tables: Tables) -> None:

@@ -4,10 +4,12 @@ a finger in the plane does, in any direction over flat faces and long waves.
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 from .attractions import add_voltage, electrostatics
 from .bodies import LAYERS
 from .draws import Draw, six_digits
-from .tables import Tables, copied
+from .tables import Tables
 
 #: what a finger in three dimensions cannot do yet, of the keys that `electrostatics` draws
 PLANE = ("direction",)
@@ -27,7 +29,7 @@ def draw_solid(random: Draw) -> Tables:
         finger["viscosity"] = random.spread(1e-4, 2e-2)
     tables["motion"] = _motions(random, tables)
     add_voltage(random, tables)
-    return copied(tables)
+    return deepcopy(tables)
 
 
 def _tip(random: Draw) -> Tables:

@@ -14,20 +14,18 @@ from typing import Any
 
 import numpy as np
 
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.mesh.mesh import Mesh
-from evfem.tissue.laws import NeoHookean
 
 from ..benchmark import benchmark_mesh
 
 SCENES = ("A", "B", "C")
-MATERIALS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
+MATERIALS = {"tissue": ev.NeoHookean(E=0.05, nu=0.48), "skin": ev.NeoHookean(E=1.0, nu=0.30)}
 PLANE = -6.395  # height of the rigid surface, mm
 FRICTION = {"A": 0.0, "B": 0.3, "C": 0.0}
 VOLTAGE = {"A": 0.0, "B": 0.0, "C": 1000.0}
-STRATUM_CORNEUM, INSULATOR = Layer(0.38, 1650.0), Layer(0.09, 3.35)
-LAYERS = Layers.of(STRATUM_CORNEUM, INSULATOR)
+STRATUM_CORNEUM, INSULATOR = ev.Layer(0.38, 1650.0), ev.Layer(0.09, 3.35)
+LAYERS = ev.Layers.of(STRATUM_CORNEUM, INSULATOR)
 TOLERANCE = 1e-8  # largest free residual over the largest force on the bone
 
 
@@ -79,11 +77,10 @@ REFERENCE: Mapping[str, Mapping[str, float]] = {
 UNCERTAINTY = {"A": 0.04, "B": 0.2}
 
 
-def scene_mesh(element: str, level: int) -> Mesh:
-    """The nodes of a level, as linear quads for q1, as a quarter as many quadratic ones for the
-    others.
-    """
-    return benchmark_mesh(level, 1 if element == "q1" else 2, same_nodes=element != "q1")
+def scene_mesh(element: str, level: int) -> ev.Mesh:
+    """The nodes of a level, as linear quads for q1 and q1_fbar, else as a quarter as many quadratic ones."""
+    linear = element in ("q1", "q1_fbar")
+    return benchmark_mesh(level, 1 if linear else 2, same_nodes=not linear)
 
 
 def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) -> None:
@@ -105,7 +102,7 @@ def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) 
         path=path(scene, way),
         plane=PLANE,
         friction=FRICTION[scene],
-        pull=0.5 * eps_0 * VOLTAGE[scene] ** 2,
+        pull=0.5 * ev.eps_0 * VOLTAGE[scene] ** 2,
         layers=np.array([LAYERS.reduced, LAYERS.thickness]),
         tolerance=way.tolerance,
     )

@@ -26,17 +26,7 @@ from evfem.surface.pad import make_pad
 from evfem.surface.surfaces import Flat
 
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
-from .problem import (
-    FRICTION,
-    GIVEN,
-    LAYERS,
-    MATERIALS,
-    PLANE,
-    VOLTAGE,
-    Way,
-    path,
-    scene_mesh,
-)
+from .problem import FRICTION, GIVEN, LAYERS, MATERIALS, PLANE, VOLTAGE, Way, path, scene_mesh
 
 POSITIVE, GENERAL = 2, 11  # kinds of matrix in PARDISO: symmetric positive definite, unsymmetric
 

@@ -5,17 +5,12 @@ shares.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from ..common import COLOURS, Series, new_figure
+from ..common import COLOURS, Axes, Figure, Series, new_figure, plain_ticks
 from .evaluation import Reference
 from .growth import Size
 from .scenes import PROBLEMS
 from .shares import PARTS, PHASES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: element -> label, colour, marker, line
 ELEMENTS = {
@@ -98,7 +93,7 @@ def _problem(ax: Axes, title: str, curves: Sequence[Series], uncertain: float) -
     drawn = [max(value, SMALLEST) for curve in curves for value in curve.y]
     ax.set_ylim(bottom=0.4 * min([uncertain, *drawn]))
     _titled(ax, title, "CPU seconds")
-    _plain_ticks(ax)
+    plain_ticks(ax)
 
 
 def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> None:
@@ -117,7 +112,7 @@ def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> No
     ax.set(xscale="log", yscale="log")
     _titled(ax, "growth of a step", "nodes")
     ax.legend(fontsize="x-small", frameon=False)
-    _plain_ticks(ax)
+    plain_ticks(ax)
 
 
 def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
@@ -142,17 +137,3 @@ def _titled(ax: Axes, title: str, label: str) -> None:
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set_xlabel(label, fontsize="small")
     ax.spines[["top", "right"]].set_visible(False)
-
-
-def _plain_ticks(ax: Axes) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    for axis in (ax.xaxis, ax.yaxis):
-        low, high = axis.get_view_interval()
-        few = high < 100.0 * low
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=7))
-        axis.set_major_formatter("{x:,g}" if high > 1e3 else "{x:g}")
-        axis.set_minor_formatter(NullFormatter())
-    ax.tick_params(labelsize="small")
-    ax.grid(which="major", color="#E5E5E5", linewidth=0.6)
-    ax.set_axisbelow(True)

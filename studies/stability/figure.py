@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..common import COLOURS, new_figure
+from ..common import COLOURS, Axes, Figure, new_figure
 from .case import Found
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: outcome -> marker, colour, label
 MARKS = {

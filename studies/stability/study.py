@@ -13,8 +13,7 @@ from typing import Any
 
 from evfem.common.storage import write_text
 
-from ..common import Series, Study, make_folder
-from ..parallel import side_by_side
+from ..common import Series, Study, make_folder, side_by_side
 from . import contact, electric, same, tissue
 from .case import PASSED, Case, Found, judge
 from .figure import draw
@@ -88,10 +87,7 @@ def by_group(found: list[Found]) -> dict[str, tuple[int, int]]:
     """Group -> cases with the expected outcome, and all of them."""
     names = list(dict.fromkeys(one.group for one in found))
     return {
-        name: (
-            sum(one.good for one in found if one.group == name),
-            sum(one.group == name for one in found),
-        )
+        name: (sum(one.good for one in found if one.group == name), sum(one.group == name for one in found))
         for name in names
     }
 

@@ -11,27 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
-from evfem.finger.fingerpad import FingerPad
+import evfem as ev
 from evfem.mesh.file import read
 from evfem.mesh.quality import check
-from evfem.planning.plan import plan
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Solver
-from evfem.simulation.run import simulate
-from evfem.surface.surfaces import Flat, Profile, Sinusoid
 
 from .case import Group, Log, Verdict
-from .scenes import (
-    benchmark,
-    block,
-    finger,
-    grid,
-    joined,
-    layered,
-    pad,
-    scene,
-    shaken,
-)
+from .scenes import benchmark, block, finger, grid, joined, layered, pad, scene, shaken
 
 INCOMPRESSIBLE = Group("incompressible")
 CONTRAST = Group("contrast")
@@ -50,8 +35,8 @@ def _incompressible(log: Log, element: str, nu: float) -> Verdict:
     if element == "p2":
         triangles = read(Path(_meshes()) / "benchmark-L0-triangles.msh")
         body = layered(triangles, tissue=(0.05, nu), skin=(1.0, 0.30))
-    flat, press = Flat(friction=0.0, y=-6.395), Press(indentation=1.0, steps=4)
-    result = log.simulate(scene(body, flat, press, solver=Solver(element=element)))
+    flat, press = ev.Flat(friction=0.0, y=-6.395), ev.Press(indentation=1.0, steps=4)
+    result = log.simulate(scene(body, flat, press, solver=ev.Solver(element=element)))
     error = float(result.normal_force[-1]) / FINER[nu] - 1.0
     allowed = ALLOWED[element]
     if allowed is None:
@@ -83,11 +68,11 @@ for _element, _allowed in ALLOWED.items():
 def _nail(log: Log) -> Verdict:
     from evfem.tissue.laws import NeoHookean
 
-    motion = Press(indentation=1.0, steps=4), Slide(1.0, steps=5)
+    motion = ev.Press(indentation=1.0, steps=4), ev.Slide(1.0, steps=5)
     forces = []
     for E in (17.0, 17_000.0):
         body = pad(ridges=True, materials={"nail": NeoHookean(E=E, nu=0.3)})
-        forces.append(float(log.simulate(scene(body, Flat(friction=0.3), *motion)).normal_force[-1]))
+        forces.append(float(log.simulate(scene(body, ev.Flat(friction=0.3), *motion)).normal_force[-1]))
     change = forces[1] / forces[0] - 1.0
     return abs(change) < 0.01, f"F_n changes by {change:.2%} from 17 MPa to 17 GPa"
 
@@ -99,8 +84,8 @@ def _dry(log: Log) -> Verdict:
     forces = []
     for E in (1.0, 100.0):
         body = pad(ridges=True, materials={"stratum_corneum": NeoHookean(E=E, nu=0.3)})
-        motion = Press(indentation=1.0, steps=4), Slide(4.0, steps=16)
-        result = log.simulate(scene(body, Flat(friction=0.5), *motion))
+        motion = ev.Press(indentation=1.0, steps=4), ev.Slide(4.0, steps=16)
+        result = log.simulate(scene(body, ev.Flat(friction=0.5), *motion))
         ratio = float(result.tangential_force[-1] / result.normal_force[-1])
         if abs(ratio - 0.5) > 1e-6:
             return False, f"F_t/F_n = {ratio:.6f} at {E:g} MPa"
@@ -116,8 +101,8 @@ def _series(log: Log, contrast: float) -> Verdict:
     region = (mesh.points[mesh.cells, 1].mean(axis=1) > 2.0).astype(int)
     two = replace(mesh, region=region, region_names={"soft": 0, "stiff": 1})
     body = layered(two, soft=(0.034, 0.0), stiff=(0.034 * contrast, 0.0))
-    press = Press(indentation=0.8, steps=3)
-    result = log.simulate(scene(body, Flat(friction=0.0), press))
+    press = ev.Press(indentation=0.8, steps=3)
+    result = log.simulate(scene(body, ev.Flat(friction=0.0), press))
 
     def stress(stretch: float, E: float) -> float:
         return 0.5 * E * (1.0 / stretch - stretch)
@@ -140,10 +125,10 @@ for _contrast in (500.0, 3000.0, 1e6):
 
 
 def _against_regular(log: Log, mesh: object, allowed: float) -> Verdict:
-    motion = Press(indentation=0.4, steps=3), Slide(1.5, steps=6)
+    motion = ev.Press(indentation=0.4, steps=3), ev.Slide(1.5, steps=6)
     forces = []
     for source in (block(16, 8, sag=0.4), mesh):
-        result = log.simulate(scene(finger(source), Flat(friction=0.3), *motion))  # type: ignore[arg-type]
+        result = log.simulate(scene(finger(source), ev.Flat(friction=0.3), *motion))  # type: ignore[arg-type]
         forces.append((float(result.normal_force[-1]), float(result.tangential_force[-1])))
     error = max(abs(a / b - 1.0) for a, b in zip(*forces, strict=True))
     return error < allowed, f"forces within {error:.2%} of a regular mesh, allowed {allowed:.0%}"
@@ -173,9 +158,9 @@ def _needles(log: Log) -> Verdict:
 @MESHES.case("sliver ridges", "the steepest walls that are allowed: F_t = 0.3 F_n in full slip")
 def _slivers(log: Log) -> Verdict:
     # a crest of 15 % of the pitch carries the load
-    body = FingerPad(resolution="coarse", ridge_height=0.2, ridge_exponent=5.5)
-    motion = Press(indentation=0.5, steps=4), Slide(2.0, steps=10)
-    result = log.simulate(scene(body, Flat(friction=0.3), *motion))
+    body = ev.FingerPad(resolution="coarse", ridge_height=0.2, ridge_exponent=5.5)
+    motion = ev.Press(indentation=0.5, steps=4), ev.Slide(2.0, steps=10)
+    result = log.simulate(scene(body, ev.Flat(friction=0.3), *motion))
     ratio = float(result.tangential_force[-1] / result.normal_force[-1])
     least = float(result.frames[-1].J.min())
     return abs(ratio - 0.3) < 1e-6 and least > 0.0, f"F_t/F_n = {ratio:.7f}, smallest cell J {least:.2f}"
@@ -195,11 +180,11 @@ def _double(log: Log) -> Verdict:
 
 def _sharper(surface: object) -> Verdict:
     """A warning of Python's or a sentence of the plan that compares the profile with the nodes."""
-    asked = scene(finger(block(8, 3)), surface, Press(indentation=0.02, steps=1))
+    asked = scene(finger(block(8, 3)), surface, ev.Press(indentation=0.02, steps=1))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        said = str(plan(asked))
-        simulate(asked)
+        said = str(ev.plan(asked))
+        ev.simulate(asked)
     texts = [str(one.message) for one in caught] + said.splitlines()
     found = [text for text in texts if "node" in text and "spacing" in text]
     return bool(found), found[0] if found else "neither the plan nor a warning says so"
@@ -208,9 +193,9 @@ def _sharper(surface: object) -> Verdict:
 @MESHES.case("profile sharper than the nodes", "a warning: nodes 0.5 mm apart miss grooves of 0.1 mm")
 def _unresolved(_: Log) -> Verdict:
     x = np.arange(-5.0, 5.001, 0.05)
-    return _sharper(Profile(x, np.where(np.round(x / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0))
+    return _sharper(ev.Profile(x, np.where(np.round(x / 0.05) % 10 < 2, -0.05, 0.0), friction=0.0))
 
 
 @MESHES.case("wave shorter than the nodes", "a warning: nodes 0.5 mm apart miss waves of 0.2 mm")
 def _short_wave(_: Log) -> Verdict:
-    return _sharper(Sinusoid(terms=[[0.005, 2.0 * np.pi / 0.2, 0.0]], friction=0.0))
+    return _sharper(ev.Sinusoid(terms=[[0.005, 2.0 * np.pi / 0.2, 0.0]], friction=0.0))

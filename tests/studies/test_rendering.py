@@ -16,8 +16,8 @@ from evfem.simulation.rendering import ApparentFriction
 pytestmark = pytest.mark.solver
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-names = ("fig12", "fig13", "rendered", "parallel")
-fig12, fig13, rendered, parallel = (importlib.import_module(f"{studies.__name__}.{name}") for name in names)
+names = ("fig12", "fig13", "rendered", "common")
+fig12, fig13, rendered, common = (importlib.import_module(f"{studies.__name__}.{name}") for name in names)
 
 
 @pytest.fixture(scope="module")
@@ -157,12 +157,12 @@ def test_variations_change_one_thing_at_a_time():
 
 
 def test_processes_keep_the_order_and_pass_errors_on():
-    assert parallel.side_by_side(math.sqrt, [4.0, 9.0, 16.0]) == [2.0, 3.0, 4.0]
-    assert parallel.side_by_side(math.sqrt, [4.0, 9.0], workers=1) == [2.0, 3.0]
-    others = parallel.side_by_side(eval, ["__import__('os').getpid()"] * 2)
+    assert common.side_by_side(math.sqrt, [4.0, 9.0, 16.0]) == [2.0, 3.0, 4.0]
+    assert common.side_by_side(math.sqrt, [4.0, 9.0], workers=1) == [2.0, 3.0]
+    others = common.side_by_side(eval, ["__import__('os').getpid()"] * 2)
     assert os.getpid() not in others
     with pytest.raises(InputError, match="study"):
-        parallel.side_by_side(studies.run, ["fig98", "fig99"])
+        common.side_by_side(studies.run, ["fig98", "fig99"])
 
 
 def test_errors_reach_another_process_whole():
