@@ -52,7 +52,7 @@ def test_study_leaves_table_numbers_and_picture(quick):
     ]
     assert json.loads((folder / "stability.json").read_text()) == json.loads(json.dumps(result))
     page = (folder / "stability.md").read_text()
-    assert all(line in page for line in result["assumptions"]["table"])
+    assert all(line in page for lines in result["assumptions"]["tables"].values() for line in lines)
     assert all(line.count(",") == 3 for line in (folder / "stability.csv").read_text().splitlines())
     assert (folder / "stability.png").read_bytes().startswith(b"\x89PNG")
 
@@ -147,7 +147,19 @@ def area_of(mesh):
 def test_picture_splits_groups_between_columns_and_marks_what_failed(quick):
     def found(group, n, outcome="passed"):
         return [
-            case.Found(f"{group}.{i}", group, f"{i}", "", outcome, "", 1.0, 4, 4, 0, 9, 0.0, 0.0)
+            case.Found(
+                4,
+                4,
+                0,
+                9,
+                key=f"{group}.{i}",
+                group=group,
+                name=f"{i}",
+                expected="",
+                outcome=outcome,
+                said="",
+                cpu_s=1.0,
+            )
             for i in range(n)
         ]
 
