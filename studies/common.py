@@ -1,48 +1,32 @@
-"""What the studies share: writing a study down, runs side by side, laws, measurements, drawing."""
+"""What the studies share: writing a study down, runs side by side, laws and measurements."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
+import evfem as ev
 from evfem import data
 from evfem.common.arrays import Floats
 from evfem.common.notices import LOG
 from evfem.common.pools import processes
 from evfem.common.storage import disk, replacing, write_text
 from evfem.common.tables import csv_text
-from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.errors import InputError
-from evfem.plotting.figures import WIDTH, new_figure
+from evfem.electrostatics.encoding import AreaLaw
+from evfem.finger.layers import TABLE_2
 from evfem.simulation.provenance import origin
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-else:  # a study that draws nothing does not load it
-    Axes = Figure = Any
-
 Argument, Answer = TypeVar("Argument"), TypeVar("Answer")
-LAWS: dict[str, StrongTroxel | Kaczmarek] = {"strong_troxel": StrongTroxel(), "kaczmarek": Kaczmarek()}
-LABELS = {"strong_troxel": "Strong-Troxel", "kaczmarek": "Kaczmarek"}
-#: told apart with any colour vision (Okabe and Ito, 2008)
-COLOURS = {
-    "strong_troxel": "#E69F00",
-    "kaczmarek": "#0072B2",
-    "measured": "#B04A85",
-    "fe": "#009E73",
-    "neutral": "#555555",
-}
+LAWS: dict[str, Any] = {"strong_troxel": ev.StrongTroxel(), "kaczmarek": ev.Kaczmarek()}
 #: hover cases of the measurements: voltage in V, air gap in mm
 CASES = {"HVHD": (2000.0, 0.50), "HVLD": (2000.0, 0.25), "LVLD": (1414.0, 0.25)}
-QUICK = "--quick: coarser and shorter than the study"
 
 
 @dataclass(frozen=True)
@@ -67,7 +51,7 @@ class Study:
     paper: dict[str, float]
     assumptions: dict[str, Any]
     series: list[Series]
-    draw: Callable[[], Figure]
+    draw: Callable[[], Any]
     parameters: dict[str, Any] = field(default_factory=dict)
     tables: dict[str, list[str]] = field(default_factory=dict)
 
@@ -78,7 +62,7 @@ class Study:
         The picture of a `quick` study says so.
         """
         said = {"tables": self.tables} if self.tables else {}
-        made = {"eps_0_F_per_m": eps_0, "quick": quick, "parameters": self.parameters}
+        made = {"eps_0_F_per_m": ev.eps_0, "quick": quick, "parameters": self.parameters}
         result = {
             "study": self.name,
             "numbers": {key: float(value) for key, value in self.numbers.items()},
@@ -92,6 +76,8 @@ class Study:
             write_text(folder / f"{self.name}.csv", series_text(self.series))
             if self.tables:
                 write_text(folder / f"{self.name}.md", self._page())
+            from .plots import say_quick
+
             figure = self.draw()
             if quick:
                 say_quick(figure)
@@ -146,7 +132,7 @@ def side_by_side(
     """
     answers: dict[int, Any] = {}
     if workers > 1 and len(arguments) > 1:
-        with suppress(InputError), processes(workers) as pool:
+        with suppress(ev.InputError), processes(workers) as pool:
             for place, answer in pool(function, dict(enumerate(arguments))):
                 if isinstance(answer, Exception):
                     raise answer
@@ -170,26 +156,40 @@ def participants() -> data.Table:
     return data.load("table1")
 
 
-def table2_layers(stratum_corneum: Any = None) -> Layers:
-    """Table 2's stack; `stratum_corneum` in mm replaces the thickness of the stratum corneum."""
+def by_participant(name: str, values: Any, unit: str = "mN") -> Series:
+    """A value for each of the first participants."""
+    return Series(name, participants()["participant"][: len(values)], values, f"{unit} over participant")
+
+
+def table2_layers(stratum_corneum: Any = None, insulator: Any = None) -> ev.Layers:
+    """Table 2's stack, with other thicknesses in mm."""
     table = data.load("table2")
-    thickness = table.value("d_sc") if stratum_corneum is None else stratum_corneum
-    skin = Layer(thickness, table.value("eps_sc"))
-    return Layers.of(skin, Layer(table.value("d_i"), table.value("eps_i")))
+    skin = ev.Layer(
+        table.value("d_sc") if stratum_corneum is None else stratum_corneum, table.value("eps_sc")
+    )
+    return ev.Layers.of(skin, ev.Layer(insulator or table.value("d_i"), table.value("eps_i")))
 
 
-def panels(height: float, columns: int, width: float = WIDTH, rows: int = 1, **grid: Any) -> Any:
-    """A figure and the axes of its panels, row by row, with their letters; keywords of `subplots`."""
-    figure = new_figure(height, width)
-    axes = figure.subplots(rows, columns, squeeze=False, **grid).ravel()
-    for ax, letter in zip(axes, "abcdefghijkl", strict=False):
-        panel_letter(ax, letter)
-    return figure, axes
+def area_law(name: str) -> AreaLaw:
+    """Contact area in mm2 over the load in N: "gross" and "ridge" of Adams, or what a law needs."""
+    laws = data.load("area_laws")
+    return AreaLaw(laws.value(name, "k"), laws.value(name, "m"))
+
+
+def tissue(factor: float = 1.0, **moduli: float) -> dict[str, ev.NeoHookean]:
+    """Table 2's soft layers with all moduli times a factor, and some replaced (MPa)."""
+    soft = {name: own for name, own in TABLE_2.items() if name != "nail"}
+    return {name: ev.NeoHookean(E=factor * moduli.get(name, E), nu=nu) for name, (E, nu) in soft.items()}
+
+
+def paper_display(friction: float) -> ev.Display:
+    """The display of Table 2."""
+    table = data.load("table2")
+    return ev.Display(insulator=ev.Layer(table.value("d_i"), table.value("eps_i")), friction=friction)
 
 
 def median_interval(values: Floats) -> tuple[float, float, float]:
-    """Confidence interval of the median from order statistics: low, high, and the confidence it
-    has.
+    """Confidence interval of the median: low, high, and the confidence it has.
 
     The narrowest symmetric pair of order statistics with at least 90 %: for eleven values the
     third and ninth, 93.5 %. It assumes nothing about the distribution.
@@ -203,77 +203,3 @@ def median_interval(values: Floats) -> tuple[float, float, float]:
         if confidence >= 0.90:
             return float(ordered[rank]), float(ordered[n - 1 - rank]), confidence
     return float(ordered[0]), float(ordered[-1]), 1.0 - 2.0 ** (1 - n)
-
-
-def draw_box(ax: Axes, at: float, values: Floats, width: float, colour: str) -> None:
-    """Box (quartiles), whiskers (extremes), median, its confidence interval as a bar, and the
-    points.
-    """
-    low, high, _ = median_interval(values)
-    box = ax.boxplot(
-        [values],
-        positions=[at],
-        widths=[width],
-        whis=(0, 100),
-        showcaps=True,
-        patch_artist=True,
-        manage_ticks=False,
-    )
-    for part in ("boxes", "whiskers", "caps", "medians"):
-        for artist in box[part]:
-            artist.set(color=colour, linewidth=1.1)
-    box["boxes"][0].set(facecolor=colour, alpha=0.30)
-    box["medians"][0].set(linewidth=2.2)
-    ax.plot([at, at], [low, high], color=colour, linewidth=3.0, alpha=0.75, solid_capstyle="butt")
-    spread = np.linspace(-0.3, 0.3, len(values)) * width
-    ax.plot(at + spread, values, ".", color=colour, markersize=3.0, alpha=0.8)
-
-
-def measured_boxes(ax: Axes, at: Mapping[str, float], width: float) -> None:
-    """The measured forces (mN) of the cases as boxes at the given abscissae."""
-    for case, place in at.items():
-        draw_box(ax, place, participants()[case], width, COLOURS["measured"])
-
-
-def not_shown(figure: Figure, what: str) -> None:
-    """A line at the foot of the figure on measured points that the paper plots but does not print."""
-    figure.supxlabel(
-        f"{what}: only plotted in the paper, not shown", fontsize="x-small", color=COLOURS["neutral"]
-    )
-
-
-def say_quick(figure: Figure) -> None:
-    """A line of its own at the head of a figure from `new_figure`: what it shows is coarser and
-    shorter.
-    """
-    line = 0.18 / figure.get_figheight()
-    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 1.0 - line))
-    figure.text(
-        0.99, 1.0 - 0.2 * line, QUICK, ha="right", va="top", fontsize="x-small", color=COLOURS["neutral"]
-    )
-
-
-def panel_letter(ax: Axes, letter: str) -> None:
-    """The letter of a panel, in its upper left corner outside the axes."""
-    ax.set_title(f"[{letter}]", loc="left", fontsize="medium")
-
-
-def law_line(ax: Axes, law: str, x: Floats, y: Floats, **style: Any) -> Any:
-    """A curve in the law's colour; further keywords of `Axes.plot`."""
-    return ax.plot(x, y, color=COLOURS[law], **style)[0]
-
-
-def plain_ticks(ax: Axes) -> None:
-    """Logarithmic axes with numbers as they are spoken, over a light grid."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    for axis in (ax.xaxis, ax.yaxis):
-        low, high = axis.get_view_interval()
-        few = high < 100.0 * low
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=7))
-        axis.set_major_formatter("{x:,g}" if high > 1e3 else "{x:g}")
-        axis.set_minor_formatter(NullFormatter())  # its labels would overlap where the axis is short
-    ax.tick_params(labelsize="small")
-    ax.grid(which="major", color="#E5E5E5", linewidth=0.6)
-    ax.set_axisbelow(True)
-    ax.spines[["top", "right"]].set_visible(False)

@@ -19,12 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from evfem import data
 from evfem.common.arrays import Floats
-from evfem.electrostatics.encoding import AreaLaw, PowerFit, fit_power
+from evfem.electrostatics.encoding import PowerFit, fit_power
 
 from . import fig11_panels
-from .common import LAWS, Series, Study, table2_layers
+from .common import LAWS, Series, Study, area_law, table2_layers
 from .fig11_panels import PAPER_FIT
 from .pressing import Case, Pad, Pressed, phases, run_all
 
@@ -103,9 +102,7 @@ TABLE_2_PAD = Pad(exponent=7.0)
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to ask the question: the pad (its `ridges` are set per question), the run, the
-    evaluation.
-    """
+    """One way to ask: the pad (its `ridges` are set per question), the run, the evaluation."""
 
     label: str
     pad: Pad = TABLE_2_PAD
@@ -190,25 +187,19 @@ def answer(
 
 
 def area_ratio(pad: Pad, runs: Runs, loads: tuple[float, ...]) -> Floats:
-    """Width of touching ridges over the gross width of contact, without voltage, averaged over the
-    phases.
-    """
+    """Width of touching ridges over the gross one, without voltage, averaged over the phases."""
     widths = [runs[Case(one, loads)].widths() for one in phases(pad)]
     return np.sum([real for real, _ in widths], axis=0) / np.sum([gross for _, gross in widths], axis=0)
 
 
 def adams_ratio(loads: Sequence[float]) -> Floats:
     """The same of Adams' power laws (Fig. 6b), for loads in N/mm over the depth."""
-    laws = data.load("area_laws")
-    ridge, gross = (AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in ("ridge", "gross"))
     force = DEPTH * np.asarray(loads)
-    return np.asarray(ridge(force)) / np.asarray(gross(force))
+    return np.asarray(area_law("ridge")(force)) / np.asarray(area_law("gross")(force))
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """The four forces over the load, alpha and beta; in full also calibration, mesh and
-    sensitivities.
-    """
+    """The forces over the load, alpha and beta; in full also calibration, mesh and sensitivities."""
     loads = QUICK_LOADS if quick else LOADS
     base = replace(BASE, pad=Pad(resolution="coarse")) if quick else BASE
     variants = {} if quick else VARIANTS
@@ -234,13 +225,12 @@ def _run(
     base: Variant, variants: Mapping[str, Variant], loads: tuple[float, ...], processes: int
 ) -> tuple[Runs, dict[str, float]]:
     """All runs, those of the paper's panels first, and the wall time of both parts."""
-    started = time.perf_counter()
-    runs = run_all(_cases([base], loads), processes)
-    seconds = {"main_part": time.perf_counter() - started}
-    started = time.perf_counter()
-    more = [case for case in _cases(variants.values(), loads) if case not in runs]
-    runs |= run_all(more, processes) if more else {}
-    seconds["sensitivities"] = time.perf_counter() - started
+    runs: dict[Case, Pressed] = {}
+    seconds = {}
+    for name, part in (("main_part", [base]), ("sensitivities", variants.values())):
+        started = time.perf_counter()
+        runs |= run_all([case for case in _cases(part, loads) if case not in runs], processes)
+        seconds[name] = time.perf_counter() - started
     return runs, seconds
 
 
@@ -286,9 +276,7 @@ def _at(loads: tuple[float, ...], values: Floats, load: float = 0.05) -> float:
 
 
 def _over_paper(pad: str, found: Answer, loads: tuple[float, ...]) -> dict[str, float]:
-    """The relative contribution over that of the paper's fit: geometric mean and extremes over the
-    loads.
-    """
+    """The relative contribution over that of the paper's fit: geometric mean and extremes."""
     alpha, beta = PAPER_FIT[pad]
     over = found.ratio / (alpha * np.asarray(loads) ** -beta)
     mean = float(np.exp(np.mean(np.log(over))))
@@ -313,9 +301,7 @@ def _numbers(answers: Mapping[str, Answer], loads: tuple[float, ...]) -> dict[st
 
 
 def _ratio_numbers(ratios: Mapping[str, Floats], loads: tuple[float, ...]) -> dict[str, float]:
-    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it would be
-    least.
-    """
+    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it is least."""
     adams = adams_ratio(loads)
     misfit = {name: np.sqrt(np.mean(np.log(ratio / adams) ** 2)) for name, ratio in ratios.items()}
     numbers = {f"calibration.{name}.rms_log_misfit": value for name, value in misfit.items()}
@@ -369,7 +355,5 @@ def _series(shown: fig11_panels.Shown) -> list[Series]:
 
 def _plate(name: str) -> Floats:
     """(7) at zero gap on Adams' gross or ridge area over `PLATE_LOADS`, N/mm of the depth."""
-    laws = data.load("area_laws")
-    area = AreaLaw(laws.value(name, "k"), laws.value(name, "m"))
     pressure = LAWS["kaczmarek"].traction(0.0, VOLTAGE, table2_layers())
-    return np.asarray(area(DEPTH * PLATE_LOADS)) * pressure / DEPTH
+    return np.asarray(area_law(name)(DEPTH * PLATE_LOADS)) * pressure / DEPTH

@@ -12,7 +12,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Axes, Figure, new_figure, panel_letter
+from .plots import COLOURS, Axes, Figure, new_figure, panel_letter
 
 PAPER_FIT = {"with_ridges": (0.17, 0.49), "without_ridges": (0.03, 0.65)}
 #: marker, name and colour of the two pads

@@ -21,7 +21,8 @@ from evfem.export import paraview
 from evfem.plotting import side_by_side
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 
-from .common import Figure, Series, Study, make_folder
+from .common import Series, Study, make_folder
+from .plots import Figure
 from .rendered import (
     ASSUMPTIONS,
     QUICK_TEXTURE,

@@ -24,7 +24,8 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Figure, Series, Study, new_figure, panel_letter
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure, panel_letter
 
 PATTERNS = {
     "along": COLOURS["neutral"],

@@ -9,19 +9,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    LAWS,
-    Axes,
-    Figure,
-    Series,
-    draw_box,
-    measured_boxes,
-    new_figure,
-    panel_letter,
-)
+from .common import CASES, LAWS, Series
+from .plots import COLOURS, LABELS, Axes, Figure, draw_box, measured_boxes, new_figure, panel_letter
 
 PADS = {"smooth": (COLOURS["kaczmarek"], "o"), "ridged": (COLOURS["fe"], "s")}
 #: how curves are drawn that nearly coincide: the second one open and dashed

@@ -30,7 +30,8 @@ from evfem.electrostatics.alternating import (
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import TOUCHSCREEN, Layers, StrongTroxel, eps_0
 
-from .common import COLOURS, Figure, Series, Study, new_figure, panel_letter
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure, panel_letter
 
 GAP, PEAK, THICKNESS = 0.001, 100.0, 0.30  # mm, V, mm
 LEAKS = (0.0, 1e-8, 1e-7)  # S/m

@@ -23,7 +23,8 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Figure, Series, Study, new_figure
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure
 
 PITCH, PERIOD, RUN_IN, FRICTION = 0.5, 4.0, 1.0, 0.3
 SPEEDS = (20.0, 40.0)

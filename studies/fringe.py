@@ -42,8 +42,9 @@ from evfem.field.outlines import graded
 from evfem.field.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
-from .common import CASES, COLOURS, Figure, Series, Study, new_figure, panel_letter, participants
+from .common import CASES, Series, Study, participants
 from .measured import participant_forces
+from .plots import COLOURS, Figure, new_figure, panel_letter
 
 PITCH, HEIGHT = 0.5, 0.15
 INSULATORS = {"film": ev.FILM, "touchscreen": ev.TOUCHSCREEN}

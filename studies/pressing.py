@@ -1,12 +1,8 @@
-"""A pad pressed to a series of loads, with and without voltage: the runs, and what its outline
-tells.
-"""
+"""A pad pressed to a series of loads, with and without voltage: runs, and what its outline tells."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -17,13 +13,9 @@ import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.faces import layer_thickness
-from evfem.simulation.result import Saved
 from evfem.surface.edge import outline_nodes
 
-from .common import LAWS, side_by_side
-
-#: which length of the outline stands for A_j: its projection now, its arc now, its arc before deformation
-AREAS = ("projected", "current", "reference")
+from .common import LAWS, paper_display, side_by_side, table2_layers, tissue
 
 
 @dataclass(frozen=True)
@@ -41,11 +33,7 @@ class Pad:
 
     def finger(self) -> ev.FingerPad:
         """The pad with these values, else Table 2."""
-        soft = {
-            name: (self.stiffness * (self.stratum_corneum_E if name == "stratum_corneum" else E), nu)
-            for name, (E, nu) in TABLE_2.items()
-            if name != "nail"
-        }
+        soft = tissue(self.stiffness, stratum_corneum=self.stratum_corneum_E)
         return ev.FingerPad(
             ridges=self.ridges,
             ridge_phase=self.phase,
@@ -53,7 +41,7 @@ class Pad:
             ridge_crest=self.crest,
             ridge_groove=self.groove,
             resolution=self.resolution,
-            materials={name: ev.NeoHookean(E=E, nu=nu) for name, (E, nu) in soft.items()},
+            materials=soft,
         )
 
 
@@ -73,9 +61,7 @@ class Case:
 
     def scene(self, *motion: Any, voltage: float) -> ev.Scene:
         """The scene of some motions, at a voltage from the start."""
-        table = ev.data.load("table2")
-        film = ev.Layer(table.value("d_i"), table.value("eps_i"))
-        display = ev.Display(insulator=film, friction=self.friction)
+        display = paper_display(self.friction)
         return ev.Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
 
 
@@ -108,9 +94,7 @@ def contact_spans(x: Floats, gap: Floats, touching: Any) -> Floats:
 
 
 def _reach(x: Floats, gap: Floats, touching: Any, last: int, step: int, wide: bool) -> float:
-    """How far contact reaches beyond the node `last`, in spacings of nodes: from -1/2 (0 for a
-    lone node) to 1.
-    """
+    """How far contact reaches beyond `last`, in spacings of nodes: from -1/2 (a lone node 0) to 1."""
     outside: list[int] = []
     for node in range(last + step, last + 4 * step, step):
         if not 0 <= node < x.size or touching[node]:
@@ -154,7 +138,6 @@ class Pressed:
     gap: Floats
     touching: Any
     force: Floats
-    nodes: int
     iterations: int
 
     def spans(self, load: int) -> Floats:
@@ -162,9 +145,7 @@ class Pressed:
         return contact_spans(self.x[load], self.gap[load], self.touching[load])
 
     def widths(self) -> tuple[Floats, Floats]:
-        """Width of real contact, and from its outermost left to its outermost right end, per load
-        (mm).
-        """
+        """Width of real contact, and between its outermost ends, per load (mm)."""
         real, gross = [], []
         for load, x in enumerate(self.x):
             ends = np.interp(self.spans(load), np.arange(x.size), x)
@@ -173,9 +154,7 @@ class Pressed:
         return np.array(real), np.array(gross)
 
     def line(self, load: int, area: str) -> Floats:
-        """Coordinate along the outline whose differences are the lengths of an area convention
-        (P,), mm.
-        """
+        """Coordinate (P,) along the outline in mm whose differences are an area convention's lengths."""
         if area == "projected":
             return self.x[load]
         if area == "reference":
@@ -186,17 +165,13 @@ class Pressed:
 
     def pressure(self, gap: Any, voltage: float, law: str, thickness: Any = None) -> Floats:
         """Attraction in MPa of every outline node at a gap."""
-        table = ev.data.load("table2")
-        d = self.thickness if thickness is None else np.full_like(self.thickness, thickness)
-        layers = ev.Layers.of(
-            ev.Layer(d, table.value("eps_sc")), ev.Layer(table.value("d_i"), table.value("eps_i"))
+        layers = table2_layers(
+            self.thickness if thickness is None else np.full_like(self.thickness, thickness)
         )
         return np.asarray(LAWS[law].traction(gap, voltage, layers))
 
     def shares(self, load: int, area: str) -> Floats:
-        """Length of outline per node as (9b) needs it: 1/6, 4/6, 1/6 of every quadratic edge (P,),
-        mm.
-        """
+        """Length (P,) of outline per node in mm for (9b): 1/6, 4/6, 1/6 of every quadratic edge."""
         line = self.line(load, area)
         edge = np.maximum(line[2::2] - line[:-2:2], 0.0)
         share = np.zeros_like(line)
@@ -207,18 +182,13 @@ class Pressed:
 
     def total(self, voltage: float, law: str, area: str = "projected", thickness: Any = None) -> Floats:
         """(9a), (9b): attraction of all nodes at their gaps, per load (N/mm)."""
-        return np.array(
-            [
-                self.pressure(np.maximum(gap, 0.0), voltage, law, thickness) @ self.shares(load, area)
-                for load, gap in enumerate(self.gap)
-            ]
-        )
+        pull = [self.pressure(np.maximum(gap, 0.0), voltage, law, thickness) for gap in self.gap]
+        return np.array([one @ self.shares(load, area) for load, one in enumerate(pull)])
 
     def contact_only(
         self, voltage: float, law: str, area: str = "projected", thickness: Any = None, nodal: bool = False
     ) -> Floats:
-        """(10): attraction of what touches, per load (N/mm), between the interpolated ends of
-        contact.
+        """(10): attraction between the interpolated ends of contact, per load (N/mm).
 
         `nodal` takes the touching nodes with their shares instead, as the sum in (10) is written.
         """
@@ -240,42 +210,16 @@ def run(case: Case) -> Pressed:
     """Press through the loads as the case says."""
     motion = [ev.Press(force=load, steps=1) for load in case.loads]
     if case.voltage and case.friction and not case.voltage_first:
-        return _bundle(case, *_branches(case, motion))
+        on = ev.VoltageRamp(case.voltage, steps=1, hold="force")
+        ways = [case.scene(*motion[: k + 1], on, voltage=0.0) for k in range(len(motion))]
+        results = [ev.simulate(way) for way in ways]
+        return _bundle(case, results, [one.frames[-1] for one in results], -1)
     result = ev.simulate(case.scene(*motion, voltage=case.voltage))
-    return _bundle(case, result, result.frames, result.electrostatic_force, result.newton_iterations)
+    return _bundle(case, [result], result.frames, slice(None))
 
 
-class _Keeper:
-    """Observer that keeps what is needed to go on from every step."""
-
-    def __init__(self) -> None:
-        self.rows: list[dict[str, Any]] = []
-        self.arrays: list[dict[str, Any]] = []
-
-    def step(self, row: dict[str, Any], _: ev.Frame | None, checkpoint: Any) -> None:
-        """Called after every converged step."""
-        self.rows.append(row)
-        self.arrays.append({name: np.copy(array) for name, array in checkpoint().items()})
-
-
-def _branches(case: Case, motion: list[ev.Press]) -> tuple[ev.Result, list[ev.Frame], Floats, Any]:
-    """Press once without voltage; from every load on, switch the voltage on with the load held."""
-    kept = _Keeper()
-    result = ev.simulate(case.scene(*motion, voltage=0.0), observers=[kept])
-    frames, forces, iterations = [], [], [result.newton_iterations.sum()]
-    for k, arrays in enumerate(kept.arrays):
-        switch_on = ev.VoltageRamp(case.voltage, steps=1, hold="force")
-        branch = ev.simulate(
-            case.scene(*motion[: k + 1], switch_on, voltage=0.0), resume=Saved(arrays, kept.rows[: k + 1])
-        )
-        frames.append(branch.frames[-1])
-        forces.append(branch.electrostatic_force[-1])
-        iterations.append(branch.newton_iterations[-1])
-    return result, frames, np.array(forces), np.array(iterations)
-
-
-def _bundle(case: Case, result: ev.Result, frames: list[ev.Frame], force: Floats, iterations: Any) -> Pressed:
-    mesh = result.mesh
+def _bundle(case: Case, results: list[ev.Result], frames: list[ev.Frame], rows: Any) -> Pressed:
+    mesh = results[0].mesh
     nodes = outline_nodes(mesh)
     points = mesh.points[nodes]
     return Pressed(
@@ -285,33 +229,15 @@ def _bundle(case: Case, result: ev.Result, frames: list[ev.Frame], force: Floats
         np.stack([points[:, 0] + frame.displacement[nodes, 0] for frame in frames]),
         np.stack([frame.gap[nodes] for frame in frames]),
         np.stack([frame.contact_status[nodes] > 0 for frame in frames]),
-        np.asarray(force, dtype=float),
-        len(mesh.points),
-        int(np.sum(iterations)),
+        np.hstack([one.electrostatic_force[rows] for one in results]),
+        int(sum(one.newton_iterations.sum() for one in results)),
     )
 
 
 def run_all(cases: Iterable[Case], processes: int = 1) -> dict[Case, Pressed]:
     """Every case once, the dearest first, in this process or in several."""
     wanted = sorted(set(cases), key=_cost, reverse=True)
-    with one_thread_each():
-        return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """New processes use one thread in dense algebra: with more, they only wait for each other's
-    cores.
-    """
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
+    return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
 
 
 def _cost(case: Case) -> float:

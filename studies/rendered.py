@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.finger.layers import TABLE_2
 from evfem.simulation.rendering import (
     ApparentFriction,
     Recording,
@@ -48,8 +47,6 @@ class Case:
     """One reference, and what is tried on the display; the defaults are those of the figures.
 
     `friction` is that of the texture; without it the surface is level with a step in friction.
-    `softness` multiplies the moduli of all tissue, `crest` is the flat share of a ridge (and of a
-    groove).
     """
 
     friction: float | None = None
@@ -58,13 +55,8 @@ class Case:
     steps: int = 60
     path: float = PATH
     force: float = 0.05
-    hold: str = "indentation"
     viscosity: float = 0.0
-    speed: float = 20.0
     dynamics: str = "quasistatic"
-    softness: float = 1.0
-    ridge_exponent: float = 7.0
-    crest: float = 0.0
     skin: float = SKIN
     encodings: tuple[str, ...] = ("open", "exact")
 
@@ -117,20 +109,9 @@ class Outcome:
 
 def pad(case: Case) -> ev.FingerPad:
     """The finger of a case."""
-    soft = {}
-    if case.softness != 1.0:
-        tissue = {name: law for name, law in TABLE_2.items() if name != "nail"}
-        soft = {name: ev.NeoHookean(E=case.softness * E, nu=nu) for name, (E, nu) in tissue.items()}
-    return ev.FingerPad(
-        ridges=case.ridges,
-        resolution=case.resolution,
-        ridge_exponent=case.ridge_exponent,
-        ridge_crest=case.crest,
-        ridge_groove=case.crest,
-        materials=soft,
-        viscosity=case.viscosity,
-        electrical=ev.Electrical(stratum_corneum_thickness=case.skin),
-    )
+    skin = ev.Electrical(stratum_corneum_thickness=case.skin)
+    shape = {"ridges": case.ridges, "resolution": case.resolution, "ridge_exponent": 7.0}
+    return ev.FingerPad(**shape, viscosity=case.viscosity, electrical=skin)
 
 
 def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
@@ -138,7 +119,7 @@ def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
     surface: ev.Flat | ev.Sinusoid = ev.Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
     if case.friction is not None:
         surface = ev.Sinusoid(friction=case.friction)
-    slide = ev.Slide(case.path, steps=case.steps, hold=case.hold, speed=case.speed)
+    slide = ev.Slide(case.path, steps=case.steps, hold="indentation", speed=20.0)
     motion = (ev.Press(force=case.force, steps=5), slide)
     solver, output = ev.Solver(dynamics=case.dynamics), ev.Output(every=every)
     return ev.Scene(pad(case), surface, motion=motion, solver=solver, output=output)

@@ -22,7 +22,8 @@ import numpy as np
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Figure, Series, Study, new_figure
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure
 
 LOAD, STATIC, FALL, AROUND = 0.04, 0.4, 0.5, 0.5
 HAND = ev.Hand(stiffness=0.02, mass=1e-6)

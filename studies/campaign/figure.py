@@ -8,7 +8,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 
-from ..common import COLOURS, Axes, Figure, new_figure, plain_ticks
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .ending import OUTCOMES, Ending
 
 BAD = "#D55E00"

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..common import COLOURS, Axes, Figure, Series, markdown, new_figure, plain_ticks
+from ..common import Series, markdown
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .evaluation import JUDGED, Run, series
 from .problem import GIVEN, UNCERTAINTY, errors
 

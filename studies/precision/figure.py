@@ -6,7 +6,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..common import COLOURS, Axes, Figure, Series, new_figure, plain_ticks
+from ..common import Series
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .evaluation import Reference
 from .growth import Size
 from .scenes import PROBLEMS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..common import COLOURS, Axes, Figure, new_figure
+from ..plots import COLOURS, Axes, Figure, new_figure
 from .case import Found
 
 #: outcome -> marker, colour, label

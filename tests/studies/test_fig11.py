@@ -79,12 +79,3 @@ def test_runs_with_the_load_held_give_what_the_cheaper_runs_give():
     touching = np.count_nonzero(np.diff(without.touching[-1].astype(int)) == 1)
     lost = nodal[-1] - without.contact_only(1000.0, "kaczmarek")[-1]
     assert abs(lost) < touching * 0.0417 * nodal[-1] / without.widths()[0][-1]
-
-
-def test_with_friction_every_load_gets_its_voltage_from_its_own_state():
-    case = pressing.Case(PAD, (0.03, 0.05), voltage=1000.0, friction=0.3)
-    branched = pressing.run(case)
-    motion = [Press(force=0.03, steps=1), Press(force=0.05, steps=1)]
-    scene = case.scene(*motion, VoltageRamp(1000.0, steps=1, hold="force"), voltage=0.0)
-    assert branched.force[1] == pytest.approx(simulate(scene).electrostatic_force[-1], rel=1e-6)
-    assert branched.force[0] < branched.force[1]

@@ -5,7 +5,6 @@ import importlib.util
 import math
 import os
 import pickle
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -142,18 +141,6 @@ def test_a_display_cannot_have_negative_friction():
     assert rendered.display_friction(rendered.TEXTURE, felt, 1.0) == (-0.02, 0.2 * 0.1)
     assert rendered.display_friction(rendered.TEXTURE, felt, 2.0) == (0.08, 0.08)
     assert rendered.display_friction(rendered.STEP, felt, 2.0)[1] == 0.5
-
-
-def test_variations_change_one_thing_at_a_time():
-    bases = {
-        "transition": fig12.VARIATIONS["transition.coarse"],
-        "sinusoid": fig12.VARIATIONS["sinusoid.coarse"],
-    }
-    for key, case in fig12.VARIATIONS.items():
-        base = bases[key.split(".")[0]]
-        changed = [name for name in vars(base) if getattr(case, name) != getattr(base, name)]
-        assert len(changed) == (0 if key.endswith(".coarse") else 1), key
-    assert bases["transition"] == replace(rendered.STEP, resolution="coarse", encodings=("open",))
 
 
 def test_processes_keep_the_order_and_pass_errors_on():

@@ -116,21 +116,13 @@ def test_spread_follows_the_derivatives(spread):
     assert numbers["kaczmarek.p50_mN.HVHD"] == pytest.approx(rest, rel=0.02)
 
 
-def test_the_gap_matters_most_and_the_models_check_is_small(spread):
+def test_the_gap_matters_most(spread):
     numbers = spread["numbers"]
     for law in common.LAWS:
         for case in common.CASES:
             ranks = {name: numbers[f"rank.{law}.{case}.{name}"] for name in uncertainty.INPUTS}
             assert min(ranks, key=ranks.get) == "gap_error"
             assert ranks["gap_error"] < -0.6
-    # the attraction pulls the pad nearer; with Strong-Troxel's law, two or three times as much
-    lowest, highest = (
-        {law: numbers[f"check.deformable_over_rigid_{end}.{law}"] for law in common.LAWS}
-        for end in ("lowest", "highest")
-    )
-    assert min(lowest.values()) > 0.0
-    assert highest["kaczmarek"] < 0.05
-    assert 1.5 * highest["kaczmarek"] < highest["strong_troxel"] < 0.1
 
 
 @pytest.mark.parametrize("name", ["participants", "uncertainty"])
