@@ -43,9 +43,7 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Statistics of the measurements, forces of both laws per participant and by finite elements,
-    verdict.
-    """
+    """Statistics of the measurements, forces of both laws and by finite elements, verdict."""
     forces = participant_forces()
     elements = {
         (model, case): hover_force(ridges, gap, voltage, "coarse" if quick else "medium")

@@ -43,59 +43,38 @@ PAPER = {
 
 ASSUMPTIONS = {
     "loads": "applied load over 10 mm: 0.1 to 1 N are 0.01 to 0.1 N/mm; alpha and beta hold for N/mm",
-    "fit": (
-        "(11) with r = ((9b) - (10)) / (10), fitted to ln r; standard errors are those of the fit alone; "
-        "what the mesh adds stands under mesh_fine (48 nodes per ridge against 24)"
-    ),
-    "paper": (
-        "the caption's order swapped, as only this fits the text; shares of 40 % and 15 % are the text's "
-        "'levels at around'"
-    ),
-    "runs": (
-        "Table 2, frictionless: load and voltage may then come in any order, and the voltage is there from "
-        "the start; without the air layer the attraction acts on nodes that the plate holds, so (10) is "
-        "evaluated on the state without voltage (tests compare both with runs that hold the load)"
-    ),
-    "edge of contact": (
-        "interpolated from the gap beyond it (evfem.contactedge); nodal sums are among the sensitivities"
-    ),
-    "phases": (
-        "forces averaged over a pad with a crest and one with a groove in the middle; each alone under "
-        "with_ridges.phase"
-    ),
-    "crest": (
-        "exponent 7 calibrated on Adams' ratio of ridge to gross area alone (0.40, 0.52, 0.585 at 0.1, 0.5,"
-        " 1 N; least misfit at 7.1). Fig. 11 does not enter, though what exponent 7 gives there had been "
-        "seen. Within 9 % from 0.2 N on, 15 % above at 0.1 N: the computed ratio grows more slowly than "
-        "Adams'"
-    ),
-    "area A_j": (
-        "current length projected on the plate; the other conventions are evaluated on the same states"
-    ),
+    "fit": "(11) with r = ((9b) - (10)) / (10), fitted to ln r; standard errors are those of the fit alone; "
+    "what the mesh adds stands under mesh_fine (48 nodes per ridge against 24)",
+    "paper": "the caption's order swapped, as only this fits the text; shares of 40 % and 15 % are the "
+    "text's 'levels at around'",
+    "runs": "Table 2, frictionless: load and voltage may then come in any order, and the voltage is there "
+    "from the start; without the air layer the attraction acts on nodes that the plate holds, so (10) is "
+    "evaluated on the state without voltage (tests compare both with runs that hold the load)",
+    "edge of contact": "interpolated from the gap beyond it (evfem.contactedge); nodal sums are among the "
+    "sensitivities",
+    "phases": "forces averaged over a pad with a crest and one with a groove in the middle; each alone under "
+    "with_ridges.phase",
+    "crest": "exponent 7 calibrated on Adams' ratio of ridge to gross area alone (0.40, 0.52, 0.585 at 0.1, "
+    "0.5, 1 N; least misfit at 7.1). Fig. 11 does not enter, though what exponent 7 gives there had been "
+    "seen. Within 9 % from 0.2 N on, 15 % above at 0.1 N: the computed ratio grows more slowly than Adams'",
+    "area A_j": "current length projected on the plate; the other conventions are evaluated on the same "
+    "states",
     "d_sc": "local thickness of the stratum corneum in the mesh: 0.38 mm at a crest, less in a groove",
     "(7) in panel b": "the paper does not say on which area: Adams' gross and ridge areas are both shown",
-    "agrees with the paper": (
-        "beta with ridges (0.49 for 0.49); the power law, which every load with ridges meets within 5 % and"
-        " without within 7 %; more air with ridges than without, and less under load"
-    ),
-    "does not agree": (
-        "with ridges alpha (0.24 for 0.17): at every load the air adds 1.4 to 1.5 times what the paper's "
-        "fit says, a share of 51 % for 40 % at 0.05 N/mm. Without ridges both (0.038 and 0.72 for 0.03 and "
-        "0.65): 1.5 to 1.8 times, 24 % for 15 %. Neither mesh nor friction changes that, and areas that "
-        "count the length of the walls move further away with ridges"
-    ),
-    "chosen after seeing the paper's numbers": (
-        "what brings them about; which of it the paper did cannot be told, and none is claimed. Half the "
-        "stiffness of all soft layers (nearly the same as twice the load, 5 mm of depth instead of 10) does"
-        " it for both pads at once: 0.033, 0.63 without ridges, -4 to +9 % over the loads; 0.22, 0.43 with "
-        "ridges, 0 to +17 %. A stratum corneum of 0.3 MPa: +14 to +27 % and -9 to +5 %. With ridges only: "
-        "nodal sums on 12 nodes per ridge (0.175, 0.48, share 42 %; -13 to +25 %), an error of the mesh; "
-        "flat crests (0.19, 0.42), which miss how Adams' ratio grows; Strong-Troxel (0.16, 0.52), which the"
-        " figure does not use"
-    ),
+    "agrees with the paper": "beta with ridges (0.49 for 0.49); the power law, which every load with ridges "
+    "meets within 5 % and without within 7 %; more air with ridges than without, and less under load",
+    "does not agree": "with ridges alpha (0.24 for 0.17): at every load the air adds 1.4 to 1.5 times what "
+    "the paper's fit says, a share of 51 % for 40 % at 0.05 N/mm. Without ridges both (0.038 and 0.72 for "
+    "0.03 and 0.65): 1.5 to 1.8 times, 24 % for 15 %. Neither mesh nor friction changes that, and areas that "
+    "count the length of the walls move further away with ridges",
+    "chosen after seeing the paper's numbers": "what brings them about; which of it the paper did cannot be "
+    "told, and none is claimed. Half the stiffness of all soft layers (nearly the same as twice the load, 5 "
+    "mm of depth instead of 10) does it for both pads at once: 0.033, 0.63 without ridges, -4 to +9 % over "
+    "the loads; 0.22, 0.43 with ridges, 0 to +17 %. A stratum corneum of 0.3 MPa: +14 to +27 % and -9 to +5 "
+    "%. With ridges only: nodal sums on 12 nodes per ridge (0.175, 0.48, share 42 %; -13 to +25 %), an error "
+    "of the mesh; flat crests (0.19, 0.42), which miss how Adams' ratio grows; Strong-Troxel (0.16, 0.52), "
+    "which the figure does not use",
 }
-
-
 #: crest exponent 7: calibrated, see `calibration.*` in the numbers
 TABLE_2_PAD = Pad(exponent=7.0)
 

@@ -1,6 +1,4 @@
-"""How Fig. 11 is drawn: the paper's two panels; in the full study calibration, mesh and
-sensitivities too.
-"""
+"""How Fig. 11 is drawn: the paper's panels; in the full study calibration, mesh and sensitivities too."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ LOAD_LABEL = "applied load $F_n$ (N/mm)"
 
 @dataclass(frozen=True)
 class Shown:
-    """What is drawn: answers per pad and per (variant, pad), labels of the variants, ratios of
-    areas.
-    """
+    """What is drawn: answers by pad and by (variant, pad), labels of the variants, ratios of areas."""
 
     loads: tuple[float, ...]
     answers: Mapping[str, Any]

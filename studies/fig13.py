@@ -62,9 +62,7 @@ class Instant:
         return self.position[self.frame.contact_status > 0]
 
     def near(self) -> Any:
-        """Which cells lie within 1 mm of the contact: by their middle and the nearest touching
-        node.
-        """
+        """Which cells lie, with their middle, within 1 mm of the nearest touching node."""
         middle = self.position[self.result.mesh.cells].mean(axis=1)
         distance = np.hypot(*(middle[:, None] - self.touching[None]).transpose(2, 0, 1))
         return distance.min(axis=1) <= NEAR

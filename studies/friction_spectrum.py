@@ -97,9 +97,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 
 def _strongest(frequency: Floats, found: Floats, line: int) -> float:
-    """Frequency (Hz) of the strongest wave shorter than four pitches: longer ones lift the whole
-    finger.
-    """
+    """Frequency (Hz) of the strongest wave below four pitches: longer ones lift the whole finger."""
     short = slice((line + 1) // 4, None)
     return float(frequency[short][np.argmax(found[short])])
 

@@ -79,9 +79,7 @@ def _needed() -> dict[str, list[Floats]]:
 
 
 def _farther(voltage: float, gap: float, measured: Floats) -> Floats:
-    """Additional gap (mm) at which the law gives the measured forces (mN), by bisection; negative
-    where the finger would have to be nearer.
-    """
+    """Additional gap (mm) at which the law gives the measured forces (mN); negative: nearer."""
     pads, layers = participant_pads(), table2_layers()
     low, high = np.full(measured.shape, -0.9 * gap), np.full(measured.shape, LARGEST_DISTANCE)
     for _ in range(HALVINGS):

@@ -108,9 +108,7 @@ def largest_voltage(table: Tables) -> float:
 
 
 def add_voltage(random: Draw, tables: Tables) -> None:
-    """A constant voltage, one along the way or over time, or the targets of the ramps, up and
-    down.
-    """
+    """A constant voltage, one along the way or over time, or the targets of the ramps."""
     if "electrostatics" not in tables:
         return
     table, ramps = tables["electrostatics"], [one for one in tables["motion"] if one["kind"] == "voltage"]

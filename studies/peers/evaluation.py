@@ -89,9 +89,7 @@ def numbers(runs: list[Run], cold: Mapping[str, Mapping[str, float]]) -> dict[st
 
 
 def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
-    """Each peer's CPU seconds, memory and iterations over evfem's, and the fastest peer's CPU
-    seconds.
-    """
+    """CPU seconds, memory and iterations of each peer over evfem's, and CPU seconds of the fastest."""
     found: dict[str, float] = {}
     for own in (run for run in runs if run.package == "evfem"):
         place, fastest = f"{own.scene}.L{own.level}", []
@@ -110,9 +108,7 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
 
 
 def agreement(runs: list[Run]) -> dict[str, float]:
-    """How far apart packages are that use the same element: the largest range of a force over its
-    mean, %.
-    """
+    """Largest range of a force over its mean, in %, of packages that use the same element."""
     found: dict[str, float] = {}
     for scene, level, element in dict.fromkeys((run.scene, run.level, run.element) for run in runs):
         same = [r.forces for r in runs if (r.scene, r.level, r.element) == (scene, level, element)]
@@ -169,9 +165,7 @@ def named(key: str, costs: Mapping[str, float]) -> dict[str, float]:
 
 
 def cost_of(goal: float, curve: list[tuple[float, float]]) -> float | None:
-    """CPU seconds of an error on a curve of (CPU s, error %) from coarse to fine; None if it stays
-    above.
-    """
+    """CPU seconds of an error on a curve of (CPU s, error %), coarse to fine; None if it stays above."""
     before: tuple[float, float] | None = None
     for cpu, error in curve:
         if error <= goal:
@@ -197,9 +191,7 @@ def series(runs: list[Run]) -> list[Series]:
 
 
 def histories(runs: list[Run]) -> list[Series]:
-    """Every run's forces over its steps, so that other quantities can be read off without a new
-    run.
-    """
+    """Every run's forces over its steps: for other quantities without a new run."""
     found = []
     for run in runs:
         forces = np.array(run.measured["history"]).T

@@ -84,9 +84,7 @@ def scene_mesh(element: str, level: int) -> ev.Mesh:
 
 
 def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) -> None:
-    """The scene as a file of arrays for programs without evfem; `apart.Problem` says what is in
-    it.
-    """
+    """The scene as a file of arrays, those of `apart.Problem`, for programs without evfem."""
     mesh = scene_mesh(element, level)
     lame = np.empty((2, len(mesh.cells)))
     for name, law in MATERIALS.items():
@@ -116,9 +114,7 @@ def path(scene: str, way: Way = GIVEN) -> Floats:
 
 
 def quantities(scene: str, history: Any, way: Way = GIVEN) -> dict[str, float]:
-    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm; where
-    the steps of the `way` end there.
-    """
+    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm."""
     normal, tangential, electrostatic = np.asarray(history, dtype=float).T
     pressed = {d: place for d in (0.5, 1.0, 1.5) if (place := _end(way.press, d / 1.5)) is not None}
     found = {f"Fn_at_{d}": normal[place] for d, place in pressed.items()}

@@ -52,9 +52,7 @@ def tables(runs: list[Run], failed: Mapping[str, str], numbers: Mapping[str, flo
 
 
 def draw(runs: list[Run]) -> Figure:
-    """A panel for each scene with a reference; inside the grey band its uncertainty hides the
-    error.
-    """
+    """A panel for each scene with a reference, whose uncertainty is a grey band."""
     scenes = [scene for scene in JUDGED if any(run.scene == scene for run in runs)]
     figure = new_figure(4.2)
     curves = series(runs)

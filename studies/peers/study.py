@@ -114,9 +114,7 @@ def warm_up(
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """All runs, their numbers, table and figure; a package that is not installed is named and left
-    out.
-    """
+    """All runs, their numbers, tables and figure; a package that is not installed is named."""
     absent = missing()
     for name in absent:
         how = PACKAGES[name].install

@@ -154,9 +154,7 @@ class Peer:
         return int(result.iterations)
 
     def check(self, dx: Floats, f: Floats, ftol: float, **_: Any) -> tuple[float, float, bool]:
-        """FElupe's question whether an iteration has converged, answered as evfem does: the
-        largest free residual over the largest force on the bone.
-        """
+        """Whether an iteration has converged: largest free residual over the largest force on the bone."""
         bone = f.reshape(-1, 2)[self.bone].sum(axis=0)
         residual = np.abs(f[self.dof1]).max() / max(np.abs(bone).max(), SMALLEST_FORCE)
         return (
@@ -167,9 +165,7 @@ class Peer:
 
 
 def plane_strain(points: Floats, cells: Ints) -> Any:
-    """FElupe's displacement field on linear (2 x 2 points of integration) or quadratic quads (3 x
-    3).
-    """
+    """FElupe's displacement field on linear (2 x 2 points) or quadratic quads (3 x 3)."""
     region = fem.RegionQuad if cells.shape[1] == 4 else fem.RegionBiQuadraticQuad
     return fem.FieldPlaneStrain(region(fem.Mesh(points, cells, "quad")), dim=2)
 
@@ -181,9 +177,7 @@ def _mask(points: Floats, nodes: Ints, axis: int) -> Any:
 
 
 def solve(scene: str, element: str, level: int, way: Way = GIVEN) -> dict[str, Any]:
-    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations they
-    took.
-    """
+    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations."""
     peer = Peer(scene, element, level, way.tolerance)
     history, iterations = [], 0
     for position, indentation in path(scene, way):

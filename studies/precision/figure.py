@@ -1,6 +1,4 @@
-"""The picture of the study `work_precision`: a panel for each problem, one for growth, one for
-shares.
-"""
+"""The picture of `work_precision`: a panel for each problem, one for growth, one for shares."""
 
 from __future__ import annotations
 

@@ -142,9 +142,7 @@ def measured(level: int) -> dict[str, float]:
 
 
 def factorisation_s(model: Any, u: Any) -> float | None:
-    """CPU seconds of one numerical LDL^T factorisation of the tangent, the least of five; None
-    without PARDISO.
-    """
+    """CPU seconds of an LDL^T factorisation of the tangent, the least of five; None without PARDISO."""
     if not find_spec("pypardiso"):
         return None
     import scipy.sparse as sparse

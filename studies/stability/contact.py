@@ -1,6 +1,4 @@
-"""Cases of contact and friction: reversals, jumps, texture, deep and light contact, steps too
-large.
-"""
+"""Cases of contact and friction: reversals, jumps, texture, deep and light, steps too large."""
 
 from __future__ import annotations
 
@@ -143,9 +141,7 @@ def _slides_over(log: Log, asked: Scene, mu: float, finer: Scene | None = None) 
 
 
 def _gained(result: Result) -> float:
-    """Energy that is there and was not given, over the largest work: what the quadrature of the works
-    misses where nodes land and leave within a step.
-    """
+    """Energy that was not given, over the largest work: an error of the quadrature of the works."""
     balance = (
         result.external_work - result.stored_energy - result.friction_dissipation
         - result.viscous_dissipation - result.kinetic_energy

@@ -109,9 +109,7 @@ def _snap(result: ev.Result) -> tuple[float, float]:
 
 
 def _plate(log: Log, law: str) -> Verdict:
-    """Ramps around the formula: the bracket must hold it, the deviation fall with travel over
-    thickness.
-    """
+    """Ramps around the formula: it lies between them, the nearer the thicker the layer."""
     deviations = []
     for thickness, reach, steps in ((1.0, 0.02, 40), (10.0, 0.002, 40)):
         plate = Plate(LAWS[law], thickness)

@@ -1,6 +1,4 @@
-"""The same answer: twice, in a mirror, in other units, with other numbers of nodes, and in other
-steps.
-"""
+"""The same answer: twice, in a mirror, other units, other numbers of nodes, other steps."""
 
 from __future__ import annotations
 

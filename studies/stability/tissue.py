@@ -1,6 +1,4 @@
-"""Cases of the tissue: incompressible and unequal layers, and meshes of the user's own, good and
-bad.
-"""
+"""Cases of the tissue: incompressible and unequal layers, meshes good and bad."""
 
 from __future__ import annotations
 
