@@ -28,21 +28,24 @@ def draw(
     """Panels: load over depth, areas over the load, variants, widths, hovering forces of two laws."""
     figure, axes = panels(6.4, 3, 9.5, rows=2)
     named = {one.name: one for one in series}
-    _depth(axes[0], named)
+    _curves(axes[0], named, "", " depth_mm")
+    axes[0].set(xlabel="depth (mm)", ylabel="load (N)", xlim=(0, None))
     _areas(axes[1], named)
     _variants(axes[2], changed, float(area_law("gross")(0.5)))
-    _widths(axes[3], named)
+    _curves(axes[3], named, "width ", "")
+    axes[3].set(xlabel="load (N)", ylabel="width of the cross-section (mm)")
     for ax, law in zip(axes[4:], ("kaczmarek", "strong_troxel"), strict=True):
         _hover(ax, law, forces)
     return figure
 
 
-def _depth(ax: Axes, named: Mapping[str, Series]) -> None:
+def _curves(ax: Axes, named: Mapping[str, Series], before: str, after: str) -> None:
+    """The curve of each pad."""
     for pad, (colour, marker) in PADS.items():
-        if f"{pad} depth_mm" in named:
-            one = named[f"{pad} depth_mm"]
-            ax.plot(one.y, one.x, marker=marker, color=colour, label=pad, **LINES[pad])
-    ax.set(xlabel="depth (mm)", ylabel="load (N)", xlim=(0, None), ylim=(0, None))
+        if one := named.get(f"{before}{pad}{after}"):
+            x, y = (one.y, one.x) if after else (one.x, one.y)
+            ax.plot(x, y, marker=marker, color=colour, label=pad, **LINES[pad])
+    ax.set_ylim(bottom=0)
     ax.legend(fontsize="small")
 
 
@@ -73,15 +76,6 @@ def _variants(ax: Axes, changed: Mapping[str, Mapping[str, float]], wanted: floa
     ax.axvline(100.0 * (wanted / base - 1.0), color=COLOURS["measured"], linestyle="--")
     ax.tick_params(axis="y", labelsize="x-small")
     ax.set_xlabel("change of the area at 0.5 N (%);\ndashed: as Adams", fontsize="small")
-
-
-def _widths(ax: Axes, named: Mapping[str, Series]) -> None:
-    for pad, (colour, marker) in PADS.items():
-        if f"width {pad}" in named:
-            one = named[f"width {pad}"]
-            ax.plot(one.x, one.y, marker=marker, color=colour, label=pad, **LINES[pad])
-    ax.set(xlabel="load (N)", ylabel="width of the cross-section (mm)", ylim=(0, None))
-    ax.legend(fontsize="small")
 
 
 def _hover(ax: Axes, law: str, forces: Mapping[tuple[str, str, str], Floats]) -> None:

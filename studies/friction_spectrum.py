@@ -46,19 +46,12 @@ def surface() -> ev.SelfAffine:
 def slid(ridges: bool, speed: float, steps: int) -> Floats:
     """Tangential over normal force in each step of one period of the surface (steps,)."""
     before = max(2, round(steps * RUN_IN / PERIOD / 4.0))
-    scene = ev.Scene(
-        ev.FingerPad(ridges=ridges, ridge_width=PITCH, resolution="coarse", viscosity=1e-3),
-        surface(),
-        motion=[
-            ev.Press(force=0.05, steps=2),
-            ev.Slide(RUN_IN, steps=before, speed=speed, hold="force"),
-            ev.Slide(PERIOD, steps=steps, speed=speed, hold="force"),
-        ],
-        solver=ev.Solver(dynamics="viscous"),
-        output=ev.Output(every=100_000),
-        name="friction_spectrum",
-    )
-    result = ev.simulate(scene)
+    finger = ev.FingerPad(ridges=ridges, ridge_width=PITCH, resolution="coarse", viscosity=1e-3)
+    motion = [ev.Press(force=0.05, steps=2)]
+    for distance, count in ((RUN_IN, before), (PERIOD, steps)):
+        motion.append(ev.Slide(distance, steps=count, speed=speed, hold="force"))
+    how = {"solver": ev.Solver(dynamics="viscous"), "output": ev.Output(every=100_000)}
+    result = ev.simulate(ev.Scene(finger, surface(), motion=motion, **how))
     return np.asarray((result.tangential_force / result.normal_force)[-steps:])
 
 

@@ -43,11 +43,8 @@ def _reversals(log: Log, mu: float, ridges: bool) -> Verdict:
 
 
 for _mu in (0.0, 0.3, 1.0, 2.0):
-    FRICTION.case(
-        f"reversals mu {_mu:g}",
-        "full slip at the end of every leg: F_t = +mu, -mu, +mu F_n",
-        quick=_mu == 0.3,
-    )(partial(_reversals, mu=_mu, ridges=False))
+    _full = "full slip at the end of every leg: F_t = +mu, -mu, +mu F_n"
+    FRICTION.case(f"reversals mu {_mu:g}", _full, _mu == 0.3)(partial(_reversals, mu=_mu, ridges=False))
 FRICTION.case("ridges that fold", "mu = 1.5 drags ridges over and back: F_t = +mu, -mu, +mu F_n")(
     partial(_reversals, mu=1.5, ridges=True)
 )
@@ -103,9 +100,8 @@ def _stop_and_go(log: Log) -> Verdict:
 
 @FRICTION.case("20 mm", "full slip lasts: F_t = 0.3 F_n and the same F_n from 6 to 20 mm")
 def _far(log: Log) -> Verdict:
-    result = log.simulate(
-        scene(pad(True), Flat(friction=0.3), Press(force=0.1, steps=5), Slide(20.0, steps=80))
-    )
+    motion = Press(force=0.1, steps=5), Slide(20.0, steps=80)
+    result = log.simulate(scene(pad(True), Flat(friction=0.3), *motion))
     later = result.position > 6.0
     off = float(np.abs(result.tangential_force[later] / result.normal_force[later] - 0.3).max())
     spread = float(np.ptp(result.normal_force[later]) / result.normal_force[-1])
@@ -142,11 +138,8 @@ def _slides_over(log: Log, asked: Scene, mu: float, finer: Scene | None = None) 
 
 def _gained(result: Result) -> float:
     """Energy that was not given, over the largest work: an error of the quadrature of the works."""
-    balance = (
-        result.external_work - result.stored_energy - result.friction_dissipation
-        - result.viscous_dissipation - result.kinetic_energy
-    )  # fmt: skip
-    return float(-balance.min() / result.external_work.max())
+    kept = result.stored_energy + result.friction_dissipation + result.viscous_dissipation
+    return float((kept + result.kinetic_energy - result.external_work).max() / result.external_work.max())
 
 
 def grating(pitch: float = 1.0, height: float = 0.1, wall: float = 0.02) -> Profile:
