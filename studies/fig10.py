@@ -52,11 +52,5 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     verdict["verdict.largest_deviation_from_print_percent"] = 100.0 * float(np.max(worst))
     series = hover.curves(_force, THICKNESS, quick)
     names = {key: f"$d^{{sc}}$ = {d} mm" for key, d in THICKNESS.items()}
-    return Study(
-        "fig10",
-        numbers | verdict,
-        PAPER,
-        ASSUMPTIONS,
-        series,
-        lambda: hover.draw(series, THICKNESS, names, 9.0),
-    ).finish(out, quick)
+    picture = lambda: hover.draw(series, THICKNESS, names, 9.0)  # noqa: E731
+    return Study("fig10", numbers | verdict, PAPER, ASSUMPTIONS, series, picture).finish(out, quick)

@@ -86,9 +86,8 @@ def instants(case: Case) -> dict[str, Instant]:
     assert isinstance(slide, ev.Slide)
     short = replace(slide, distance=slide.distance * number / slide.steps, steps=number)
     scene = replace(reference.scene, motion=(press, short), output=ev.Output(every=1_000_000))
-    display = replay(
-        replace(reference, scene=scene), ev.Display(friction=friction), ev.Kaczmarek(), signal.profile
-    )
+    short_reference, surface = replace(reference, scene=scene), ev.Display(friction=friction)
+    display = replay(short_reference, surface, ev.Kaczmarek(), signal.profile)
     step = press.steps + number
     return {"reference": _instant(reference, step), "display": _instant(display, step)}
 
@@ -126,9 +125,8 @@ def _series(found: dict[str, Instant]) -> list[Series]:
         order = np.argsort(instant.touching[:, 0])
         x = instant.touching[order, 0]
         for quantity in ("contact_pressure", "shear_traction"):
-            series.append(
-                Series(f"{name}.{quantity}", x, getattr(instant.frame, quantity)[touching][order], "MPa")
-            )
+            y = getattr(instant.frame, quantity)[touching][order]
+            series.append(Series(f"{name}.{quantity}", x, y, "MPa"))
     return series
 
 

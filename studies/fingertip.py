@@ -44,10 +44,8 @@ LOAD = 0.5
 WAY = (0.1, 0.25, LOAD)
 ASSUMPTIONS = {
     "pad": "Table 2's axes and moduli; 22.5 mm long (26 mm seen at 30 degrees); the bone's axes are assumed",
-    "areas": (
-        "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is larger "
-        "than the hull of the touching nodes; ridge (and smooth pads): all that touches"
-    ),
+    "areas": "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is "
+    "larger than the hull of the touching nodes; ridge (and smooth pads): all that touches",
     "press": "no friction, no voltage, rim held by the nail; one variant has friction 0.3",
     "hover": "rigid, local thickness of the stratum corneum; fingers of Table 1 as Fingertip.participant",
     "ridges": "twelve cells across each; the error of the mesh is that of six",
@@ -140,13 +138,11 @@ def variants(quick: bool) -> dict[str, dict[str, float]]:
     for name, own in chosen.items():
         friction = 0.3 if name.startswith("friction") else 0.0
         found[name] = press(tip(**own), loads, friction, steps=3 if friction else 1)
+    unchanged = found["smooth"].real_contact_area[-1]
+    ends = {name: (one.indentation[-1], one.real_contact_area[-1]) for name, one in found.items()}
     return {
-        name: {
-            "depth_mm": float(one.indentation[-1]),
-            "area_mm2": float(one.real_contact_area[-1]),
-            "area_over_unchanged": float(one.real_contact_area[-1] / found["smooth"].real_contact_area[-1]),
-        }
-        for name, one in found.items()
+        name: {"depth_mm": depth, "area_mm2": area, "area_over_unchanged": area / unchanged}
+        for name, (depth, area) in ends.items()
     }
 
 

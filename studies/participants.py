@@ -21,7 +21,7 @@ import numpy as np
 import evfem as ev
 from evfem.electrostatics.forces import pad_force, pad_force_per_depth
 
-from .common import CASES, LAWS, Floats, Study, by_participant, participants, table2_layers
+from .common import CASES, LAWS, Floats, Study, by_participant, paper_display, participants, table2_layers
 from .measured import participant_forces, participant_pads
 from .plots import COLOURS, LABELS, Figure, panels
 
@@ -31,6 +31,8 @@ ASSUMPTIONS = {
     "voltages": "HV = 2000 V, LV = 1414 V",
     "mesh": "coarse, 0.2 % below medium with Kaczmarek's law; quick: the first three participants",
 }
+
+DASH = {"marker": "_", "markersize": 11, "markeredgewidth": 1.6}
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
@@ -60,19 +62,8 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 
 def plan(names: list[str]) -> ev.Sweep:
     """The sweep: a coarse finger of Table 2 hovering over its display."""
-    values = ev.data.load("table2")
-    scene = {
-        "version": 1,
-        "finger": {"resolution": "coarse"},
-        "surface": {"kind": "flat", "friction": values.value("mu")},
-        "electrostatics": {
-            "law": "kaczmarek",
-            "voltage": 2000.0,
-            "insulator_thickness": values.value("d_i"),
-            "insulator_eps_r": values.value("eps_i"),
-        },
-        "motion": [{"kind": "hover", "gap": 0.25}],
-    }
+    display, hover = paper_display(ev.data.load("table2").value("mu")), ev.Hover(gap=0.25)
+    scene = ev.Scene(ev.FingerPad(resolution="coarse"), display, ev.Kaczmarek(), 2000.0, [hover])
     cases = {
         case: {"electrostatics.voltage": voltage, "motion.0.gap": gap}
         for case, (voltage, gap) in CASES.items()
@@ -117,23 +108,13 @@ def _draw(names: list[str], forces: dict[Any, Floats], closed: dict[Any, Floats]
         ax.plot(place, measured, "D", color=COLOURS["measured"], markersize=5, label="measured")
         for law, shift in (("kaczmarek", -0.14), ("strong_troxel", 0.14)):
             style = {"color": COLOURS[law], "linestyle": ""}
-            ax.plot(
-                place + shift,
-                forces[law, case],
-                marker="o",
-                markersize=5,
-                **style,
-                label=f"{LABELS[law]}, finite elements",
+            kinds = (
+                ("finite elements", forces, {"marker": "o", "markersize": 5}),
+                ("closed form", closed, DASH),
             )
-            ax.plot(
-                place + shift,
-                closed[law, case],
-                marker="_",
-                markersize=11,
-                markeredgewidth=1.6,
-                **style,
-                label=f"{LABELS[law]}, closed form",
-            )
+            for kind, found, mark in kinds:
+                label = f"{LABELS[law]}, {kind}"
+                ax.plot(place + shift, found[law, case], label=label, **style, **mark)
         ax.set(ylabel="force (mN)", ylim=(0, None))
         ax.set_title(f"{case}: {voltage:g} V, {gap:.2f} mm", fontsize="medium")
         ax.grid(axis="y", linewidth=0.4, alpha=0.5)

@@ -34,15 +34,9 @@ class Pad:
     def finger(self) -> ev.FingerPad:
         """The pad with these values, else Table 2."""
         soft = tissue(self.stiffness, stratum_corneum=self.stratum_corneum_E)
-        return ev.FingerPad(
-            ridges=self.ridges,
-            ridge_phase=self.phase,
-            ridge_exponent=self.exponent,
-            ridge_crest=self.crest,
-            ridge_groove=self.groove,
-            resolution=self.resolution,
-            materials=soft,
-        )
+        shape = {name: getattr(self, name) for name in ("phase", "exponent", "crest", "groove")}
+        ridge = {f"ridge_{name}": value for name, value in shape.items()}
+        return ev.FingerPad(ridges=self.ridges, resolution=self.resolution, materials=soft, **ridge)
 
 
 @dataclass(frozen=True)

@@ -133,8 +133,7 @@ def reference_of(case: Case) -> Recording:
 
 
 def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tuple[float, float]:
-    """Smallest apparent friction of the reference after full slip, and the friction of the
-    display.
+    """Smallest apparent friction of the reference after full slip, and friction of the display.
 
     On the step the display has the coefficient before it; on texture the smallest apparent
     friction, or a fifth of the texture's own coefficient if that is larger (a negative one cannot
@@ -171,18 +170,8 @@ def render(case: Case) -> Outcome:
         rendered[kind] = _rendered(reference, found, full_slip)
         costs |= {f"{kind}_{name}": value for name, value in _costs(found).items()}
     costs["cpu_s"] = time.process_time() - begin
-    return Outcome(
-        case,
-        felt.position[1:],
-        felt.normal_force[1:],
-        felt.tangential_force[1:],
-        full_slip,
-        lowest,
-        friction,
-        signal,
-        rendered,
-        costs,
-    )
+    position, load, force = (x[1:] for x in (felt.position, felt.normal_force, felt.tangential_force))
+    return Outcome(case, position, load, force, full_slip, lowest, friction, signal, rendered, costs)
 
 
 def _replayed(kind: str, case: Case, reference: Recording, friction: float, signal: Signal) -> Recording:
@@ -198,15 +187,8 @@ def _replayed(kind: str, case: Case, reference: Recording, friction: float, sign
 def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:
     fidelity, felt = compare(reference.result, found.result), apparent_friction(found.result)
     slide = found.result.motion == "slide"
-    return Rendered(
-        felt.tangential_force[1:],
-        felt.normal_force[1:],
-        found.result.voltage[slide],
-        fidelity.pearson,
-        fidelity.relative_l2,
-        fidelity.largest_error,
-        felt.minimum(after=full_slip),
-    )
+    judged = fidelity.pearson, fidelity.relative_l2, fidelity.largest_error, felt.minimum(after=full_slip)
+    return Rendered(felt.tangential_force[1:], felt.normal_force[1:], found.result.voltage[slide], *judged)
 
 
 def _costs(found: Recording) -> dict[str, float]:

@@ -7,8 +7,7 @@ from __future__ import annotations
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 
-from .draws import Draw, six_digits
-from .tables import Tables
+from .tables import Draw, Tables, six_digits
 
 LARGEST_FIELD = 60e3  # V/mm
 LARGEST_VOLTAGE = 3000.0

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .draws import Draw, six_digits
-from .tables import Tables
+from .tables import Draw, Tables, six_digits
 
 TABLE_2_WIDTH = 16.68
 #: layers of the pad: default thickness (mm) and modulus (MPa) of Table 2

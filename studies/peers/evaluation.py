@@ -25,16 +25,8 @@ CONTENDERS = tuple(
     who for own, its in ELEMENTS.items() for who in (("evfem", own), *((peer, its) for peer in PEERS))
 )
 #: what is measured of a run
-MEASURED = (
-    "cpu_s",
-    "slowest_cpu_s",
-    "wall_s",
-    "process_cpu_s",
-    "iterations",
-    "factorisations",
-    "imported_MB",
-    "peak_MB",
-)
+MEASURED = ("cpu_s", "slowest_cpu_s", "wall_s", "process_cpu_s", "iterations", "factorisations")
+MEASURED += ("imported_MB", "peak_MB")
 #: errors at which the fastest run is looked for, %
 GOALS = (1.0, 0.3, 0.1)
 #: what a scene is judged by there: the beginning of the names of its forces
@@ -93,10 +85,11 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
     found: dict[str, float] = {}
     for own in (run for run in runs if run.package == "evfem"):
         place, fastest = f"{own.scene}.L{own.level}", []
-        for run in runs:
-            same = (run.scene, run.level, run.element) == (own.scene, own.level, ELEMENTS[own.element])
-            if run.package == "evfem" or not same:
-                continue
+        place_of, others = (
+            (own.scene, own.level, ELEMENTS[own.element]),
+            [r for r in runs if r.package in PEERS],
+        )
+        for run in (r for r in others if (r.scene, r.level, r.element) == place_of):
             for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):
                 ratio = run.measured[name] / own.measured[name]
                 found[f"{place}.{run.package}_over_evfem.{own.element}.{name}"] = ratio
@@ -187,14 +180,4 @@ def series(runs: list[Run]) -> list[Series]:
             if mine:
                 x, y = [r.measured["cpu_s"] for r in mine], [r.error() for r in mine]
                 found.append(Series(f"{scene} {package} {element}", x, y, "% over CPU s"))
-    return found
-
-
-def histories(runs: list[Run]) -> list[Series]:
-    """Every run's forces over its steps: for other quantities without a new run."""
-    found = []
-    for run in runs:
-        forces = np.array(run.measured["history"]).T
-        for name, force in zip(("normal", "tangential", "electrostatic"), forces, strict=True):
-            found.append(Series(f"{run.key} {name}", np.arange(1, force.size + 1), force, "N/mm over step"))
     return found

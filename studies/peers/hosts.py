@@ -94,8 +94,8 @@ def run_once(
             write(problem, scene, element, level, way)
             words = [python, str(Path(__file__).with_name(PACKAGES[package].script)), str(problem)]
         else:
-            module = f"{__package__}.run"
-            words = [python, "-P", "-m", module, package, element, scene, str(level), way.words]
+            given = [level, way.press, way.slide, way.tolerance]
+            words = [python, "-P", "-m", f"{__package__}.run", package, element, scene, *map(str, given)]
         done = subprocess.run(words, env=variables, capture_output=True, text=True)
     if done.returncode:
         return {"failed": (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]}

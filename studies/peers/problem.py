@@ -19,7 +19,6 @@ from evfem.common.arrays import Floats
 
 from ..benchmark import benchmark_mesh
 
-SCENES = ("A", "B", "C")
 MATERIALS = {"tissue": ev.NeoHookean(E=0.05, nu=0.48), "skin": ev.NeoHookean(E=1.0, nu=0.30)}
 PLANE = -6.395  # height of the rigid surface, mm
 FRICTION = {"A": 0.0, "B": 0.3, "C": 0.0}
@@ -44,33 +43,15 @@ class Way:
     def __str__(self) -> str:
         return f"{self.press}+{self.slide}"
 
-    @classmethod
-    def of(cls, words: str) -> Way:
-        """From `words`."""
-        press, slide, tolerance = words.split(",")
-        return cls(int(press), int(slide), float(tolerance))
-
-    @property
-    def words(self) -> str:
-        """As an argument of a command."""
-        return f"{self.press},{self.slide},{self.tolerance:g}"
-
 
 #: as the comparison on the same nodes has it
 GIVEN = Way()
 #: what was converged with exact contact and quadratic elements of two packages that agree, N/mm
 REFERENCE: Mapping[str, Mapping[str, float]] = {
     "A": {"Fn_at_0.5": 0.07098, "Fn_at_1.0": 0.24112, "Fn_at_1.5": 0.54337},
-    "B": {
-        "Fn_at_0.5": 0.0721,
-        "Fn_at_1.0": 0.2556,
-        "Fn_at_1.5": 0.6017,
-        "Ft_after_0.1": 0.00687,
-        "Ft_after_0.5": 0.03364,
-        "Ft_after_3.0": 0.1564,
-        "Fn_after_3.0": 0.5214,
-        "Ft_mean_2_to_3": 0.1473,
-    },
+    "B": {"Fn_at_0.5": 0.0721, "Fn_at_1.0": 0.2556, "Fn_at_1.5": 0.6017}
+    | {"Ft_after_0.1": 0.00687, "Ft_after_0.5": 0.03364, "Ft_after_3.0": 0.1564}
+    | {"Fn_after_3.0": 0.5214, "Ft_mean_2_to_3": 0.1473},
     "C": {},
 }
 #: its uncertainty: the largest of a scene's values, %
@@ -89,21 +70,11 @@ def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) 
     lame = np.empty((2, len(mesh.cells)))
     for name, law in MATERIALS.items():
         lame[:, mesh.cells_of(name)] = np.array([[law.mu], [law.lmbda]])
-    np.savez(
-        target,
-        points=mesh.points,
-        cells=mesh.cells,
-        mu=lame[0],
-        lmbda=lame[1],
-        pad=mesh.node_sets["pad"],
-        bone=mesh.node_sets["bone"],
-        path=path(scene, way),
-        plane=PLANE,
-        friction=FRICTION[scene],
-        pull=0.5 * ev.eps_0 * VOLTAGE[scene] ** 2,
-        layers=np.array([LAYERS.reduced, LAYERS.thickness]),
-        tolerance=way.tolerance,
-    )
+    arrays: dict[str, Any] = {name: mesh.node_sets[name] for name in ("pad", "bone")}
+    arrays |= {"points": mesh.points, "cells": mesh.cells, "mu": lame[0], "lmbda": lame[1]}
+    arrays |= {"path": path(scene, way), "plane": PLANE, "friction": FRICTION[scene]}
+    arrays |= {"pull": 0.5 * ev.eps_0 * VOLTAGE[scene] ** 2, "tolerance": way.tolerance}
+    np.savez(target, layers=np.array([LAYERS.reduced, LAYERS.thickness]), **arrays)
 
 
 def path(scene: str, way: Way = GIVEN) -> Floats:

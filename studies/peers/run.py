@@ -1,5 +1,5 @@
 """One measured run of the press-and-slide benchmark:
-`python -m evfem.studies.peers.run evfem q1 A 1 15,30,1e-8`.
+`python -m evfem.studies.peers.run evfem q1 A 1 15 30 1e-8`.
 
 Prints a line of JSON: forces after every step, iterations, CPU and wall seconds from the mesh to
 the last step without the imports, CPU seconds of the whole process, resident memory (MB) after the
@@ -63,4 +63,5 @@ def run(package: str, element: str, scene: str, level: int, way: Way = GIVEN) ->
 
 
 if __name__ == "__main__":
-    print(json.dumps(run(*sys.argv[1:4], int(sys.argv[4]), Way.of(sys.argv[5]))))
+    level, press, slide = map(int, sys.argv[4:7])
+    print(json.dumps(run(*sys.argv[1:4], level, Way(press, slide, float(sys.argv[7])))))

@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from ..common import Study
-from .evaluation import CONTENDERS, FEWER, Run, histories, numbers, race, series
+from .evaluation import CONTENDERS, FEWER, Run, numbers, race, series
 from .hosts import PACKAGES, missing, run_once
 from .problem import GIVEN, TOLERANCE, Way
 from .shown import draw, tables
@@ -129,7 +129,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             runs, failed = runs + more, failed | lost
     said = {"missing": absent, "failed": failed, "peers": versions(runs)}
     found = numbers(runs, cold) | ({} if quick else race(runs))
-    curves, shown = series(runs) + histories(runs), tables(runs, failed, found)
+    curves, shown = series(runs), tables(runs, failed, found)
     study = Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs), tables=shown)
     return study.finish(out, quick)
 

@@ -138,18 +138,10 @@ class Peer:
         """Move the bone and find the equilibrium; the number of iterations."""
         for boundary, value in zip(self.held, (position, -indentation), strict=True):
             boundary.update(value)
-        result = fem.newtonraphson(
-            x0=self.field,
-            items=self.items,
-            dof0=self.dof0,
-            dof1=self.dof1,
-            ext0=fem.dof.apply(self.field, self.bounds, self.dof0),
-            solver=self.solver,
-            check=self.check,
-            tol=self.tolerance,
-            maxiter=MOST_ITERATIONS,
-            verbose=0,
-        )
+        known = fem.dof.apply(self.field, self.bounds, self.dof0)
+        how = {"check": self.check, "tol": self.tolerance, "maxiter": MOST_ITERATIONS, "verbose": 0}
+        free = {"dof0": self.dof0, "dof1": self.dof1, "ext0": known, "solver": self.solver}
+        result = fem.newtonraphson(x0=self.field, items=self.items, **free, **how)
         self.contact.state.keep()
         return int(result.iterations)
 
@@ -157,11 +149,8 @@ class Peer:
         """Whether an iteration has converged: largest free residual over the largest force on the bone."""
         bone = f.reshape(-1, 2)[self.bone].sum(axis=0)
         residual = np.abs(f[self.dof1]).max() / max(np.abs(bone).max(), SMALLEST_FORCE)
-        return (
-            float(np.linalg.norm(dx)),
-            float(residual),
-            bool(residual <= ftol and not self.contact.state.turning.any()),
-        )
+        done = bool(residual <= ftol and not self.contact.state.turning.any())
+        return float(np.linalg.norm(dx)), float(residual), done
 
 
 def plane_strain(points: Floats, cells: Ints) -> Any:

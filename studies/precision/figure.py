@@ -31,9 +31,8 @@ POINTS = {
 }
 STEPS = "Q2-P1 on L0, steps 0.3 to 0.025 mm, against their limit"
 #: part of a step -> colour
-PART_COLOURS = dict(
-    zip(PARTS, ("#0072B2", "#E69F00", "#009E73", "#B04A85", "#56B4E9", "#BBBBBB"), strict=True)
-)
+HUES = ("#0072B2", "#E69F00", "#009E73", "#B04A85", "#56B4E9", "#BBBBBB")
+PART_COLOURS = dict(zip(PARTS, HUES, strict=True))
 SMALLEST = 1e-4  # %, below which no error is drawn
 
 
@@ -60,14 +59,8 @@ def draw(
     found: dict[str, object] = {}
     for ax in axes[: len(shown)]:
         found |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(
-        list(found.values()),
-        list(found),
-        loc="outside lower center",
-        ncols=4,
-        fontsize="small",
-        frameon=False,
-    )
+    place = {"loc": "outside lower center", "ncols": 4, "fontsize": "small", "frameon": False}
+    figure.legend(list(found.values()), list(found), **place)
     return figure
 
 
@@ -84,10 +77,8 @@ def _problem(ax: Axes, title: str, curves: Sequence[Series], uncertain: float) -
             ax.plot(curve.x, y, linestyle="", color="black", marker=marker, markersize=7, label=label)
         elif variant == "steps":
             ax.plot(curve.x, y, ":", color="black", marker=".", label=STEPS)
-    ax.axhspan(
-        SMALLEST, max(uncertain, SMALLEST), color=COLOURS["neutral"], alpha=0.15, linewidth=0.0,
-        label="reference uncertain",
-    )  # fmt: skip
+    look = {"color": COLOURS["neutral"], "alpha": 0.15, "linewidth": 0.0, "label": "reference uncertain"}
+    ax.axhspan(SMALLEST, max(uncertain, SMALLEST), **look)
     ax.set(xscale="log", yscale="log")
     drawn = [max(value, SMALLEST) for curve in curves for value in curve.y]
     ax.set_ylim(bottom=0.4 * min([uncertain, *drawn]))
@@ -102,10 +93,8 @@ def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> No
         ("slide_s", "slide step, CPU s", COLOURS["strong_troxel"], "s"),
     ):
         power = numbers[f"growth.exponent.{name}"]
-        y = [getattr(one, name) for one in sizes]
-        ax.plot(
-            nodes, y, color=colour, marker=marker, markersize=4.5, label=f"{label} ~ nodes$^{{{power:.2f}}}$"
-        )
+        y, label = [getattr(one, name) for one in sizes], f"{label} ~ nodes$^{{{power:.2f}}}$"
+        ax.plot(nodes, y, color=colour, marker=marker, markersize=4.5, label=label)
     memory = [one.peak_MB / 1024.0 for one in sizes]
     ax.plot(nodes, memory, "--", color=COLOURS["fe"], marker="^", markersize=4.5, label="peak memory, GB")
     ax.set(xscale="log", yscale="log")
@@ -115,7 +104,7 @@ def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> No
 
 
 def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
-    names = [f"{phase.replace('_', ' ')}" for phase in PHASES]
+    names = [phase.replace("_", " ") for phase in PHASES]
     left = [0.0] * len(names)
     for part in PARTS:
         width = [100.0 * numbers[f"shares.{phase}.share.{part}"] for phase in PHASES]
@@ -124,9 +113,7 @@ def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
             if share > 9.0:
                 ax.text(start + 0.5 * share, place, f"{share:.0f}", ha="center", va="center", fontsize=7)
         left = [start + share for start, share in zip(left, width, strict=True)]
-    ax.set(xlim=(0.0, 100.0), ylim=(-0.5, len(names) + 0.6))
-    ax.invert_yaxis()
-    ax.set_ylim(len(names) - 0.5, -1.5)
+    ax.set(xlim=(0.0, 100.0), ylim=(len(names) - 0.5, -1.5))
     _titled(ax, f"a step's time, {numbers['shares.nodes']:,.0f} nodes", "share of CPU time (%)")
     ax.legend(ncols=3, fontsize="x-small", frameon=False, loc="upper center")
     ax.tick_params(labelsize="small")

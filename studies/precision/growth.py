@@ -51,13 +51,11 @@ class Clock:
     def __init__(self) -> None:
         self.at: list[float] = []
 
-    def started(self, *_: Any) -> None:
-        """The parts are built."""
+    def step(self, *_: Any) -> None:
+        """A step has converged, or the parts are built."""
         self.at.append(time.process_time())
 
-    def step(self, *_: Any) -> None:
-        """A step has converged."""
-        self.at.append(time.process_time())
+    started = step
 
 
 def measure_alone(divisions: tuple[int, int, int]) -> Size:
@@ -141,11 +139,5 @@ def table(found: Mapping[str, float], sizes: list[Size]) -> list[str]:
         slide = f"{one.slide_s:.3g} ({one.slide_iterations:.1f})"
         rows.append([f"{one.nodes:,}", f"{one.setup_s:.3g}", press, slide, f"{one.peak_MB:.0f}"])
     powers = [found[f"growth.exponent.{name}"] for name in ("setup_s", "press_s", "slide_s", "memory")]
-    head = (
-        "nodes",
-        "set-up with first step: CPU s",
-        "press step: CPU s (iterations)",
-        "slide step",
-        "peak MB",
-    )
-    return markdown(head, [*rows, ["exponent", *(f"{power:.2f}" for power in powers)]])
+    head = ("nodes", "set-up with first step: CPU s", "press step: CPU s (iterations)", "slide step")
+    return markdown((*head, "peak MB"), [*rows, ["exponent", *(f"{power:.2f}" for power in powers)]])

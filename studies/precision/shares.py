@@ -18,9 +18,6 @@ from unittest.mock import patch
 
 import numpy as np
 
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene
-
 from ..common import markdown
 from .growth import Clock
 from .runs import warm_up
@@ -105,14 +102,7 @@ def measured(level: int) -> dict[str, float]:
     from evfem.simulation.run import Run
 
     begin = time.process_time()
-    usual = build(Case("B", level))
-    scene = Scene(
-        usual.finger,
-        usual.surface,
-        motion=[Press(indentation=1.5, steps=20), Slide(distance=3.0, steps=30)],
-        solver=usual.solver,
-        output=usual.output,
-    )
+    scene = build(Case("B", level, press=20))
     parts = Parts()
     with parts.watching():
         run = Run(scene, None)
@@ -124,10 +114,8 @@ def measured(level: int) -> dict[str, float]:
     model: Model = run.model
     cost = np.diff(parts.at)
     setup = parts.at[0] - begin
-    found = {
-        "nodes": float(len(model.mesh.points)),
-        "setup_share_of_a_20_step_press": setup / (setup + cost[:20].sum()),
-    }
+    found = {"nodes": float(len(model.mesh.points))}
+    found["setup_share_of_a_20_step_press"] = setup / (setup + cost[:20].sum())
     yardstick = factorisation_s(model, run.state.u)
     for phase, steps in PHASES.items():
         found[f"{phase}.step_s"] = float(cost[steps].mean())

@@ -56,13 +56,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         "Growth": growth.table(found, sizes),
         "A step at that many nodes": shares.table(found),
     }
-    study = Study(
-        "work_precision",
-        found,
-        {},
-        ASSUMPTIONS,
-        curves + growth.series(sizes),
-        lambda: draw(curves, known, sizes, found),
-        tables=tables,
-    )
+    picture = lambda: draw(curves, known, sizes, found)  # noqa: E731
+    series_of_all = curves + growth.series(sizes)
+    study = Study("work_precision", found, {}, ASSUMPTIONS, series_of_all, picture, tables=tables)
     return study.finish(out, quick)

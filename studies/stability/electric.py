@@ -73,9 +73,8 @@ class Plate:
         sides = np.flatnonzero(np.abs(mesh.points[:, 0]) > 0.499 * WIDTH)
         mesh = replace(mesh, node_sets={**mesh.node_sets, "sides": sides})
         body = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(E=E, nu=NU)}, SKIN)
-        whole = scene(
-            body, ev.Display(THIN_LAYER), ev.Hover(GAP), *motion, law=law or self.law, coupling=self.solver
-        )
+        how = {"law": law or self.law, "coupling": self.solver}
+        whole = scene(body, ev.Display(THIN_LAYER), ev.Hover(GAP), *motion, **how)
         return whole.with_term(rollers, on=ev.Boundary("sides"))
 
     @property
@@ -195,9 +194,8 @@ def _staggered(log: Log) -> Verdict:
 
 
 def _thin(log: Log, law: str, thickness: float) -> Verdict:
-    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact
-    width. Under Strong-Troxel's law that is more than the shear of the pad can overcome: it
-    sticks.
+    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width.
+    Under Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
     """
     display = ev.Display(ev.Layer(thickness, 3.35), friction=0.3)
     motion = ev.Press(force=0.05, steps=5), ev.Slide(3.0, steps=15)
@@ -284,9 +282,8 @@ def _full(log: Log) -> Verdict:
 def _alone(log: Log) -> Verdict:
     worst = 0.0
     for body in (finger(block(8, 3, sag=0.4)), pad()):
-        result = log.simulate(
-            scene(body, ev.Display(), ev.Press(force=0.0, steps=2), law=ev.Kaczmarek(), voltage=1000.0)
-        )
+        how = {"law": ev.Kaczmarek(), "voltage": 1000.0}
+        result = log.simulate(scene(body, ev.Display(), ev.Press(force=0.0, steps=2), **how))
         worst = max(worst, abs(float(result.normal_force[-1] / result.electrostatic_force[-1]) - 1.0))
         if result.indentation[-1] <= 0.0:
             return False, "not pulled in"
@@ -303,13 +300,8 @@ def _infinite(log: Log) -> Verdict:
         def traction(self, gap: Any, voltage: Any, layers: ev.Layers) -> Any:
             return voltage**2 * np.where(np.real(gap) > 0.0, 1e-12, np.inf) + 0.0 * gap
 
-    asked = scene(
-        finger(block(8, 3, sag=0.4)),
-        ev.Display(),
-        ev.Press(indentation=0.2, steps=2),
-        law=Broken(),
-        voltage=100.0,
-    )
+    body, press = finger(block(8, 3, sag=0.4)), ev.Press(indentation=0.2, steps=2)
+    asked = scene(body, ev.Display(), press, law=Broken(), voltage=100.0)
     try:
         message = str(log.stop(asked))
     except ev.InputError as error:

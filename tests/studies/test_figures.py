@@ -16,7 +16,9 @@ from evfem.errors import InputError, StorageError
 from evfem.reference import cylinder_force
 
 studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-common, laws = (importlib.import_module(f"{studies.__name__}.{name}") for name in ("common", "laws"))
+common, laws, plots = (
+    importlib.import_module(f"{studies.__name__}.{name}") for name in ("common", "laws", "plots")
+)
 CASES = ("HVHD", "HVLD", "LVLD")
 
 
@@ -145,12 +147,12 @@ def test_curves_of_a_study_as_csv():
 
 @pytest.mark.parametrize("quick", [True, False])
 def test_the_picture_of_a_quick_study_says_so_beside_everything_else(quick, tmp_path):
-    figure = common.new_figure(3.0, 4.0)
+    figure = plots.new_figure(3.0, 4.0)
     figure.add_subplot().set(xlabel="x", ylabel="y")
-    common.panel_letter(figure.axes[0], "a")
-    common.not_shown(figure, "measured points")
+    plots.panel_letter(figure.axes[0], "a")
+    plots.not_shown(figure, "measured points")
     common.Study("one", {}, {}, {}, [], lambda: figure).finish(tmp_path, quick)
-    notes = [text for text in figure.texts if text.get_text() == common.QUICK]
+    notes = [text for text in figure.texts if text.get_text() == plots.QUICK]
     assert len(notes) == int(quick)
     others = [*figure.axes, *(text for text in figure.texts if text not in notes)]
     for note in notes:
