@@ -3,14 +3,14 @@ checks.
 """
 
 import csv
-import importlib
-import importlib.util
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from evfem.studies.campaign import bodies, drawing, ending, invariants, run, study, tables
 
+from evfem import studies
 from evfem.common.pools import open_pool, processes
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
@@ -23,11 +23,6 @@ from evfem.simulation.run import simulate
 from evfem.tissue.elements import elements_on
 from evfem.tissue.laws import LAWS
 
-studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-NAMES = "bodies drawing ending invariants run study tables"
-bodies, drawing, ending, invariants, run, study, tables = (
-    importlib.import_module(f"{studies.__name__}.campaign.{name}") for name in NAMES.split(" ")
-)
 Ending = ending.Ending
 
 
@@ -60,33 +55,24 @@ def test_every_choice_of_a_scene_file_is_drawn(drawn):
 
     assert seen("surface", "kind") == set(SURFACES)
     assert seen("solver", "element") == {None, *elements_on(3), *elements_on(4)}
-    assert seen("solver", "dynamics") == {None, "viscous", "inertial"}
-    assert seen("solver", "contact") == {None, "penalty"}
-    assert {"strong_troxel", "kaczmarek"} < seen("electrostatics", "law")
-    assert {"staggered", "staggered_once"} < seen("electrostatics", "coupling")
-    assert {"normal"} < seen("electrostatics", "direction")
-    assert {"resolved"} < seen("electrostatics", "drive")
-    assert {"sine", "square"} < seen("electrostatics", "waveform")
-    assert set(SKINS) < seen("electrostatics", "skin")
-    assert {False} < seen("electrostatics", "air_layer")
-    assert set(INSULATORS) < seen("electrostatics", "insulator")
-    assert {True, False} <= seen("finger", "ridges")
-    assert set(bodies.MESHES) < seen("finger", "mesh")
-    assert {
-        one["electrostatics"]["signal"]["kind"] for one in drawn if "signal" in one.get("electrostatics", {})
-    } == (set(SIGNALS))
+    for name, key, choices in (
+        ("solver", "dynamics", ("viscous", "inertial")),
+        ("solver", "contact", ("penalty",)),
+        ("electrostatics", "law", ("strong_troxel", "kaczmarek")),
+        ("electrostatics", "coupling", ("staggered", "staggered_once")),
+        ("electrostatics", "waveform", ("sine", "square")),
+        ("electrostatics", "skin", SKINS),
+        ("electrostatics", "insulator", INSULATORS),
+        ("finger", "mesh", bodies.MESHES),
+    ):
+        assert seen(name, key) == {None, *choices}, key
+    signals = [one["electrostatics"].get("signal", {}) for one in drawn if "electrostatics" in one]
+    assert {signal.get("kind") for signal in signals} == {None, *SIGNALS}
     materials = [law for one in drawn for law in one["finger"].get("materials", {}).values()]
     assert {law.get("law") for law in materials} == {None, *LAWS}
     motions = [motion for one in drawn for motion in one["motion"]]
     assert {motion["kind"] for motion in motions} == set(MOTIONS)
     assert {motion.get("hold") for motion in motions} == {None, "force"}
-
-
-def test_friction_is_drawn_with_jumps_and_with_ramps_within_a_node_spacing(drawn):
-    rows = [one["surface"]["friction"] for one in drawn if isinstance(one["surface"]["friction"], list)]
-    widths = np.concatenate([np.diff(np.array(table)[:, 0]) for table in rows])
-    assert (widths == 0.0).any()  # jumps
-    assert ((widths > 0.0) & (widths < 0.02)).any()  # ramps within a node spacing
 
 
 #: what a drawn scene never says, and why
@@ -95,16 +81,11 @@ NEVER = {
     "electrostatics.voltage_file": "`with_files` writes it from a profile",
     "electrostatics.signal.file": "samples stand in the table",
     "electrostatics.signal.full_scale": "of a .wav alone",
-    "finger.ridge_pixel": "of the picture of a print alone",
-    "finger.ridge_dark": "of the picture of a print alone",
-    "electrostatics.electrodes": "a map of one's own: a mirror would have to know it",
+    "electrostatics.electrodes": "a map of one's own",
     "electrostatics.grounded": "false has no balance of the source to be checked by",
-    "finger.ridge_scan": "a measured outline, which no generator can draw",
     "solver.core": "off gives answers that depend on the way, a length changes what is asked for",
     "solver.strategy.relaxation": "switched off it leaves scenes without an end",
-}
-
-
+} | dict.fromkeys(("finger.ridge_pixel", "finger.ridge_dark", "finger.ridge_scan"), "of a print alone")
 #: keys that the generator leaves to other tests
 LATER = ("friction_law", "depth")
 
@@ -149,12 +130,7 @@ SCENE = {
     "version": 1,
     "finger": {"resolution": "coarse", "ridges": False},
     "surface": {"kind": "flat", "friction": 0.4},
-    "electrostatics": {
-        "law": "kaczmarek",
-        "voltage": 800.0,
-        "insulator_thickness": 0.09,
-        "insulator_eps_r": 3.35,
-    },
+    "electrostatics": {"law": "kaczmarek", "voltage": 800.0, "insulator": "film"},
     "solver": {"element": "q1"},
     "motion": [
         {"kind": "press", "indentation": 0.6, "steps": 2},
@@ -222,21 +198,13 @@ def test_an_invariant_sees_what_breaks_it(correct, name):
     assert next(one.step for one in found if one.name == name) in (4, 5)
 
 
-def test_a_target_that_is_missed_is_seen(correct):
+def test_a_target_that_is_missed_and_attraction_without_voltage_are_seen(correct):
     scene, result = correct
-    other = result.indentation.copy()
-    other[:] += 1e-3
-    assert "targets" in [one.name for one in invariants.broken(scene, replace(result, indentation=other))]
-
-
-def test_attraction_without_voltage_is_seen(correct):
-    scene, result = correct
-    other = result.electrostatic_force.copy()
-    assert other[-1] == 0.0
-    other[-1] = 1e-12
-    assert "no attraction" in [
-        one.name for one in invariants.broken(scene, replace(result, electrostatic_force=other))
-    ]
+    deeper = replace(result, indentation=result.indentation + 1e-3)
+    assert "targets" in [one.name for one in invariants.broken(scene, deeper)]
+    assert result.voltage[-1] == result.electrostatic_force[-1] == 0.0
+    pulled = replace(result, electrostatic_force=result.electrostatic_force + 1e-12)
+    assert "no attraction" in [one.name for one in invariants.broken(scene, pulled)]
 
 
 def test_a_node_held_at_a_jump_of_friction_breaks_nothing():
@@ -247,13 +215,6 @@ def test_a_node_held_at_a_jump_of_friction_breaks_nothing():
     x = result.mesh.points[:, 0] + frame.displacement[:, 0]
     assert ((np.abs(x - 1.5) < invariants.NEAR) & (frame.contact_status == 1)).any()
     assert invariants.broken(scene, result) == []
-
-
-def test_the_remainder_of_the_books_is_what_no_column_has(correct):
-    _, result = correct
-    rest = invariants.remainder(result)
-    more = replace(result, external_work=result.external_work + 0.5 * invariants.largest_energy(result))
-    assert np.all(invariants.remainder(more) > rest)
 
 
 # -- three dimensions
@@ -396,19 +357,11 @@ def test_a_process_ends_at_its_limit_and_another_takes_its_place():
 FEW = (3, 4, 5, 6, 7, 10, 11, 15, 16, 17)
 
 
-def ends_well(number):
+REST = [pytest.param(number, marks=pytest.mark.slow) for number in sorted({*range(40)} - {*FEW})]
+
+
+@pytest.mark.solver
+@pytest.mark.parametrize("number", [*FEW, *REST])
+def test_a_scene_nobody_chose_ends_in_equilibria(number):
     found = ending.judge(drawing.draw(0, number))
     assert found.good, f"scene {number} of seed 0: {found.outcome}; {found.said}"
-
-
-@pytest.mark.solver
-@pytest.mark.parametrize("number", FEW)
-def test_a_scene_nobody_chose_ends_in_equilibria(number):
-    ends_well(number)
-
-
-@pytest.mark.slow
-@pytest.mark.solver
-@pytest.mark.parametrize("number", sorted({*range(40)} - {*FEW}))
-def test_more_scenes_nobody_chose_end_in_equilibria(number):
-    ends_well(number)
