@@ -9,6 +9,7 @@ reached at F_n = 0.69 N.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +63,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [Series(f"friction {law}", force, y, "N over N") for law, y in tangential.items()]
     series += [Series(f"area {name}", force, area(force), "mm2 over N") for name, area in areas.items()]
     parameters = {"U_V": voltage, "mu": friction, "d_sc_mm": 0.1, "d_i_mm": 0.001}
-    picture = lambda: _draw(force, friction, tangential, areas)  # noqa: E731
+    picture = partial(_draw, force, friction, tangential, areas)
     return Study("fig06", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

@@ -7,6 +7,7 @@ recomputed (5) spans 0.036-0.360 N and (3) 6.0-602 N.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         numbers |= {f"verdict.{law}.share_in_measured_range": np.mean((values >= low) & (values <= high))}
     series = [Series(f"{law} eps_i={e:g}", eps_sc, y, "N over eps_sc") for (law, e), y in lines.items()]
     given = {key: meyer.value(key) for key in ("A", "d_sc", "d_i", "U")}
-    picture = lambda: _draw(eps_sc, eps_i, force, lines, (low, high))  # noqa: E731
+    picture = partial(_draw, eps_sc, eps_i, force, lines, (low, high))
     return Study("fig07", numbers, PAPER, ASSUMPTIONS, series, picture, given).finish(out, quick)
 
 

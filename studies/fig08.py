@@ -8,6 +8,7 @@ numbers.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +51,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = [Series(f"{law} d_sc={d} mm", voltage, y, "N over V") for (law, d), y in curves.items()]
     parameters = {"A_mm2": meyer.value("A"), "d_i_mm": meyer.value("d_i")}
     parameters |= {name: table.value(name) for name in ("eps_sc", "eps_i")}
-    picture = lambda: _draw(voltage, curves, (low, high))  # noqa: E731
+    picture = partial(_draw, voltage, curves, (low, high))
     return Study("fig08", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

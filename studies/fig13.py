@@ -21,17 +21,9 @@ from evfem.export import paraview
 from evfem.plotting import side_by_side
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 
+from . import rendered
 from .common import Series, Study, make_folder
 from .plots import Figure
-from .rendered import (
-    ASSUMPTIONS,
-    QUICK_TEXTURE,
-    TEXTURE,
-    Case,
-    display_encoding,
-    display_friction,
-    reference_scene,
-)
 
 PAPER = {"voltage_V": 1911.12}
 NEAR = 1.0  # mm from the contact
@@ -74,13 +66,13 @@ def _instant(recording: Recording, step: int) -> Instant:
     return Instant(replace(recording.result, frames=[frame]))
 
 
-def instants(case: Case) -> dict[str, Instant]:
+def instants(case: rendered.Case) -> dict[str, Instant]:
     """Reference and display in the step of the slide with the largest voltage by (20a)."""
-    reference = record(reference_scene(case, every=1))
+    reference = record(rendered.reference_scene(case, every=1))
     felt = apparent_friction(reference.result)
     full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
-    _, friction = display_friction(case, felt, full_slip)
-    signal = voltage_for(felt, display_encoding(friction))
+    _, friction = rendered.display_friction(case, felt, full_slip)
+    signal = voltage_for(felt, rendered.display_encoding(friction))
     number = int(np.argmax(signal.profile.voltage[1:])) + 1
     press, slide = reference.scene.motion
     assert isinstance(slide, ev.Slide)
@@ -94,9 +86,9 @@ def instants(case: Case) -> dict[str, Instant]:
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Both pads in the instant of the largest voltage, their stresses, the figure, the fields."""
-    found = instants(QUICK_TEXTURE if quick else TEXTURE)
+    found = instants(rendered.QUICK_TEXTURE if quick else rendered.TEXTURE)
     numbers = _numbers(found)
-    study = Study("fig13", numbers, PAPER, ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
+    study = Study("fig13", numbers, PAPER, rendered.ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
     result = study.finish(out, quick)
     if out is not None:
         for name, instant in found.items():

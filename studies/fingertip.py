@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -197,7 +198,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [Series(f"width {name}", loads, values, "mm over N") for name, values in width.items()]
     series += [by_participant(" ".join(key), values) for key, values in forces.items()]
     parameters = {"loads_N": loads, "variants_at_N": LOAD, "resolution": pads["smooth"].resolution}
-    picture = lambda: draw(series, changed, forces)  # noqa: E731
+    picture = partial(draw, series, changed, forces)
     return Study("fingertip", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

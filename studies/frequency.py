@@ -20,13 +20,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.electrostatics.alternating import (
-    alternating_pressure,
-    complex_length,
-    corner_frequencies,
-    square_wave_pressure,
-    step_pressure,
-)
+from evfem.electrostatics import alternating
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import TOUCHSCREEN, Layers, StrongTroxel, eps_0
 
@@ -36,6 +30,7 @@ from .plots import COLOURS, Figure, panels
 GAP, PEAK, THICKNESS = 0.001, 100.0, 0.30  # mm, V, mm
 LEAKS = (0.0, 1e-8, 1e-7)  # S/m
 LEAK = 1e-8
+LEAKY = {"insulator": TOUCHSCREEN, "gap_conductivity": LEAK}
 #: dry skin at 1 kHz, as a step and the corners take it
 CONSTANTS = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": THICKNESS}
 #: Rauf and Follmer (2025), doi:10.1016/j.eml.2025.102382: shear capacity (kPa) of an electroadhesive clutch
@@ -70,7 +65,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     curves |= {f"leak {leak:g} S/m": _mean(frequency, "gabriel_dry", leak) for leak in LEAKS}
     swings = _fluctuations(frequency)
     time = np.geomspace(1e-6, 0.1, 61 if quick else 301)
-    step = 1e6 * step_pressure(time, GAP, PEAK, **CONSTANTS, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    step = 1e6 * alternating.step_pressure(time, GAP, PEAK, **CONSTANTS, **LEAKY)
     numbers = _numbers(swings, frequency) | _statements(time, step)
     series = [Series(name, frequency, y, "Pa over Hz") for name, y in curves.items()]
     series += [Series(f"{name} wave", frequency, y, "Pa over Hz") for name, y in swings.items()]
@@ -83,14 +78,15 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 def _mean(frequency: Any, skin: str, leak: float) -> Any:
     """Mean pressure in Pa under a sine."""
     given = {"skin": skin, "skin_thickness": THICKNESS, "insulator": TOUCHSCREEN}
-    return 1e6 * alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **given, gap_conductivity=leak)
+    rms = PEAK / np.sqrt(2.0)
+    return 1e6 * alternating.alternating_pressure(GAP, rms, frequency, **given, gap_conductivity=leak)
 
 
 def _fluctuations(frequency: Floats) -> dict[str, Floats]:
     """Mean and standard deviation of the pressure over the cycle (Pa), skin shorted, by waveform."""
-    metal = {"skin": 1.0, "skin_thickness": 0.0, "insulator": TOUCHSCREEN, "gap_conductivity": LEAK}
-    sine = 1e6 * alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **metal)
-    square = 1e6 * square_wave_pressure(frequency, GAP, PEAK, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    metal = {"skin": 1.0, "skin_thickness": 0.0} | LEAKY
+    sine = 1e6 * alternating.alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **metal)
+    square = 1e6 * alternating.square_wave_pressure(frequency, GAP, PEAK, **LEAKY)
     full = 1e6 * StrongTroxel().traction(GAP, PEAK, Layers.of(TOUCHSCREEN))
     tau = eps_0 * (1.0 + GAP * 3.9 / 0.001) / LEAK
     a = 1.0 / (2.0 * frequency * tau)
@@ -124,11 +120,11 @@ def _numbers(swings: dict[str, Floats], frequency: Floats) -> dict[str, float]:
 
 def _statements(time: Floats, step: Floats) -> dict[str, float]:
     """What experiments state, and what the model gives."""
-    corners = corner_frequencies(GAP, **CONSTANTS, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    corners = alternating.corner_frequencies(GAP, **CONSTANTS, **LEAKY)
     found = _fluctuations(np.array([15.0, 60.0, 480.0]))
     over = found["fluctuation of a square"] / found["fluctuation of a sine"]
     skin = {"skin": "gabriel_dry", "skin_thickness": THICKNESS, "insulator": TOUCHSCREEN}
-    none = abs(complex_length(1e3, **skin))
+    none = abs(alternating.complex_length(1e3, **skin))
     dc, slow, fast = (np.array(CLUTCH[name]) for name in CLUTCH)
     exponents = [float(np.polyfit(np.log(VOLTS), np.log(y), 1)[0]) for y in (dc, slow, fast)]
     return {

@@ -15,6 +15,7 @@ of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, t
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +62,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         for (law, case), values in forces.items()
     ]
     parameters = {"U_V": VOLTAGE, "gap_mm": GAP, "radius_mm": RADIUS}
-    picture = lambda: _draw(gaps, exact, by_law, forces)  # noqa: E731
+    picture = partial(_draw, gaps, exact, by_law, forces)
     return Study("laws", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

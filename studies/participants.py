@@ -13,6 +13,7 @@ a factor of three for fingers of the same size, are not theirs to explain.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     every |= {f"measured {case}": participants()[case][: len(names)] for case in CASES}
     series = [by_participant(name, values) for name, values in every.items()]
     parameters = {"sweep": table.provenance["scene"], "grid": table.provenance["grid"]}
-    picture = lambda: _draw(names, forces, closed)  # noqa: E731
+    picture = partial(_draw, names, forces, closed)
     return Study("participants", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

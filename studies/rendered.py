@@ -14,17 +14,7 @@ from dataclasses import dataclass, field, replace
 import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.simulation.rendering import (
-    ApparentFriction,
-    Recording,
-    Signal,
-    apparent_friction,
-    compare,
-    exact,
-    record,
-    replay,
-    voltage_for,
-)
+from evfem.simulation import rendering
 
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0
@@ -97,7 +87,7 @@ class Outcome:
     full_slip: float
     lowest_friction: float
     friction: float
-    signal: Signal
+    signal: rendering.Signal
     rendered: dict[str, Rendered]
     costs: dict[str, float] = field(default_factory=dict)
 
@@ -125,14 +115,14 @@ def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
     return ev.Scene(pad(case), surface, motion=motion, solver=solver, output=output)
 
 
-def reference_of(case: Case) -> Recording:
+def reference_of(case: Case) -> rendering.Recording:
     """The run of a case's reference; that the load drifts where its indentation is held is known."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "motion 1 slides with the indentation held")
-        return record(reference_scene(case))
+        return rendering.record(reference_scene(case))
 
 
-def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tuple[float, float]:
+def display_friction(case: Case, felt: rendering.ApparentFriction, full_slip: float) -> tuple[float, float]:
     """Smallest apparent friction of the reference after full slip, and friction of the display.
 
     On the step the display has the coefficient before it; on texture the smallest apparent
@@ -159,10 +149,10 @@ def render(case: Case) -> Outcome:
     """
     begin = time.process_time()
     reference = reference_of(case)
-    felt = apparent_friction(reference.result)
+    felt = rendering.apparent_friction(reference.result)
     full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
     lowest, friction = display_friction(case, felt, full_slip)
-    signal = voltage_for(felt, display_encoding(friction))
+    signal = rendering.voltage_for(felt, display_encoding(friction))
     costs = {"reference_cpu_s": time.process_time() - begin} | _costs(reference)
     rendered = {}
     for kind in case.encodings:
@@ -174,24 +164,29 @@ def render(case: Case) -> Outcome:
     return Outcome(case, position, load, force, full_slip, lowest, friction, signal, rendered, costs)
 
 
-def _replayed(kind: str, case: Case, reference: Recording, friction: float, signal: Signal) -> Recording:
+def _replayed(
+    kind: str, case: Case, reference: rendering.Recording, friction: float, signal: rendering.Signal
+) -> rendering.Recording:
     display = ev.Display(friction=friction)
     if kind == "exact":
-        return exact(reference, display, ev.Kaczmarek())
+        return rendering.exact(reference, display, ev.Kaczmarek())
     if kind == "thick":
         finger = pad(replace(case, skin=0.38))
         reference = replace(reference, scene=replace(reference.scene, finger=finger))
-    return replay(reference, display, ev.Kaczmarek(), signal.profile)
+    return rendering.replay(reference, display, ev.Kaczmarek(), signal.profile)
 
 
-def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:
-    fidelity, felt = compare(reference.result, found.result), apparent_friction(found.result)
+def _rendered(reference: rendering.Recording, found: rendering.Recording, full_slip: float) -> Rendered:
+    fidelity, felt = (
+        rendering.compare(reference.result, found.result),
+        rendering.apparent_friction(found.result),
+    )
     slide = found.result.motion == "slide"
     judged = fidelity.pearson, fidelity.relative_l2, fidelity.largest_error, felt.minimum(after=full_slip)
     return Rendered(felt.tangential_force[1:], felt.normal_force[1:], found.result.voltage[slide], *judged)
 
 
-def _costs(found: Recording) -> dict[str, float]:
+def _costs(found: rendering.Recording) -> dict[str, float]:
     """Steps asked for and the parts they took: every one of them is a converged equilibrium."""
     result = found.result
     return {"steps": float(len(result.step)), "parts": float(result.substeps.sum())}

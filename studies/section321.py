@@ -9,6 +9,7 @@ um is generally accepted.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = [Series(f"{law} force ratio", thickness, y, "1 over mm") for law, y in ratio.items()]
     parameters = {"voltages_V": voltages, "insulators_mm": [film.thickness for film in films]}
     parameters |= {"eps_i": table.value("eps_i"), "eps_sc": eps_sc}
-    picture = lambda: _draw(thickness, ratio, found)  # noqa: E731
+    picture = partial(_draw, thickness, ratio, found)
     return Study("section321", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 

@@ -84,18 +84,14 @@ def on_the_same_nodes(runs: list[Run]) -> dict[str, float]:
     """CPU seconds, memory and iterations of each peer over evfem's, and CPU seconds of the fastest."""
     found: dict[str, float] = {}
     for own in (run for run in runs if run.package == "evfem"):
-        place, fastest = f"{own.scene}.L{own.level}", []
-        place_of, others = (
-            (own.scene, own.level, ELEMENTS[own.element]),
-            [r for r in runs if r.package in PEERS],
-        )
-        for run in (r for r in others if (r.scene, r.level, r.element) == place_of):
+        place, where = f"{own.scene}.L{own.level}", (own.scene, own.level, ELEMENTS[own.element])
+        others = [r for r in runs if r.package in PEERS and (r.scene, r.level, r.element) == where]
+        for run in others:
             for name in ("cpu_s", "process_cpu_s", "peak_MB", "iterations"):
                 ratio = run.measured[name] / own.measured[name]
                 found[f"{place}.{run.package}_over_evfem.{own.element}.{name}"] = ratio
-            fastest.append(run.measured["cpu_s"])
-        if fastest:
-            ratio = min(fastest) / own.measured["cpu_s"]
+        if others:
+            ratio = min(run.measured["cpu_s"] for run in others) / own.measured["cpu_s"]
             found[f"{place}.fastest_over_evfem.{own.element}.cpu_s"] = ratio
     return found
 

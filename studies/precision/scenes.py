@@ -16,17 +16,7 @@ import numpy as np
 import evfem as ev
 from evfem.scene.motion import Motion
 
-from ..peers.problem import (
-    FRICTION,
-    INSULATOR,
-    MATERIALS,
-    PLANE,
-    STRATUM_CORNEUM,
-    TOLERANCE,
-    VOLTAGE,
-    quantities,
-    scene_mesh,
-)
+from ..peers import problem
 
 PROBLEMS = {
     "A": "press (A)",
@@ -61,7 +51,7 @@ class Case:
     rigid: bool = False
     fast: bool = True
     press: int = 15
-    tolerance: float = TOLERANCE
+    tolerance: float = problem.TOLERANCE
 
     @property
     def variant(self) -> str:
@@ -86,7 +76,11 @@ class Case:
 
 def benchmark_finger(mesh: ev.Mesh) -> ev.MeshedFinger:
     """The benchmark's finger on a mesh of it."""
-    return ev.MeshedFinger(mesh, MATERIALS, ev.Electrical(STRATUM_CORNEUM.thickness, STRATUM_CORNEUM.eps_r))
+    return ev.MeshedFinger(
+        mesh,
+        problem.MATERIALS,
+        ev.Electrical(problem.STRATUM_CORNEUM.thickness, problem.STRATUM_CORNEUM.eps_r),
+    )
 
 
 def build(case: Case) -> ev.Scene:
@@ -94,13 +88,13 @@ def build(case: Case) -> ev.Scene:
     solver: dict[str, Any] = {"element": case.element, "tolerance": case.tolerance}
     if case.penalty:
         solver |= {"contact": "penalty", "penalty_normal": case.penalty, "penalty_tangential": case.penalty}
-    friction = 0.3 if case.problem in PADS else FRICTION.get(case.problem, 0.0)
+    friction = 0.3 if case.problem in PADS else problem.FRICTION.get(case.problem, 0.0)
     if isinstance(case.level, int):
-        finger: Any = benchmark_finger(scene_mesh(case.element, case.level))
+        finger: Any = benchmark_finger(problem.scene_mesh(case.element, case.level))
     else:
         finger = ev.FingerPad(ridges=case.problem == "ridged", resolution=case.level)
-    y = PLANE if case.problem in "ABC" else None
-    surface = ev.Display(insulator=INSULATOR, friction=friction, y=y)
+    y = problem.PLANE if case.problem in "ABC" else None
+    surface = ev.Display(insulator=problem.INSULATOR, friction=friction, y=y)
     voltage, law = _voltage(case), ev.Kaczmarek() if case.problem not in "AB" else None
     how: dict[str, Any] = {"solver": ev.Solver(**solver), "output": ev.Output(every=1000)}
     return ev.Scene(finger, surface, law, voltage, _motion(case), coupling=case.coupling, **how)
@@ -109,7 +103,7 @@ def build(case: Case) -> ev.Scene:
 def _voltage(case: Case) -> float:
     if case.problem == "hover":
         return RIGID_VOLTAGE if case.rigid else HOVER_VOLTAGE
-    return 1000.0 if case.problem in PADS else VOLTAGE.get(case.problem, 0.0)
+    return 1000.0 if case.problem in PADS else problem.VOLTAGE.get(case.problem, 0.0)
 
 
 def _motion(case: Case) -> list[Motion]:
@@ -127,7 +121,7 @@ def forces(case: Case, result: ev.Result) -> dict[str, float]:
     """What the problem is judged by: forces in N/mm, and the pad's indentation in mm."""
     normal, tangential, pull = result.normal_force, result.tangential_force, result.electrostatic_force
     if case.problem in "AC":
-        return quantities(case.problem, np.stack([normal, tangential, pull], axis=1))
+        return problem.quantities(case.problem, np.stack([normal, tangential, pull], axis=1))
     if case.problem == "B":
         places = np.searchsorted(result.position[15:], np.array([0.3, 0.6, 3.0]) * (1.0 - 1e-9)) + 15
         found = {f"Fn_at_{d}": float(normal[round(10 * d) - 1]) for d in (0.5, 1.0, 1.5)}

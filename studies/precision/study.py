@@ -7,6 +7,7 @@ csv and picture the tables are written as work_precision.md.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,7 +57,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         "Growth": growth.table(found, sizes),
         "A step at that many nodes": shares.table(found),
     }
-    picture = lambda: draw(curves, known, sizes, found)  # noqa: E731
+    picture = partial(draw, curves, known, sizes, found)
     series_of_all = curves + growth.series(sizes)
     study = Study("work_precision", found, {}, ASSUMPTIONS, series_of_all, picture, tables=tables)
     return study.finish(out, quick)
