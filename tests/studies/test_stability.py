@@ -89,6 +89,15 @@ def test_balances_see_a_force_and_an_energy_that_are_missing():
     assert case.lost_energy(result) > 0.01
 
 
+def test_scenes_are_alike_that_end_in_the_same_row():
+    """Without friction in two steps or one; a tenth deeper is another end."""
+    body, flat = scenes.finger(scenes.block(sag=0.4)), Flat(friction=0.0)
+    ways = ((0.4, 1), (0.4, 2), (0.44, 1))
+    once, twice, deeper = (scenes.scene(body, flat, Press(indentation=d, steps=n)) for d, n in ways)
+    assert case.alike(case.Log(), (once, twice), "normal_force stored_energy", 1e-6)[0]
+    assert not case.alike(case.Log(), (once, deeper), "normal_force", 0.05)[0]
+
+
 def test_other_images_of_a_mesh_are_the_same_body():
     mesh = scenes.shaken(scenes.block(sag=0.4), 0.3)
     area = area_of(mesh)
