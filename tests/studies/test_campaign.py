@@ -1,6 +1,4 @@
-"""The campaign: scenes nobody chose end in equilibria, and nothing that is broken passes its
-checks.
-"""
+"""The campaign: scenes nobody chose end in equilibria, and nothing that is broken passes its checks."""
 
 import csv
 import json

@@ -6,9 +6,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_ridges_make_a_line_in_the_spectrum_of_friction(numbers_of):
-    """v / pitch = 20 / 0.5 Hz; Scheibert et al. and Prevost et al. (2009) saw it, and none without
-    ridges.
-    """
+    """v / pitch = 20 / 0.5 Hz; Scheibert et al. and Prevost et al. (2009) saw it, and none without ridges."""
     found = numbers_of("friction_spectrum")
     assert found["strongest_above_quarter_Hz.ridges.20_mm_s"] == found["verdict.line_Hz.20_mm_s"] == 40.0
     assert found["line_over_neighbours.ridges.20_mm_s"] > 3.0

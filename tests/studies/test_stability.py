@@ -1,6 +1,4 @@
-"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass
-unseen.
-"""
+"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass unseen."""
 
 import numpy as np
 import pytest

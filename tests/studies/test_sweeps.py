@@ -1,6 +1,4 @@
-"""The two studies that are sweeps: participants by finite elements, and what Fig. 5's inputs do to
-it.
-"""
+"""The two studies that are sweeps: participants by finite elements, and what Fig. 5's inputs do to it."""
 
 import numpy as np
 import pytest
@@ -29,9 +27,7 @@ def test_every_participant_law_and_case_is_a_scene(numbers_of):
 
 
 def test_a_participants_force_is_that_of_a_single_run(numbers_of):
-    """Force per depth of one scene, times the width over which the rigid ellipsoid has its own
-    force.
-    """
+    """Force per depth of one scene, times the width over which the rigid ellipsoid has its own force."""
     names = common.participants()["participant"][:3]
     (point,) = [
         p
@@ -55,9 +51,7 @@ def test_a_participants_force_is_that_of_a_single_run(numbers_of):
 
 
 def test_ridges_take_away_more_than_deformation_adds(numbers_of):
-    """Gaps in the grooves are up to 0.15 mm wider; the paper's Fig. 5 has the same two per mm of
-    width.
-    """
+    """Gaps in the grooves are up to 0.15 mm wider; the paper's Fig. 5 has the same two per mm of width."""
     for law in common.LAWS:
         for case in common.CASES:
             key = f"verdict.change_from_closed_form_{{}}.{law}.{case}"
@@ -79,9 +73,7 @@ def test_samples_without_spread_are_fig05():
 
 
 def test_spread_follows_the_derivatives(numbers_of):
-    """To first order the variance is the sum of squared slopes times input variances (delta
-    method).
-    """
+    """To first order the variance is the sum of squared slopes times input variances (delta method)."""
     numbers = numbers_of("uncertainty")
     middle = {
         name: np.array([float(one.quantile(np.array([0.5]))[0])]) for name, one in uncertainty.INPUTS.items()
