@@ -17,6 +17,8 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
+from evfem.studies.common import markdown
+
 DOCS = Path(__file__).parent
 PAGE, README = DOCS / "performance.md", DOCS.parent / "README.md"
 #: a table between its marks
@@ -37,9 +39,7 @@ def short(value: float | None) -> str:
 
 def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     """A Markdown table."""
-    head = list(head)
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
+    return "\n".join(markdown(list(head), rows)) + "\n"
 
 
 def run(found: Found) -> str:

@@ -1,6 +1,4 @@
-"""Studies: a module per figure of the paper or numerical question, each with
-`main(quick, out) -> dict`.
-"""
+"""Studies: a module per figure of the paper or question, each with `main(quick, out) -> dict`."""
 
 from __future__ import annotations
 
@@ -12,32 +10,12 @@ from typing import Any
 from evfem.errors import InputError, quoted
 
 #: every study, in the order in which "all" runs them; it leaves out `APART`
-NAMES = (
-    "section321",
-    "laws",
-    "fringe",
-    "fingertip",
-    "fingerprint",
-    "fig05",
-    "fig06",
-    "fig07",
-    "fig08",
-    "fig09",
-    "fig10",
-    "fig11",
-    "fig12",
-    "fig13",
-    "participants",
-    "uncertainty",
-    "frequency",
-    "hypotheses",
-    "friction_spectrum",
-    "stick_slip",
-    "stability",
-    "work_precision",
-    "peers",
-    "campaign",
-)
+NAMED = """
+section321 laws fringe fingertip fingerprint fig05 fig06 fig07 fig08 fig09 fig10 fig11 fig12 fig13
+participants uncertainty frequency hypotheses friction_spectrum stick_slip stability work_precision peers
+campaign
+"""
+NAMES = tuple(NAMED.split())
 #: studies that "all" leaves out: one needs packages of others, one takes hours
 APART = ("peers", "campaign")
 #: studies that have a folder of their own, and the module in it that runs them

@@ -14,39 +14,22 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import evfem as ev
 from evfem import data
-from evfem.electrostatics.laws import Kaczmarek, Layer
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    Series,
-    Study,
-    draw_box,
-    median_interval,
-    new_figure,
-    participants,
-)
+from .common import CASES, Series, Study, by_participant, median_interval, paper_display, participants
 from .measured import comparison, participant_forces
+from .plots import COLOURS, LABELS, Figure, draw_box, new_figure
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+PRINTED = {"mean": (1.81, 2.95, 1.31), "median": (1.85, 2.73, 1.37), "sd": (0.547, 1.07, 0.558)}
 PAPER = {
-    "measured.mean_mN.HVHD": 1.81,
-    "measured.mean_mN.HVLD": 2.95,
-    "measured.mean_mN.LVLD": 1.31,
-    "measured.median_mN.HVHD": 1.85,
-    "measured.median_mN.HVLD": 2.73,
-    "measured.median_mN.LVLD": 1.37,
-    "measured.sd_mN.HVHD": 0.547,
-    "measured.sd_mN.HVLD": 1.07,
-    "measured.sd_mN.LVLD": 0.558,
+    f"measured.{name}_mN.{case}": value
+    for name, values in PRINTED.items()
+    for case, value in zip(CASES, values, strict=True)
 }
 WIDTHS = (8, 10)  # mm out of the plane
 MODELS = {"fe": ("finite elements, ridges", True), "fe_smooth": ("finite elements, smooth", False)}
@@ -60,9 +43,7 @@ ASSUMPTIONS = {
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Statistics of the measurements, forces of both laws per participant and by finite elements,
-    verdict.
-    """
+    """Statistics of the measurements, forces of both laws and by finite elements, verdict."""
     forces = participant_forces()
     elements = {
         (model, case): hover_force(ridges, gap, voltage, "coarse" if quick else "medium")
@@ -76,29 +57,18 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             f"verdict.{model}.mm_of_width_for_median.{case}": 1e-3 * np.median(participants()[case]) / force
         }
     numbers |= comparison(forces)
-    study = Study(
+    return Study(
         "fig05", numbers, PAPER, ASSUMPTIONS, _series(forces, elements), lambda: _draw(forces, elements)
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 @cache
 def hover_force(ridges: bool, gap: float, voltage: float, resolution: str = "medium") -> float:
-    """Attraction in N/mm of Table 2's deformable finger held `gap` mm above the display,
-    Kaczmarek's law.
-    """
-    from evfem.finger.fingerpad import FingerPad
-    from evfem.scene.motion import Hover
-    from evfem.scene.scene import Scene
-    from evfem.simulation.run import simulate
-    from evfem.surface.surfaces import Display
-
-    table = data.load("table2")
-    display = Display(insulator=Layer(table.value("d_i"), table.value("eps_i")), friction=table.value("mu"))
-    finger = FingerPad(ridges=ridges, resolution=resolution)
-    motion = (Hover(gap=gap),)
-    scene = Scene(finger, display, law=Kaczmarek(), voltage=voltage, motion=motion, name="hover")
-    return float(simulate(scene).electrostatic_force[-1])
+    """Attraction in N/mm of Table 2's deformable finger `gap` mm above the display, Kaczmarek's law."""
+    finger = ev.FingerPad(ridges=ridges, resolution=resolution)
+    display, motion = paper_display(data.load("table2").value("mu")), (ev.Hover(gap=gap),)
+    scene = ev.Scene(finger, display, ev.Kaczmarek(), voltage, motion)
+    return float(ev.simulate(scene).electrostatic_force[-1])
 
 
 def _measured_numbers() -> dict[str, float]:
@@ -127,59 +97,37 @@ def _law_numbers(forces: dict[Any, Any]) -> dict[str, float]:
 
 
 def _series(forces: dict[Any, Any], elements: dict[Any, float]) -> list[Series]:
-    names = participants()["participant"]
-    series = [
-        Series(f"measured {case}", names, participants()[case], "mN over participant") for case in CASES
-    ]
-    series += [
-        Series(f"{law} {case}", names, values, "mN over participant")
-        for (law, case), values in forces.items()
-    ]
+    series = [by_participant(f"measured {case}", participants()[case]) for case in CASES]
+    series += [by_participant(f"{law} {case}", values) for (law, case), values in forces.items()]
     widths = np.array(WIDTHS, dtype=float)
     for (model, case), force in elements.items():
-        series.append(
-            Series(f"{model} kaczmarek {case}", widths, 1e3 * force * widths, "mN over mm of width")
-        )
+        y = 1e3 * force * widths
+        series.append(Series(f"{model} kaczmarek {case}", widths, y, "mN over mm of width"))
     return series
 
 
 def _draw(forces: dict[Any, Any], elements: dict[Any, float]) -> Figure:
+    from matplotlib.patches import Patch
+
     figure = new_figure(4.2)
     ax = figure.add_subplot()
-    offsets = {"measured": -0.32, "kaczmarek": -0.13, "strong_troxel": 0.06}
+    bars = {"fe": (0.22, COLOURS["fe"]), "fe_smooth": (0.34, "white")}
     for place, case in enumerate(CASES):
-        draw_box(ax, place + offsets["measured"], participants()[case], 0.15, COLOURS["measured"])
-        for law in ("kaczmarek", "strong_troxel"):
-            draw_box(ax, place + offsets[law], forces[law, case], 0.15, COLOURS[law])
-        for model, at in (("fe", 0.22), ("fe_smooth", 0.34)):
-            ends = [1e3 * elements[model, case] * width for width in WIDTHS]
-            face = COLOURS["fe"] if model == "fe" else "white"
-            ax.bar(
-                place + at,
-                ends[1] - ends[0],
-                0.09,
-                ends[0],
-                color=face,
-                edgecolor=COLOURS["fe"],
-                linewidth=1.3,
-            )
+        draw_box(ax, place - 0.32, participants()[case], 0.15, COLOURS["measured"])
+        for law, at in (("kaczmarek", -0.13), ("strong_troxel", 0.06)):
+            draw_box(ax, place + at, forces[law, case], 0.15, COLOURS[law])
+        for model, (at, face) in bars.items():
+            low, high = (1e3 * elements[model, case] * width for width in WIDTHS)
+            look = {"color": face, "edgecolor": COLOURS["fe"], "linewidth": 1.3}
+            ax.bar(place + at, high - low, 0.09, low, **look)
     labels = [f"{case}\n{voltage:g} V, {gap:.2f} mm" for case, (voltage, gap) in CASES.items()]
     ax.set_xticks(range(len(CASES)), labels)
     ax.set(ylabel="electrostatic force (mN)", ylim=(0, None), xlim=(-0.5, 2.5))
-    ax.legend(handles=_handles(), fontsize="small", loc="upper right", ncols=1)
-    return figure
-
-
-def _handles() -> list[Any]:
-    from matplotlib.patches import Patch
-
-    named = {
-        "measured": "measured",
-        "kaczmarek": f"{LABELS['kaczmarek']} (8b)",
-        "strong_troxel": f"{LABELS['strong_troxel']} (8a)",
-    }
+    named = {"measured": "measured"}
+    named |= {law: f"{LABELS[law]} ({how})" for law, how in (("kaczmarek", "8b"), ("strong_troxel", "8a"))}
     handles = [Patch(facecolor=COLOURS[key], alpha=0.5, label=label) for key, label in named.items()]
-    for model, face in (("fe", COLOURS["fe"]), ("fe_smooth", "white")):
+    for model, (_, face) in bars.items():
         label = f"{MODELS[model][0]}, width 8-10 mm"
         handles.append(Patch(facecolor=face, edgecolor=COLOURS["fe"], label=label))
-    return handles
+    ax.legend(handles=handles, fontsize="small", loc="upper right", ncols=1)
+    return figure

@@ -9,19 +9,17 @@ reached at F_n = 0.69 N.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem import data
 from evfem.electrostatics.encoding import AreaLaw, Encoding, fit_area_to_friction
-from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import LAWS, Series, Study, area_law, table2_layers
+from .plots import COLOURS, LABELS, Figure, law_line, not_shown, panels
 
 PAPER = {
     "kaczmarek.area_mm2_at_1N": 125.359,
@@ -39,9 +37,9 @@ ADAMS = {"gross": ("Adams, gross", "--"), "ridge": ("Adams, ridges", ":")}
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Friction by (16a) and (16b), the areas behind it, and Adams' area laws."""
-    meyer, laws = data.load("meyer"), data.load("area_laws")
-    areas = {name: AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in laws["law"]}
-    layers = _layers(meyer)
+    meyer = data.load("meyer")
+    areas = {name: area_law(name) for name in data.load("area_laws")["law"]}
+    layers = table2_layers(meyer.value("d_sc_max_force"), meyer.value("d_i"))
     voltage, friction = meyer.value("U"), meyer.value("mu")
     force = np.linspace(0.02, 1.2, 31 if quick else 119)
     display = {law: Encoding(LAWS[law], layers, areas[law], friction) for law in LAWS}
@@ -65,22 +63,8 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series += [Series(f"friction {law}", force, y, "N over N") for law, y in tangential.items()]
     series += [Series(f"area {name}", force, area(force), "mm2 over N") for name, area in areas.items()]
     parameters = {"U_V": voltage, "mu": friction, "d_sc_mm": 0.1, "d_i_mm": 0.001}
-    study = Study(
-        "fig06",
-        numbers,
-        PAPER,
-        ASSUMPTIONS,
-        series,
-        lambda: _draw(force, friction, tangential, areas),
-        parameters,
-    )
-    return study.finish(out, quick)
-
-
-def _layers(meyer: data.Table) -> Layers:
-    table = data.load("table2")
-    skin = Layer(meyer.value("d_sc_max_force"), table.value("eps_sc"))
-    return Layers.of(skin, Layer(meyer.value("d_i"), table.value("eps_i")))
+    picture = partial(_draw, force, friction, tangential, areas)
+    return Study("fig06", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
 def _force_for(display: Encoding, attraction: float, voltage: float) -> float:
@@ -90,26 +74,18 @@ def _force_for(display: Encoding, attraction: float, voltage: float) -> float:
 
 
 def _draw(force: Any, friction: float, tangential: dict[str, Any], areas: dict[str, AreaLaw]) -> Figure:
-    figure = new_figure(3.4)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = panels(3.4, 2)
     left.plot(force, friction * force, color=COLOURS["fe"], label=f"off: $F_t$ = {friction:g} $F_n$")
-    law_line(
-        left,
-        "strong_troxel",
-        force,
-        tangential["strong_troxel"],
-        linewidth=4.5,
-        label="on: (16b) Strong-Troxel",
-    )
-    law_line(left, "kaczmarek", force, tangential["kaczmarek"], linewidth=1.5, label="on: (16a) Kaczmarek")
+    styles = {"strong_troxel": (4.5, "on: (16b) Strong-Troxel"), "kaczmarek": (1.5, "on: (16a) Kaczmarek")}
+    for law, (width, label) in styles.items():
+        law_line(left, law, force, tangential[law], linewidth=width, label=label)
     left.set(xlabel="normal force $F_n$ (N)", ylabel="friction $F_t$ (N)", xlim=(0, 1.2), ylim=(0, None))
     for law in LAWS:
         law_line(right, law, force, areas[law](force), label=f"needed by {LABELS[law]}")
     for (name, (label, style)), colour in zip(ADAMS.items(), ("neutral", "measured"), strict=True):
         right.plot(force, areas[name](force), style, color=COLOURS[colour], label=label)
     right.set(xlabel="normal force $F_n$ (N)", ylabel="contact area (mm²)", xlim=(0, 1.2), ylim=(-4, 220))
-    for ax, letter in ((left, "a"), (right, "b")):
-        ax.legend(fontsize="small")
-        panel_letter(ax, letter)
+    left.legend(fontsize="small")
+    right.legend(fontsize="small")
     not_shown(figure, "Measured points of Meyer et al. and of Adams")
     return figure

@@ -7,8 +7,9 @@ recomputed (5) spans 0.036-0.360 N and (3) 6.0-602 N.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +17,11 @@ from evfem import data
 from evfem.electrostatics.forces import plate_force
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
+from .common import LAWS, Series, Study
+from .plots import COLOURS, LABELS, Figure, law_line, new_figure, not_shown, panel_letter
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-PAPER = {
-    "kaczmarek.min_N": 0.05,
-    "kaczmarek.max_N": 0.35,
-    "strong_troxel.min_N": 10.0,
-    "strong_troxel.max_N": 600.0,
-}
+PAPER = {"kaczmarek.min_N": 0.05, "kaczmarek.max_N": 0.35}
+PAPER |= {"strong_troxel.min_N": 10.0, "strong_troxel.max_N": 600.0}
 ASSUMPTIONS = {
     "contact area": "100 mm2, as the paper assumes",
     "voltage": "140 V is the effective voltage across skin and insulator",
@@ -50,20 +45,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         numbers |= {f"verdict.{law}.lowest_over_highest_measured": values.min() / high}
         numbers |= {f"verdict.{law}.share_in_measured_range": np.mean((values >= low) & (values <= high))}
     series = [Series(f"{law} eps_i={e:g}", eps_sc, y, "N over eps_sc") for (law, e), y in lines.items()]
-    study = Study(
-        "fig07",
-        numbers,
-        PAPER,
-        ASSUMPTIONS,
-        series,
-        lambda: _draw(eps_sc, eps_i, force, lines, (low, high)),
-        _given(meyer),
-    )
-    return study.finish(out, quick)
-
-
-def _given(meyer: data.Table) -> dict[str, float]:
-    return {key: meyer.value(key) for key in ("A", "d_sc", "d_i", "U")}
+    given = {key: meyer.value(key) for key in ("A", "d_sc", "d_i", "U")}
+    picture = partial(_draw, eps_sc, eps_i, force, lines, (low, high))
+    return Study("fig07", numbers, PAPER, ASSUMPTIONS, series, picture, given).finish(out, quick)
 
 
 def _force(law: str, eps_sc: Any, eps_i: Any, meyer: data.Table) -> Any:

@@ -8,19 +8,17 @@ numbers.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem import data
 from evfem.electrostatics.forces import plate_force
-from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure, not_shown, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import LAWS, Series, Study, table2_layers
+from .plots import COLOURS, LABELS, Figure, law_line, not_shown, panels
 
 THICKNESS = (0.1, 0.2, 0.3, 0.4, 0.5)  # mm
 ASSUMPTIONS = {
@@ -36,10 +34,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     meyer, table = data.load("meyer"), data.load("table2")
     voltage = np.linspace(20.0, 200.0, 10 if quick else 91)
     reference = meyer.value("U")
-    layers = {
-        d: Layers.of(Layer(d, table.value("eps_sc")), Layer(meyer.value("d_i"), table.value("eps_i")))
-        for d in THICKNESS
-    }
+    layers = {d: table2_layers(d, meyer.value("d_i")) for d in THICKNESS}
 
     def force(law: str, d: float, u: Any) -> Any:
         return plate_force(LAWS[law], meyer.value("A"), 0.0, u, layers[d])
@@ -48,43 +43,28 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     low, high = meyer.value("F_e_min"), meyer.value("F_e_max")
     for law in LAWS:
         values = np.array([force(law, d, reference) for d in THICKNESS])
-        numbers |= {
-            f"verdict.{law}.middle_of_range_ratio": np.sqrt(values.min() * values.max() / (low * high))
-        }
-        numbers |= {f"verdict.{law}.spread_max_over_min": values.max() / values.min()}
-    numbers |= {"verdict.measured.spread_max_over_min": high / low}
+        middle = np.sqrt(values.min() * values.max() / (low * high))
+        numbers[f"verdict.{law}.middle_of_range_ratio"] = middle
+        numbers[f"verdict.{law}.spread_max_over_min"] = values.max() / values.min()
+    numbers["verdict.measured.spread_max_over_min"] = high / low
     curves = {(law, d): force(law, d, voltage) for law in LAWS for d in THICKNESS}
     series = [Series(f"{law} d_sc={d} mm", voltage, y, "N over V") for (law, d), y in curves.items()]
-    parameters = {
-        "A_mm2": meyer.value("A"),
-        "d_i_mm": meyer.value("d_i"),
-        "eps_sc": table.value("eps_sc"),
-        "eps_i": table.value("eps_i"),
-    }
-    study = Study(
-        "fig08", numbers, {}, ASSUMPTIONS, series, lambda: _draw(voltage, curves, (low, high)), parameters
-    )
-    return study.finish(out, quick)
+    parameters = {"A_mm2": meyer.value("A"), "d_i_mm": meyer.value("d_i")}
+    parameters |= {name: table.value(name) for name in ("eps_sc", "eps_i")}
+    picture = partial(_draw, voltage, curves, (low, high))
+    return Study("fig08", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
 def _draw(voltage: Any, curves: dict[Any, Any], band: tuple[float, float]) -> Figure:
-    figure = new_figure(3.4)
-    axes = figure.subplots(1, 2, sharey=True)
-    for ax, law, letter in zip(axes, LAWS, "ab", strict=True):
+    figure, axes = panels(3.4, 2, sharey=True)
+    look = {"color": COLOURS["measured"], "linewidth": 5, "solid_capstyle": "butt"}
+    for ax, law in zip(axes, LAWS, strict=True):
         for d in THICKNESS:
             law_line(ax, law, voltage, curves[law, d], linewidth=0.7 + 4.0 * d, label=f"$d^{{sc}}$ = {d} mm")
-        ax.plot(
-            [140.0, 140.0],
-            band,
-            color=COLOURS["measured"],
-            linewidth=5,
-            solid_capstyle="butt",
-            label="measured range",
-        )
+        ax.plot([140.0, 140.0], band, label="measured range", **look)
         ax.set(yscale="log", xlabel="voltage $U$ (V)", ylim=(3e-5, 1e3))
         ax.set_title(LABELS[law], fontsize="medium")
         ax.legend(fontsize="small", loc="upper left" if law == "kaczmarek" else "lower left")
-        panel_letter(ax, letter)
     axes[0].set_ylabel("$F_e$ (N)")
     not_shown(figure, "Measured points of Meyer et al.")
     return figure

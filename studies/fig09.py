@@ -38,7 +38,6 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             )
     series = hover.curves(_force, AREAS, quick)
     names = {key: f"{area:g} mm²" for key, area in AREAS.items()}
-    study = Study(
+    return Study(
         "fig09", numbers | verdict, {}, ASSUMPTIONS, series, lambda: hover.draw(series, AREAS, names, 9.0)
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)

@@ -8,6 +8,7 @@ rectangle. Expected at 0.38 mm for HVLD / LVLD / HVHD (the paper, and recomputed
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,12 +53,5 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     verdict["verdict.largest_deviation_from_print_percent"] = 100.0 * float(np.max(worst))
     series = hover.curves(_force, THICKNESS, quick)
     names = {key: f"$d^{{sc}}$ = {d} mm" for key, d in THICKNESS.items()}
-    study = Study(
-        "fig10",
-        numbers | verdict,
-        PAPER,
-        ASSUMPTIONS,
-        series,
-        lambda: hover.draw(series, THICKNESS, names, 9.0),
-    )
-    return study.finish(out, quick)
+    picture = partial(hover.draw, series, THICKNESS, names, 9.0)
+    return Study("fig10", numbers | verdict, PAPER, ASSUMPTIONS, series, picture).finish(out, quick)

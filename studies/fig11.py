@@ -19,12 +19,11 @@ from typing import Any
 
 import numpy as np
 
-from evfem import data
 from evfem.common.arrays import Floats
-from evfem.electrostatics.encoding import AreaLaw, PowerFit, fit_power
+from evfem.electrostatics.encoding import PowerFit, fit_power
 
 from . import fig11_panels
-from .common import LAWS, Series, Study, table2_layers
+from .common import LAWS, Series, Study, area_law, table2_layers
 from .fig11_panels import PAPER_FIT
 from .pressing import Case, Pad, Pressed, phases, run_all
 
@@ -44,68 +43,45 @@ PAPER = {
 
 ASSUMPTIONS = {
     "loads": "applied load over 10 mm: 0.1 to 1 N are 0.01 to 0.1 N/mm; alpha and beta hold for N/mm",
-    "fit": (
-        "(11) with r = ((9b) - (10)) / (10), fitted to ln r; standard errors are those of the fit alone; "
-        "what the mesh adds stands under mesh_fine (48 nodes per ridge against 24)"
-    ),
-    "paper": (
-        "the caption's order swapped, as only this fits the text; shares of 40 % and 15 % are the text's "
-        "'levels at around'"
-    ),
-    "runs": (
-        "Table 2, frictionless: load and voltage may then come in any order, and the voltage is there from "
-        "the start; without the air layer the attraction acts on nodes that the plate holds, so (10) is "
-        "evaluated on the state without voltage (tests compare both with runs that hold the load)"
-    ),
-    "edge of contact": (
-        "interpolated from the gap beyond it (evfem.contactedge); nodal sums are among the sensitivities"
-    ),
-    "phases": (
-        "forces averaged over a pad with a crest and one with a groove in the middle; each alone under "
-        "with_ridges.phase"
-    ),
-    "crest": (
-        "exponent 7 calibrated on Adams' ratio of ridge to gross area alone (0.40, 0.52, 0.585 at 0.1, 0.5,"
-        " 1 N; least misfit at 7.1). Fig. 11 does not enter, though what exponent 7 gives there had been "
-        "seen. Within 9 % from 0.2 N on, 15 % above at 0.1 N: the computed ratio grows more slowly than "
-        "Adams'"
-    ),
-    "area A_j": (
-        "current length projected on the plate; the other conventions are evaluated on the same states"
-    ),
+    "fit": "(11) with r = ((9b) - (10)) / (10), fitted to ln r; standard errors are those of the fit alone; "
+    "what the mesh adds stands under mesh_fine (48 nodes per ridge against 24)",
+    "paper": "the caption's order swapped, as only this fits the text; shares of 40 % and 15 % are the "
+    "text's 'levels at around'",
+    "runs": "Table 2, frictionless: load and voltage may then come in any order, and the voltage is there "
+    "from the start; without the air layer the attraction acts on nodes that the plate holds, so (10) is "
+    "evaluated on the state without voltage (tests compare both with runs that hold the load)",
+    "edge of contact": "interpolated from the gap beyond it (evfem.contactedge); nodal sums are among the "
+    "sensitivities",
+    "phases": "forces averaged over a pad with a crest and one with a groove in the middle; each alone under "
+    "with_ridges.phase",
+    "crest": "exponent 7 calibrated on Adams' ratio of ridge to gross area alone (0.40, 0.52, 0.585 at 0.1, "
+    "0.5, 1 N; least misfit at 7.1). Fig. 11 does not enter, though what exponent 7 gives there had been "
+    "seen. Within 9 % from 0.2 N on, 15 % above at 0.1 N: the computed ratio grows more slowly than Adams'",
+    "area A_j": "current length projected on the plate; the other conventions are evaluated on the same "
+    "states",
     "d_sc": "local thickness of the stratum corneum in the mesh: 0.38 mm at a crest, less in a groove",
     "(7) in panel b": "the paper does not say on which area: Adams' gross and ridge areas are both shown",
-    "agrees with the paper": (
-        "beta with ridges (0.49 for 0.49); the power law, which every load with ridges meets within 5 % and"
-        " without within 7 %; more air with ridges than without, and less under load"
-    ),
-    "does not agree": (
-        "with ridges alpha (0.24 for 0.17): at every load the air adds 1.4 to 1.5 times what the paper's "
-        "fit says, a share of 51 % for 40 % at 0.05 N/mm. Without ridges both (0.038 and 0.72 for 0.03 and "
-        "0.65): 1.5 to 1.8 times, 24 % for 15 %. Neither mesh nor friction changes that, and areas that "
-        "count the length of the walls move further away with ridges"
-    ),
-    "chosen after seeing the paper's numbers": (
-        "what brings them about; which of it the paper did cannot be told, and none is claimed. Half the "
-        "stiffness of all soft layers (nearly the same as twice the load, 5 mm of depth instead of 10) does"
-        " it for both pads at once: 0.033, 0.63 without ridges, -4 to +9 % over the loads; 0.22, 0.43 with "
-        "ridges, 0 to +17 %. A stratum corneum of 0.3 MPa: +14 to +27 % and -9 to +5 %. With ridges only: "
-        "nodal sums on 12 nodes per ridge (0.175, 0.48, share 42 %; -13 to +25 %), an error of the mesh; "
-        "flat crests (0.19, 0.42), which miss how Adams' ratio grows; Strong-Troxel (0.16, 0.52), which the"
-        " figure does not use"
-    ),
+    "agrees with the paper": "beta with ridges (0.49 for 0.49); the power law, which every load with ridges "
+    "meets within 5 % and without within 7 %; more air with ridges than without, and less under load",
+    "does not agree": "with ridges alpha (0.24 for 0.17): at every load the air adds 1.4 to 1.5 times what "
+    "the paper's fit says, a share of 51 % for 40 % at 0.05 N/mm. Without ridges both (0.038 and 0.72 for "
+    "0.03 and 0.65): 1.5 to 1.8 times, 24 % for 15 %. Neither mesh nor friction changes that, and areas that "
+    "count the length of the walls move further away with ridges",
+    "chosen after seeing the paper's numbers": "what brings them about; which of it the paper did cannot be "
+    "told, and none is claimed. Half the stiffness of all soft layers (nearly the same as twice the load, 5 "
+    "mm of depth instead of 10) does it for both pads at once: 0.033, 0.63 without ridges, -4 to +9 % over "
+    "the loads; 0.22, 0.43 with ridges, 0 to +17 %. A stratum corneum of 0.3 MPa: +14 to +27 % and -9 to +5 "
+    "%. With ridges only: nodal sums on 12 nodes per ridge (0.175, 0.48, share 42 %; -13 to +25 %), an error "
+    "of the mesh; flat crests (0.19, 0.42), which miss how Adams' ratio grows; Strong-Troxel (0.16, 0.52), "
+    "which the figure does not use",
 }
-
-
 #: crest exponent 7: calibrated, see `calibration.*` in the numbers
 TABLE_2_PAD = Pad(exponent=7.0)
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to ask the question: the pad (its `ridges` are set per question), the run, the
-    evaluation.
-    """
+    """One way to ask: the pad (its `ridges` are set per question), the run, the evaluation."""
 
     label: str
     pad: Pad = TABLE_2_PAD
@@ -190,25 +166,19 @@ def answer(
 
 
 def area_ratio(pad: Pad, runs: Runs, loads: tuple[float, ...]) -> Floats:
-    """Width of touching ridges over the gross width of contact, without voltage, averaged over the
-    phases.
-    """
+    """Width of touching ridges over the gross one, without voltage, averaged over the phases."""
     widths = [runs[Case(one, loads)].widths() for one in phases(pad)]
     return np.sum([real for real, _ in widths], axis=0) / np.sum([gross for _, gross in widths], axis=0)
 
 
 def adams_ratio(loads: Sequence[float]) -> Floats:
     """The same of Adams' power laws (Fig. 6b), for loads in N/mm over the depth."""
-    laws = data.load("area_laws")
-    ridge, gross = (AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in ("ridge", "gross"))
     force = DEPTH * np.asarray(loads)
-    return np.asarray(ridge(force)) / np.asarray(gross(force))
+    return np.asarray(area_law("ridge")(force)) / np.asarray(area_law("gross")(force))
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """The four forces over the load, alpha and beta; in full also calibration, mesh and
-    sensitivities.
-    """
+    """The forces over the load, alpha and beta; in full also calibration, mesh and sensitivities."""
     loads = QUICK_LOADS if quick else LOADS
     base = replace(BASE, pad=Pad(resolution="coarse")) if quick else BASE
     variants = {} if quick else VARIANTS
@@ -225,23 +195,21 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     numbers |= {"runs": len(runs), "newton_iterations": sum(one.iterations for one in runs.values())}
     parameters = {"U_V": VOLTAGE, "loads_N_per_mm": loads, "resolution": base.pad.resolution}
     parameters |= {"ridge_exponent": base.pad.exponent, "wall_seconds": seconds}
-    study = Study(
+    return Study(
         "fig11", numbers, PAPER, ASSUMPTIONS, _series(shown), lambda: fig11_panels.draw(shown), parameters
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def _run(
     base: Variant, variants: Mapping[str, Variant], loads: tuple[float, ...], processes: int
 ) -> tuple[Runs, dict[str, float]]:
     """All runs, those of the paper's panels first, and the wall time of both parts."""
-    started = time.perf_counter()
-    runs = run_all(_cases([base], loads), processes)
-    seconds = {"main_part": time.perf_counter() - started}
-    started = time.perf_counter()
-    more = [case for case in _cases(variants.values(), loads) if case not in runs]
-    runs |= run_all(more, processes) if more else {}
-    seconds["sensitivities"] = time.perf_counter() - started
+    runs: dict[Case, Pressed] = {}
+    seconds = {}
+    for name, part in (("main_part", [base]), ("sensitivities", variants.values())):
+        started = time.perf_counter()
+        runs |= run_all([case for case in _cases(part, loads) if case not in runs], processes)
+        seconds[name] = time.perf_counter() - started
     return runs, seconds
 
 
@@ -287,9 +255,7 @@ def _at(loads: tuple[float, ...], values: Floats, load: float = 0.05) -> float:
 
 
 def _over_paper(pad: str, found: Answer, loads: tuple[float, ...]) -> dict[str, float]:
-    """The relative contribution over that of the paper's fit: geometric mean and extremes over the
-    loads.
-    """
+    """The relative contribution over that of the paper's fit: geometric mean and extremes."""
     alpha, beta = PAPER_FIT[pad]
     over = found.ratio / (alpha * np.asarray(loads) ** -beta)
     mean = float(np.exp(np.mean(np.log(over))))
@@ -314,9 +280,7 @@ def _numbers(answers: Mapping[str, Answer], loads: tuple[float, ...]) -> dict[st
 
 
 def _ratio_numbers(ratios: Mapping[str, Floats], loads: tuple[float, ...]) -> dict[str, float]:
-    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it would be
-    least.
-    """
+    """Ridge-to-gross ratios beside Adams', their misfit, and the exponent at which it is least."""
     adams = adams_ratio(loads)
     misfit = {name: np.sqrt(np.mean(np.log(ratio / adams) ** 2)) for name, ratio in ratios.items()}
     numbers = {f"calibration.{name}.rms_log_misfit": value for name, value in misfit.items()}
@@ -370,7 +334,5 @@ def _series(shown: fig11_panels.Shown) -> list[Series]:
 
 def _plate(name: str) -> Floats:
     """(7) at zero gap on Adams' gross or ridge area over `PLATE_LOADS`, N/mm of the depth."""
-    laws = data.load("area_laws")
-    area = AreaLaw(laws.value(name, "k"), laws.value(name, "m"))
     pressure = LAWS["kaczmarek"].traction(0.0, VOLTAGE, table2_layers())
-    return np.asarray(area(DEPTH * PLATE_LOADS)) * pressure / DEPTH
+    return np.asarray(area_law(name)(DEPTH * PLATE_LOADS)) * pressure / DEPTH

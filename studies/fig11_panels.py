@@ -1,22 +1,16 @@
-"""How Fig. 11 is drawn: the paper's two panels; in the full study calibration, mesh and
-sensitivities too.
-"""
+"""How Fig. 11 is drawn: the paper's panels; in the full study calibration, mesh and sensitivities too."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .plots import COLOURS, Axes, Figure, new_figure, panel_letter
 
 PAPER_FIT = {"with_ridges": (0.17, 0.49), "without_ridges": (0.03, 0.65)}
 #: marker, name and colour of the two pads
@@ -32,19 +26,14 @@ CRESTS = {
     "crest_exponent_8": ("exponent 8", "#08306B"),
     "flat_crest": ("flat crests", COLOURS["strong_troxel"]),
 }
-MESHES = {
-    12: ("mesh_coarse", "nodal_edge_coarse"),
-    24: ("base", "nodal_edge"),
-    48: ("mesh_fine", "nodal_edge_fine"),
-}
+MESHES = {12: ("mesh_coarse", "nodal_edge_coarse"), 24: ("base", "nodal_edge")}
+MESHES[48] = ("mesh_fine", "nodal_edge_fine")
 LOAD_LABEL = "applied load $F_n$ (N/mm)"
 
 
 @dataclass(frozen=True)
 class Shown:
-    """What is drawn: answers per pad and per (variant, pad), labels of the variants, ratios of
-    areas.
-    """
+    """What is drawn: answers by pad and by (variant, pad), labels of the variants, ratios of areas."""
 
     loads: tuple[float, ...]
     answers: Mapping[str, Any]
@@ -80,23 +69,12 @@ def _contribution(ax: Axes, shown: Shown) -> None:
     for pad, one in shown.answers.items():
         marker, name, colour = STYLES[pad]
         alpha, beta = one.fit.k, -one.fit.m
-        ax.plot(
-            shown.loads,
-            one.ratio,
-            marker,
-            color=colour,
-            label=f"{name}: $\\alpha$ = {alpha:.3f}, $\\beta$ = {beta:.2f}",
-        )
+        label = f"{name}: $\\alpha$ = {alpha:.3f}, $\\beta$ = {beta:.2f}"
+        ax.plot(shown.loads, one.ratio, marker, color=colour, label=label)
         ax.plot(fine, alpha * fine**-beta, color=COLOURS["fe"], linewidth=1.3, zorder=1)
         alpha, beta = PAPER_FIT[pad]
-        ax.plot(
-            fine,
-            alpha * fine**-beta,
-            ":",
-            color=colour,
-            linewidth=1.3,
-            label=f"the paper's fit: {alpha:g}, {beta:g}",
-        )
+        label = f"the paper's fit: {alpha:g}, {beta:g}"
+        ax.plot(fine, alpha * fine**-beta, ":", color=colour, linewidth=1.3, label=label)
     ax.set(xlabel=LOAD_LABEL, ylabel="air layer over contact, (9b)/(10) − 1", xlim=(0, 0.105), ylim=(0, None))
     ax.plot([], [], color=COLOURS["fe"], linewidth=1.3, label="fits of (11)")
     ax.legend(fontsize="x-small")
@@ -145,14 +123,11 @@ def _meshes(ax: Axes, shown: Shown) -> None:
 
 def _sensitivities(axes: Any, shown: Shown) -> None:
     rows = ["base", *shown.labels]
-    for ax, of, paper, name in (
-        (axes[0], lambda f: f.k, 0, r"$\alpha$"),
-        (axes[1], lambda f: -f.m, 1, r"$\beta$"),
-    ):
+    fits = ((lambda f: f.k, r"$\alpha$"), (lambda f: -f.m, r"$\beta$"))
+    for paper, (ax, (of, name)) in enumerate(zip(axes, fits, strict=True)):
         for pad, (marker, _, colour) in STYLES.items():
-            found = {n: one for (n, p), one in shown.varied.items() if p == pad} | {
-                "base": shown.answers[pad]
-            }
+            found = {n: one for (n, p), one in shown.varied.items() if p == pad}
+            found |= {"base": shown.answers[pad]}
             places = [i for i, row in enumerate(rows) if row in found]
             ax.plot([of(found[rows[i]].fit) for i in places], places, marker, color=colour, markersize=4.5)
             ax.axvline(of(shown.answers[pad].fit), color=colour, linewidth=0.8, alpha=0.6)

@@ -12,17 +12,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
-from .parallel import side_by_side
+from .common import Series, Study, side_by_side
+from .plots import COLOURS, Axes, Figure, new_figure, note, panel_letter
 from .rendered import ASSUMPTIONS, QUICK_STEP, QUICK_TEXTURE, STEP, TEXTURE, Case, Outcome, render
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PAPER = {
     "transition.voltage_max_V": 1776.73,
@@ -42,37 +38,12 @@ INSIGHTS = {
 #: prefix of the keys -> what is simulated; the first pad is the paper's
 PADS = {"": True, "without_ridges.": False}
 SCENES = {"transition": STEP, "sinusoid": TEXTURE}
-OPEN = ("open",)
-#: what is changed one at a time, all on coarse pads with ridges
-_STEP = replace(STEP, resolution="coarse", encodings=OPEN)
-_TEXTURE = replace(TEXTURE, resolution="coarse", encodings=())
-VARIATIONS: dict[str, Case] = {
-    "transition.coarse": _STEP,
-    "transition.half_steps": replace(_STEP, steps=2 * _STEP.steps),
-    "transition.load_held": replace(_STEP, hold="force"),
-    "transition.load_0.02": replace(_STEP, force=0.02),
-    "sinusoid.coarse": _TEXTURE,
-    "sinusoid.half_steps": replace(_TEXTURE, steps=2 * _TEXTURE.steps),
-    "sinusoid.load_held": replace(_TEXTURE, hold="force"),
-    "sinusoid.load_0.02": replace(_TEXTURE, force=0.02),
-    "sinusoid.viscosity_0.2ms": replace(_TEXTURE, viscosity=2e-4),
-    "sinusoid.viscosity_1ms": replace(_TEXTURE, viscosity=1e-3),
-    "sinusoid.speed_50mm_s": replace(_TEXTURE, speed=50.0),
-    "sinusoid.without_mass": replace(_TEXTURE, dynamics="viscous"),
-    "sinusoid.friction_0.08": replace(_TEXTURE, friction=0.08),
-    "sinusoid.stiffness_0.5": replace(_TEXTURE, softness=0.5),
-    "sinusoid.crest_exponent_2": replace(_TEXTURE, ridge_exponent=2.0),
-    "sinusoid.crest_flat_0.3": replace(_TEXTURE, crest=0.3),
-}
-#: keep every n-th step of the coarse texture run when looking for the smallest apparent friction
-SAMPLING = (5, 10)
 
 
 def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
     """Numbers of one pad on one reference: open loop, and exact with `inverse.` before them."""
     signal, numbers = outcome.signal, {}
-    voltages = {"open": "", "exact": "inverse."}
-    for kind, inverse in voltages.items():
+    for kind, inverse in (("open", ""), ("exact", "inverse.")):
         found, key = outcome.rendered[kind], f"{prefix}{inverse}{name}"
         numbers[f"{key}.pearson"] = found.pearson
         numbers[f"{key}.relative_l2"] = found.relative_l2
@@ -109,8 +80,7 @@ def _main_numbers(prefix: str, name: str, outcome: Outcome) -> dict[str, float]:
 
 
 def _where_possible(outcome: Outcome) -> tuple[float, float]:
-    """Relative L2 error of the exact encoding over the steps it can serve, and the share of the
-    others.
+    """Relative L2 error of the exact encoding over the steps it can serve, and the others' share.
 
     Out of reach are steps in which the friction force on the display is not the wished one: while
     part of the contact sticks, and where the display has more than that of its own.
@@ -137,44 +107,6 @@ def _rise(outcome: Outcome, kind: str) -> float:
     return float((felt[-1] - felt[before]) / (outcome.force[-1] - outcome.force[before]))
 
 
-def _variation_numbers(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
-    """What changes with mesh, steps, load, viscosity, speed, friction, stiffness and ridges."""
-    numbers = {}
-    for name, outcome in outcomes.items():
-        key = f"variation.{name}"
-        if name.startswith("transition"):
-            found = outcome.rendered["open"]
-            numbers[f"{key}.pearson"], numbers[f"{key}.relative_l2"] = found.pearson, found.relative_l2
-        else:
-            numbers[f"{key}.mu_min"], numbers[f"{key}.mu_mean"] = (
-                outcome.lowest_friction,
-                _mean_friction(outcome),
-            )
-        base = outcomes[f"{name.split('.')[0]}.coarse"]
-        if outcome is not base:
-            numbers[f"{key}.change_of_force"] = _apart(base, outcome)
-    coarse = outcomes["sinusoid.coarse"]
-    slipping = coarse.position >= coarse.full_slip
-    for n in SAMPLING:
-        seen = coarse.apparent[slipping][n - 1 :: n]
-        numbers[f"variation.sinusoid.every_{n}th_step.mu_min"] = float(seen.min())
-    return numbers
-
-
-def _apart(base: Outcome, other: Outcome) -> float:
-    """Relative L2 difference of the reference's friction force, at the positions of `base`."""
-    force = np.interp(base.position, other.position, other.force)
-    return float(np.linalg.norm(force - base.force) / np.linalg.norm(base.force))
-
-
-def _mesh_numbers(outcomes: Mapping[str, Outcome], coarse: Mapping[str, Outcome]) -> dict[str, float]:
-    """Change of the reference's friction force from coarse pads to those of the figure."""
-    return {
-        f"variation.{name}.coarse.change_of_force": _apart(outcomes[name], coarse[f"{name}.coarse"])
-        for name in SCENES
-    }
-
-
 def _cases(quick: bool) -> dict[str, Case]:
     """Key -> case, those that take longest first."""
     scenes = {"transition": QUICK_STEP, "sinusoid": QUICK_TEXTURE} if quick else SCENES
@@ -184,32 +116,20 @@ def _cases(quick: bool) -> dict[str, Case]:
             if ridges or not quick:
                 cases[f"{prefix}{name}"] = replace(scenes[name], ridges=ridges)
     thick = cases["transition"]
-    cases["transition"] = replace(thick, encodings=(*thick.encodings, "thick"))
-    return cases if quick else cases | {f"variation.{key}": case for key, case in VARIATIONS.items()}
+    return cases | {"transition": replace(thick, encodings=(*thick.encodings, "thick"))}
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Both references on both pads, open loop and exact; what changes them; the figure."""
+    """Both references on both pads, open loop and exact; the figure."""
     cases = _cases(quick)
-    found = side_by_side(render, list(cases.values()), 1 if quick else 2)
-    outcomes = dict(zip(cases, found, strict=True))
-    shown = {key: outcome for key, outcome in outcomes.items() if not key.startswith("variation.")}
+    outcomes = dict(zip(cases, side_by_side(render, list(cases.values()), 1 if quick else 2), strict=True))
     numbers: dict[str, float] = {}
-    for key, outcome in shown.items():
-        prefix, name = key[: -len(key.split(".")[-1])], key.split(".")[-1]
-        numbers |= _main_numbers(prefix, name, outcome)
-    varied = {key.removeprefix("variation."): o for key, o in outcomes.items() if key not in shown}
-    if varied:
-        numbers |= _variation_numbers(varied) | _mesh_numbers(shown, varied)
-    costs = {key: outcome.costs for key, outcome in outcomes.items()}
+    for key, outcome in outcomes.items():
+        name = key.split(".")[-1]
+        numbers |= _main_numbers(key.removesuffix(name), name, outcome)
+    costs, picture = {key: one.costs for key, one in outcomes.items()}, lambda: draw(outcomes, numbers)
     study = Study(
-        "fig12",
-        numbers,
-        PAPER,
-        ASSUMPTIONS | INSIGHTS,
-        _series(shown),
-        lambda: draw(shown, numbers),
-        {"costs": costs},
+        "fig12", numbers, PAPER, ASSUMPTIONS | INSIGHTS, _series(outcomes), picture, {"costs": costs}
     )
     return study.finish(out, quick)
 
@@ -217,13 +137,11 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
 def _series(outcomes: Mapping[str, Outcome]) -> list[Series]:
     series = []
     for key, outcome in outcomes.items():
-        x = outcome.position
-        series.append(Series(f"{key}.reference.force", x, outcome.force, "N/mm"))
-        series.append(Series(f"{key}.reference.load", x, outcome.load, "N/mm"))
+        curves = {"reference.force": (outcome.force, "N/mm"), "reference.load": (outcome.load, "N/mm")}
         for kind, found in outcome.rendered.items():
-            series.append(Series(f"{key}.{kind}.force", x, found.force, "N/mm"))
-            series.append(Series(f"{key}.{kind}.load", x, found.load, "N/mm"))
-            series.append(Series(f"{key}.{kind}.voltage", x, found.voltage, "V"))
+            curves |= {f"{kind}.force": (found.force, "N/mm"), f"{kind}.load": (found.load, "N/mm")}
+            curves[f"{kind}.voltage"] = (found.voltage, "V")
+        series += [Series(f"{key}.{name}", outcome.position, y, unit) for name, (y, unit) in curves.items()]
     return series
 
 
@@ -253,9 +171,8 @@ def draw(outcomes: Mapping[str, Outcome], numbers: Mapping[str, float]) -> Figur
         _draw_voltage(column[0], outcomes[key], key)
         _draw_force(column[1], outcomes[key], numbers, key)
         _draw_residual(column[2], outcomes[key])
-    for row, label in zip(
-        axes[:, 0], ("voltage (V)", "friction force (N/mm)", "error over largest force"), strict=True
-    ):
+    labels = ("voltage (V)", "friction force (N/mm)", "error over largest force")
+    for row, label in zip(axes[:, 0], labels, strict=True):
         row.set_ylabel(label)
     handles, labels = axes[1, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize="small")
@@ -269,16 +186,9 @@ def _draw_voltage(ax: Axes, outcome: Outcome, key: str) -> None:
     ax.margins(y=0.12)
     printed = PAPER[f"{key.split('.')[-1]}.voltage_max_V"]
     ax.axhline(printed, color=COLOURS["neutral"], linewidth=0.8, linestyle=":")
-    ax.annotate(
-        f"paper {printed:g} V",
-        (0.02, printed),
-        xycoords=("axes fraction", "data"),
-        xytext=(0, 2),
-        textcoords="offset points",
-        fontsize="x-small",
-        color=COLOURS["neutral"],
-        bbox={"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 0.5},
-    )
+    box = {"facecolor": "white", "alpha": 0.75, "linewidth": 0.0, "pad": 0.5}
+    style = {"fontsize": "x-small", "color": COLOURS["neutral"], "bbox": box}
+    note(ax, f"paper {printed:g} V", (0.02, printed), (0, 2), xycoords=("axes fraction", "data"), **style)
     ax.grid(alpha=0.3)
 
 

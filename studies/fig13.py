@@ -11,33 +11,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Kaczmarek
 from evfem.export import paraview
 from evfem.plotting import side_by_side
-from evfem.scene.motion import Slide
-from evfem.scene.scene import Output
 from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
-from evfem.simulation.result import Frame, Result
-from evfem.surface.surfaces import Display
 
+from . import rendered
 from .common import Series, Study, make_folder
-from .rendered import (
-    ASSUMPTIONS,
-    QUICK_TEXTURE,
-    TEXTURE,
-    Case,
-    display_encoding,
-    display_friction,
-    reference_scene,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .plots import Figure
 
 PAPER = {"voltage_V": 1911.12}
 NEAR = 1.0  # mm from the contact
@@ -50,10 +36,10 @@ TITLES = {"reference": "on the sinusoid", "display": "on the display"}
 class Instant:
     """One step of a run: a result with that step's fields alone."""
 
-    result: Result
+    result: ev.Result
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> ev.Frame:
         """The fields."""
         return self.result.frames[0]
 
@@ -68,9 +54,7 @@ class Instant:
         return self.position[self.frame.contact_status > 0]
 
     def near(self) -> Any:
-        """Which cells lie within 1 mm of the contact: by their middle and the nearest touching
-        node.
-        """
+        """Which cells lie, with their middle, within 1 mm of the nearest touching node."""
         middle = self.position[self.result.mesh.cells].mean(axis=1)
         distance = np.hypot(*(middle[:, None] - self.touching[None]).transpose(2, 0, 1))
         return distance.min(axis=1) <= NEAR
@@ -82,28 +66,29 @@ def _instant(recording: Recording, step: int) -> Instant:
     return Instant(replace(recording.result, frames=[frame]))
 
 
-def instants(case: Case) -> dict[str, Instant]:
+def instants(case: rendered.Case) -> dict[str, Instant]:
     """Reference and display in the step of the slide with the largest voltage by (20a)."""
-    reference = record(reference_scene(case, every=1))
+    reference = record(rendered.reference_scene(case, every=1))
     felt = apparent_friction(reference.result)
     full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
-    _, friction = display_friction(case, felt, full_slip)
-    signal = voltage_for(felt, display_encoding(friction))
+    _, friction = rendered.display_friction(case, felt, full_slip)
+    signal = voltage_for(felt, rendered.display_encoding(friction))
     number = int(np.argmax(signal.profile.voltage[1:])) + 1
     press, slide = reference.scene.motion
-    assert isinstance(slide, Slide)
+    assert isinstance(slide, ev.Slide)
     short = replace(slide, distance=slide.distance * number / slide.steps, steps=number)
-    scene = replace(reference.scene, motion=(press, short), output=Output(every=1_000_000))
-    display = replay(replace(reference, scene=scene), Display(friction=friction), Kaczmarek(), signal.profile)
+    scene = replace(reference.scene, motion=(press, short), output=ev.Output(every=1_000_000))
+    short_reference, surface = replace(reference, scene=scene), ev.Display(friction=friction)
+    display = replay(short_reference, surface, ev.Kaczmarek(), signal.profile)
     step = press.steps + number
     return {"reference": _instant(reference, step), "display": _instant(display, step)}
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Both pads in the instant of the largest voltage, their stresses, the figure, the fields."""
-    found = instants(QUICK_TEXTURE if quick else TEXTURE)
+    found = instants(rendered.QUICK_TEXTURE if quick else rendered.TEXTURE)
     numbers = _numbers(found)
-    study = Study("fig13", numbers, PAPER, ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
+    study = Study("fig13", numbers, PAPER, rendered.ASSUMPTIONS, _series(found), lambda: draw(found, numbers))
     result = study.finish(out, quick)
     if out is not None:
         for name, instant in found.items():
@@ -132,9 +117,8 @@ def _series(found: dict[str, Instant]) -> list[Series]:
         order = np.argsort(instant.touching[:, 0])
         x = instant.touching[order, 0]
         for quantity in ("contact_pressure", "shear_traction"):
-            series.append(
-                Series(f"{name}.{quantity}", x, getattr(instant.frame, quantity)[touching][order], "MPa")
-            )
+            y = getattr(instant.frame, quantity)[touching][order]
+            series.append(Series(f"{name}.{quantity}", x, y, "MPa"))
     return series
 
 

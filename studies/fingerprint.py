@@ -17,24 +17,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
+from .common import Series, Study
+from .plots import COLOURS, Figure, panels
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-PATTERNS = {
-    "along": COLOURS["neutral"],
-    "whorl": COLOURS["kaczmarek"],
-    "loop": COLOURS["strong_troxel"],
-    "arch": COLOURS["fe"],
-}
+COLOUR_OF = {"along": "neutral", "whorl": "kaczmarek", "loop": "strong_troxel", "arch": "fe"}
+PATTERNS = {pattern: COLOURS[name] for pattern, name in COLOUR_OF.items()}
 DIRECTIONS = {"x": 0.0, "z": 90.0}
 PITCH, LOAD, VOLTAGE, FRICTION = 0.75, 0.25, 1000.0, 0.3
 #: slides (mm), one after the other; the first, short one tells the stiffness
@@ -101,8 +95,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         if one in PATTERNS
     ]
     parameters = {"pitch_mm": PITCH, "load_N": LOAD, "voltage_V": VOLTAGE, "slides_mm": slides}
-    study = Study("fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "fingerprint", numbers, {}, ASSUMPTIONS, series, lambda: _draw(found, patterns), parameters
+    ).finish(out, quick)
 
 
 def pattern_numbers(found: dict[tuple[str, str], Slid], patterns: list[str]) -> dict[str, float]:
@@ -139,9 +134,8 @@ def error_numbers(found: dict[tuple[str, str], Slid]) -> dict[str, float]:
     }
     numbers = {}
     for name, one in others.items():
-        changes = {"stiffness": (one.stiffness, base.stiffness)}
-        pulls = (one.result.electrostatic_force[PRESSED], base.result.electrostatic_force[PRESSED])
-        changes["attraction"] = (float(pulls[0]), float(pulls[1]))
+        pulls = [float(slid.result.electrostatic_force[PRESSED]) for slid in (one, base)]
+        changes = {"stiffness": (one.stiffness, base.stiffness), "attraction": pulls}
         if name == "steps_doubled":
             changes["friction_after_0.1mm"] = (float(one.share[-1]), float(base.share[3]))
         numbers |= {f"error.{name}.{key}_percent": 100.0 * (a / b - 1.0) for key, (a, b) in changes.items()}
@@ -151,31 +145,27 @@ def error_numbers(found: dict[tuple[str, str], Slid]) -> dict[str, float]:
 def _draw(found: dict[tuple[str, str], Slid], patterns: list[str]) -> Figure:
     from evfem.plotting.footprint import footprint
 
-    figure = new_figure(6.2, 9.5)
+    figure, axes = panels(6.2, 3, 9.5, rows=2)
     figure.get_layout_engine().set(rect=(0.0, 0.0, 0.97, 1.0))  # labels of bars stand beside the panels
-    axes = figure.subplots(2, 3)
     shown = patterns[-3:]
-    for ax, one, letter in zip(axes[0], shown, "abc", strict=False):
+    for ax, one in zip(axes, shown, strict=False):
         footprint(found[one, "x"].result, "contact_pressure", PRESSED, ax, near=(-3.0, 3.0, -4.2, 4.2))
         ax.set_title(one, fontsize="medium")
-        panel_letter(ax, letter)
-    for ax in axes[0, 1:]:
+    for ax in axes[1:3]:
         ax.set_ylabel("")  # as at the first
-    for ax in axes[0, len(shown) :]:
+    for ax in axes[len(shown) : 3]:
         ax.set_visible(False)
-    _bars(axes[1, 0], patterns, {way: [found[one, way].onset for one in patterns] for way in DIRECTIONS})
-    axes[1, 0].set_ylabel("onset of sliding (mm)")
+    _bars(axes[3], patterns, {way: [found[one, way].onset for one in patterns] for way in DIRECTIONS})
+    axes[3].set_ylabel("onset of sliding (mm)")
     bars = ["smooth", *patterns]
-    _bars(axes[1, 1], bars, {way: [found[one, way].stiffness for one in bars] for way in DIRECTIONS})
-    axes[1, 1].set_ylabel("stiffness (N/mm)")
+    _bars(axes[4], bars, {way: [found[one, way].stiffness for one in bars] for way in DIRECTIONS})
+    axes[4].set_ylabel("stiffness (N/mm)")
     smooth = found["smooth", "x"].result.electrostatic_force[PRESSED]
     pull = [found[one, "x"].result.electrostatic_force[PRESSED] / smooth for one in patterns]
-    axes[1, 2].bar(patterns, pull, color=[PATTERNS[one] for one in patterns])
-    axes[1, 2].set_ylabel("attraction over that of a smooth pad")
-    for ax in axes[1]:
+    axes[5].bar(patterns, pull, color=[PATTERNS[one] for one in patterns])
+    axes[5].set_ylabel("attraction over that of a smooth pad")
+    for ax in axes[3:]:
         ax.tick_params(axis="x", labelsize="small", rotation=30)
-    for ax, letter in zip(axes[1], "def", strict=True):
-        panel_letter(ax, letter)
     return figure
 
 

@@ -22,21 +22,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import evfem as ev
-from evfem import data
 from evfem.common.arrays import Floats
-from evfem.electrostatics.encoding import AreaLaw
-from evfem.finger.layers import TABLE_2
 from evfem.finger.solid import Ellipsoid, Grid
 from evfem.simulation.model import make_attraction, placed
 from evfem.surface.skin import Skin, make_skin
 
-from .common import CASES, LAWS, Series, Study, participants
+from .common import CASES, LAWS, Series, Study, area_law, by_participant, participants, tissue
 from .fingertip_panels import draw
 from .measured import participant_forces
 
@@ -47,24 +45,13 @@ LOAD = 0.5
 WAY = (0.1, 0.25, LOAD)
 ASSUMPTIONS = {
     "pad": "Table 2's axes and moduli; 22.5 mm long (26 mm seen at 30 degrees); the bone's axes are assumed",
-    "areas": (
-        "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is larger "
-        "than the hull of the touching nodes; ridge (and smooth pads): all that touches"
-    ),
+    "areas": "gross: convex hull of what touches; its uncertainty, under `error`, is by how much that is "
+    "larger than the hull of the touching nodes; ridge (and smooth pads): all that touches",
     "press": "no friction, no voltage, rim held by the nail; one variant has friction 0.3",
     "hover": "rigid, local thickness of the stratum corneum; fingers of Table 1 as Fingertip.participant",
     "ridges": "twelve cells across each; the error of the mesh is that of six",
     "variants": "one change each of the coarse smooth pad; crests of the ridged one",
 }
-
-
-def softer(factor: float, only: str = "") -> dict[str, Any]:
-    """Materials of Table 2 with moduli times a factor, all of them or of one layer."""
-    layers = {name: own for name, own in TABLE_2.items() if not name.startswith("nail")}
-    return {
-        name: ev.NeoHookean(E=E * (factor if only in ("", name) else 1.0), nu=nu)
-        for name, (E, nu) in layers.items()
-    }
 
 
 #: what is changed of the coarse smooth pad, one thing each
@@ -75,9 +62,9 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "bone x 0.7": {"bone_width": 4.2, "bone_height": 3.5, "bone_length": 11.9},
     "free rim": {"rim": "free"},
     "held at 30 degrees": {"posture": 30.0},
-    "all moduli x 0.5": {"materials": softer(0.5)},
-    "hypodermis x 0.5": {"materials": softer(0.5, "hypodermis")},
-    "stratum corneum x 0.3": {"materials": softer(0.3, "stratum_corneum")},
+    "all moduli x 0.5": {"materials": tissue(0.5)},
+    "hypodermis x 0.5": {"materials": tissue(hypodermis=0.5 * 0.034)},
+    "stratum corneum x 0.3": {"materials": tissue(stratum_corneum=0.3)},
     "friction 0.3": {},
 }
 #: crests of the ridged pad: a flat share, and the exponent of the walls
@@ -93,9 +80,7 @@ def tip(resolution: str = "coarse", ridges: str = "none", **own: Any) -> ev.Fing
 
 
 class Resolved(ev.Fingertip):
-    """A pad with twice as many columns across as its resolution has: twelve cells a pitch, for how much
-    of a ridge touches is told by the nodes across it.
-    """
+    """A pad with twice its resolution's columns across: twelve cells a pitch tell how much touches."""
 
     def _grid(self, outer: Ellipsoid) -> Grid:
         grid = super()._grid(outer)
@@ -115,9 +100,7 @@ def press(finger: Any, loads: Sequence[float], friction: float = 0.0, steps: int
 
 
 def gross_area(result: ev.Result, frame: int) -> tuple[float, float]:
-    """Gross contact area (mm2), and how uncertain the nodes leave it: by how much it is larger than
-    the convex hull of the touching nodes.
-    """
+    """Gross contact area (mm2), and by how much it is larger than the hull of the touching nodes."""
     from scipy.spatial import ConvexHull
 
     skin, shown = make_skin(result.mesh), result.frames[frame]
@@ -134,9 +117,7 @@ def pressed(name: str, result: ev.Result, loads: Sequence[float]) -> dict[str, l
     smooth = name.startswith("smooth")
     return {
         "depth_mm": result.indentation[rows].tolist(),
-        "gross_mm2": [float(result.real_contact_area[row]) for row in rows]
-        if smooth
-        else [g for g, _ in gross],
+        "gross_mm2": result.real_contact_area[rows].tolist() if smooth else [g for g, _ in gross],
         "real_mm2": result.real_contact_area[rows].tolist(),
         "uncertain_mm2": [u for _, u in gross],
     }
@@ -158,13 +139,11 @@ def variants(quick: bool) -> dict[str, dict[str, float]]:
     for name, own in chosen.items():
         friction = 0.3 if name.startswith("friction") else 0.0
         found[name] = press(tip(**own), loads, friction, steps=3 if friction else 1)
+    unchanged = found["smooth"].real_contact_area[-1]
+    ends = {name: (one.indentation[-1], one.real_contact_area[-1]) for name, one in found.items()}
     return {
-        name: {
-            "depth_mm": float(one.indentation[-1]),
-            "area_mm2": float(one.real_contact_area[-1]),
-            "area_over_unchanged": float(one.real_contact_area[-1] / found["smooth"].real_contact_area[-1]),
-        }
-        for name, one in found.items()
+        name: {"depth_mm": depth, "area_mm2": area, "area_over_unchanged": area / unchanged}
+        for name, (depth, area) in ends.items()
     }
 
 
@@ -217,23 +196,16 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         for key, values in one.items()
     ]
     series += [Series(f"width {name}", loads, values, "mm over N") for name, values in width.items()]
-    named = participants()["participant"][: 3 if quick else None]
-    series += [Series(" ".join(key), named, values, "mN over participant") for key, values in forces.items()]
+    series += [by_participant(" ".join(key), values) for key, values in forces.items()]
     parameters = {"loads_N": loads, "variants_at_N": LOAD, "resolution": pads["smooth"].resolution}
-    picture = lambda: draw(series, changed, forces, areas())  # noqa: E731
+    picture = partial(draw, series, changed, forces)
     return Study("fingertip", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
-
-
-def areas() -> dict[str, AreaLaw]:
-    """Adams' gross and ridge areas."""
-    laws = data.load("area_laws")
-    return {name: AreaLaw(laws.value(name, "k"), laws.value(name, "m")) for name in ("gross", "ridge")}
 
 
 def press_numbers(table: dict[str, dict[str, list[float]]], loads: Sequence[float]) -> dict[str, float]:
     """Depths and areas, and the areas over Adams'."""
     numbers: dict[str, float] = {}
-    adams = areas()
+    adams = {name: area_law(name) for name in ("gross", "ridge")}
     for name, one in table.items():
         for key, values in one.items():
             numbers |= {f"{name}.{key}.{load:g}N": value for load, value in zip(loads, values, strict=True)}
@@ -243,9 +215,8 @@ def press_numbers(table: dict[str, dict[str, list[float]]], loads: Sequence[floa
             if name == "ridged":
                 key = f"verdict.{name}.ridge_over_adams.{load:g}N"
                 numbers[key] = one["real_mm2"][i] / float(adams["ridge"](load))
-                numbers[f"verdict.{name}.ridge_over_gross.{load:g}N"] = (
-                    one["real_mm2"][i] / one["gross_mm2"][i]
-                )
+                ratio = one["real_mm2"][i] / one["gross_mm2"][i]
+                numbers[f"verdict.{name}.ridge_over_gross.{load:g}N"] = ratio
                 ratio = float(adams["ridge"](load) / adams["gross"](load))
                 numbers[f"adams.ridge_over_gross.{load:g}N"] = ratio
     return numbers
@@ -253,7 +224,7 @@ def press_numbers(table: dict[str, dict[str, list[float]]], loads: Sequence[floa
 
 def variant_numbers(changed: dict[str, dict[str, float]]) -> dict[str, float]:
     """Depth and area of every variant, and the area that Adams' law would want of it."""
-    wanted = float(areas()["gross"](LOAD))
+    wanted = float(area_law("gross")(LOAD))
     numbers = {"variant.wanted_over_unchanged": wanted / changed["smooth"]["area_mm2"]}
     for name, one in changed.items():
         numbers |= {f"variant.{name}.{key}": value for key, value in one.items()}

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 
-from .common import CASES, COLOURS, LABELS, LAWS, Series, draw_box, measured_boxes, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from .common import CASES, Series, area_law
+from .plots import COLOURS, LABELS, Axes, Figure, draw_box, measured_boxes, panels
 
 PADS = {"smooth": (COLOURS["kaczmarek"], "o"), "ridged": (COLOURS["fe"], "s")}
 #: how curves are drawn that nearly coincide: the second one open and dashed
@@ -27,36 +24,35 @@ def draw(
     series: Sequence[Series],
     changed: Mapping[str, Mapping[str, float]],
     forces: Mapping[tuple[str, str, str], Floats],
-    adams: Mapping[str, Any],
 ) -> Figure:
     """Panels: load over depth, areas over the load, variants, widths, hovering forces of two laws."""
-    figure = new_figure(6.4, 9.5)
-    axes = figure.subplots(2, 3)
+    figure, axes = panels(6.4, 3, 9.5, rows=2)
     named = {one.name: one for one in series}
-    _depth(axes[0, 0], named)
-    _areas(axes[0, 1], named, adams)
-    _variants(axes[0, 2], changed, float(adams["gross"](0.5)))
-    _widths(axes[1, 0], named)
-    for ax, law in zip(axes[1, 1:], ("kaczmarek", "strong_troxel"), strict=True):
+    _curves(axes[0], named, "", " depth_mm")
+    axes[0].set(xlabel="depth (mm)", ylabel="load (N)", xlim=(0, None))
+    _areas(axes[1], named)
+    _variants(axes[2], changed, float(area_law("gross")(0.5)))
+    _curves(axes[3], named, "width ", "")
+    axes[3].set(xlabel="load (N)", ylabel="width of the cross-section (mm)")
+    for ax, law in zip(axes[4:], ("kaczmarek", "strong_troxel"), strict=True):
         _hover(ax, law, forces)
-    for ax, letter in zip(axes.ravel(), "abcdef", strict=True):
-        panel_letter(ax, letter)
     return figure
 
 
-def _depth(ax: Axes, named: Mapping[str, Series]) -> None:
+def _curves(ax: Axes, named: Mapping[str, Series], before: str, after: str) -> None:
+    """The curve of each pad."""
     for pad, (colour, marker) in PADS.items():
-        if f"{pad} depth_mm" in named:
-            one = named[f"{pad} depth_mm"]
-            ax.plot(one.y, one.x, marker=marker, color=colour, label=pad, **LINES[pad])
-    ax.set(xlabel="depth (mm)", ylabel="load (N)", xlim=(0, None), ylim=(0, None))
+        if one := named.get(f"{before}{pad}{after}"):
+            x, y = (one.y, one.x) if after else (one.x, one.y)
+            ax.plot(x, y, marker=marker, color=colour, label=pad, **LINES[pad])
+    ax.set_ylim(bottom=0)
     ax.legend(fontsize="small")
 
 
-def _areas(ax: Axes, named: Mapping[str, Series], adams: Mapping[str, Any]) -> None:
+def _areas(ax: Axes, named: Mapping[str, Series]) -> None:
     loads = np.geomspace(0.04, 1.2, 30)
     for name, style in (("gross", "--"), ("ridge", ":")):
-        ax.loglog(loads, adams[name](loads), style, color=COLOURS["measured"], label=f"Adams, {name}")
+        ax.loglog(loads, area_law(name)(loads), style, color=COLOURS["measured"], label=f"Adams, {name}")
     for pad, (colour, marker) in PADS.items():
         if f"{pad} gross_mm2" not in named:
             continue
@@ -74,25 +70,17 @@ def _areas(ax: Axes, named: Mapping[str, Series], adams: Mapping[str, Any]) -> N
 def _variants(ax: Axes, changed: Mapping[str, Mapping[str, float]], wanted: float) -> None:
     base = changed["smooth"]["area_mm2"]
     names = sorted((name for name in changed if name != "smooth"), key=lambda name: changed[name]["area_mm2"])
-    ax.barh(
-        names, [100.0 * (changed[name]["area_mm2"] / base - 1.0) for name in names], color=COLOURS["neutral"]
-    )
+    change = [100.0 * (changed[name]["area_mm2"] / base - 1.0) for name in names]
+    ax.barh(names, change, color=COLOURS["neutral"])
     ax.axvline(0.0, color="k", linewidth=0.8)
     ax.axvline(100.0 * (wanted / base - 1.0), color=COLOURS["measured"], linestyle="--")
     ax.tick_params(axis="y", labelsize="x-small")
     ax.set_xlabel("change of the area at 0.5 N (%);\ndashed: as Adams", fontsize="small")
 
 
-def _widths(ax: Axes, named: Mapping[str, Series]) -> None:
-    for pad, (colour, marker) in PADS.items():
-        if f"width {pad}" in named:
-            one = named[f"width {pad}"]
-            ax.plot(one.x, one.y, marker=marker, color=colour, label=pad, **LINES[pad])
-    ax.set(xlabel="load (N)", ylabel="width of the cross-section (mm)", ylim=(0, None))
-    ax.legend(fontsize="small")
-
-
 def _hover(ax: Axes, law: str, forces: Mapping[tuple[str, str, str], Floats]) -> None:
+    from matplotlib.patches import Patch
+
     places = dict(zip(CASES, range(len(CASES)), strict=True))
     measured_boxes(ax, {case: place - 0.27 for case, place in places.items()}, 0.2)
     for shift, kind, colour in ((0.0, "smooth", COLOURS[law]), (0.27, "ridged", COLOURS["fe"])):
@@ -101,12 +89,6 @@ def _hover(ax: Axes, law: str, forces: Mapping[tuple[str, str, str], Floats]) ->
     ax.set_xticks(list(places.values()), list(places))
     ax.set(ylabel="force (mN)", ylim=(0, None))
     ax.set_title(LABELS[law], fontsize="medium")
-    ax.legend(handles=_handles(law), fontsize="x-small")
-
-
-def _handles(law: str) -> list[Any]:
-    from matplotlib.patches import Patch
-
-    assert law in LAWS
     kinds = (("measured", COLOURS["measured"]), ("smooth", COLOURS[law]), ("ridged", COLOURS["fe"]))
-    return [Patch(color=colour, label=label) for label, colour in kinds]
+    handles = [Patch(color=colour, label=label) for label, colour in kinds]
+    ax.legend(handles=handles, fontsize="x-small")

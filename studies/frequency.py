@@ -15,38 +15,28 @@ about 190 Hz and less above it; a step rises before it decays.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.electrostatics.alternating import (
-    alternating_pressure,
-    complex_length,
-    corner_frequencies,
-    square_wave_pressure,
-    step_pressure,
-)
+from evfem.electrostatics import alternating
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import TOUCHSCREEN, Layers, StrongTroxel, eps_0
 
-from .common import COLOURS, Series, Study, new_figure, panel_letter
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import Series, Study
+from .plots import COLOURS, Figure, panels
 
 GAP, PEAK, THICKNESS = 0.001, 100.0, 0.30  # mm, V, mm
 LEAKS = (0.0, 1e-8, 1e-7)  # S/m
 LEAK = 1e-8
+LEAKY = {"insulator": TOUCHSCREEN, "gap_conductivity": LEAK}
 #: dry skin at 1 kHz, as a step and the corners take it
 CONSTANTS = {"skin_eps_r": 1136.0, "skin_conductivity": 2e-4, "skin_thickness": THICKNESS}
 #: Rauf and Follmer (2025), doi:10.1016/j.eml.2025.102382: shear capacity (kPa) of an electroadhesive clutch
 VOLTS = (150.0, 200.0, 250.0, 300.0)
-CLUTCH = {
-    "DC": (2.05, 3.45, 5.71, 6.92),
-    "100 Hz": (1.96, 4.00, 5.04, 6.25),
-    "10 kHz": (1.27, 2.47, 3.28, 3.94),
-}
+CLUTCH = {"DC": (2.05, 3.45, 5.71, 6.92), "100 Hz": (1.96, 4.00, 5.04, 6.25)}
+CLUTCH["10 kHz"] = (1.27, 2.47, 3.28, 3.94)
 LINES = ("#000000", COLOURS["strong_troxel"], COLOURS["kaczmarek"], COLOURS["fe"])
 ASSUMPTIONS = {
     "plate": "100 V peak, gap 1 um, insulator 1 um / 3.9, stratum corneum 0.30 mm",
@@ -75,30 +65,28 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     curves |= {f"leak {leak:g} S/m": _mean(frequency, "gabriel_dry", leak) for leak in LEAKS}
     swings = _fluctuations(frequency)
     time = np.geomspace(1e-6, 0.1, 61 if quick else 301)
-    step = 1e6 * step_pressure(time, GAP, PEAK, **CONSTANTS, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    step = 1e6 * alternating.step_pressure(time, GAP, PEAK, **CONSTANTS, **LEAKY)
     numbers = _numbers(swings, frequency) | _statements(time, step)
     series = [Series(name, frequency, y, "Pa over Hz") for name, y in curves.items()]
     series += [Series(f"{name} wave", frequency, y, "Pa over Hz") for name, y in swings.items()]
     series.append(Series("step", time, step, "Pa over s"))
     series += [Series(f"clutch {name}", VOLTS, y, "kPa over V") for name, y in CLUTCH.items()]
-    study = Study(
-        "frequency", numbers, {}, ASSUMPTIONS, series,
-        lambda: _draw(frequency, curves, swings, (time, step)), {"gap_mm": GAP, "peak_V": PEAK},
-    )  # fmt: skip
-    return study.finish(out, quick)
+    given, picture = {"gap_mm": GAP, "peak_V": PEAK}, lambda: _draw(frequency, curves, swings, (time, step))
+    return Study("frequency", numbers, {}, ASSUMPTIONS, series, picture, given).finish(out, quick)
 
 
 def _mean(frequency: Any, skin: str, leak: float) -> Any:
     """Mean pressure in Pa under a sine."""
     given = {"skin": skin, "skin_thickness": THICKNESS, "insulator": TOUCHSCREEN}
-    return 1e6 * alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **given, gap_conductivity=leak)
+    rms = PEAK / np.sqrt(2.0)
+    return 1e6 * alternating.alternating_pressure(GAP, rms, frequency, **given, gap_conductivity=leak)
 
 
 def _fluctuations(frequency: Floats) -> dict[str, Floats]:
     """Mean and standard deviation of the pressure over the cycle (Pa), skin shorted, by waveform."""
-    metal = {"skin": 1.0, "skin_thickness": 0.0, "insulator": TOUCHSCREEN, "gap_conductivity": LEAK}
-    sine = 1e6 * alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **metal)
-    square = 1e6 * square_wave_pressure(frequency, GAP, PEAK, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    metal = {"skin": 1.0, "skin_thickness": 0.0} | LEAKY
+    sine = 1e6 * alternating.alternating_pressure(GAP, PEAK / np.sqrt(2.0), frequency, **metal)
+    square = 1e6 * alternating.square_wave_pressure(frequency, GAP, PEAK, **LEAKY)
     full = 1e6 * StrongTroxel().traction(GAP, PEAK, Layers.of(TOUCHSCREEN))
     tau = eps_0 * (1.0 + GAP * 3.9 / 0.001) / LEAK
     a = 1.0 / (2.0 * frequency * tau)
@@ -132,13 +120,11 @@ def _numbers(swings: dict[str, Floats], frequency: Floats) -> dict[str, float]:
 
 def _statements(time: Floats, step: Floats) -> dict[str, float]:
     """What experiments state, and what the model gives."""
-    corners = corner_frequencies(GAP, **CONSTANTS, insulator=TOUCHSCREEN, gap_conductivity=LEAK)
+    corners = alternating.corner_frequencies(GAP, **CONSTANTS, **LEAKY)
     found = _fluctuations(np.array([15.0, 60.0, 480.0]))
     over = found["fluctuation of a square"] / found["fluctuation of a sine"]
-    z, leaked = (
-        abs(complex_length(1e3, skin="gabriel_dry", skin_thickness=THICKNESS, insulator=TOUCHSCREEN))
-        + np.array([0.0, gap]) for gap in (0.0005, 0.0025)
-    )  # fmt: skip
+    skin = {"skin": "gabriel_dry", "skin_thickness": THICKNESS, "insulator": TOUCHSCREEN}
+    none = abs(alternating.complex_length(1e3, **skin))
     dc, slow, fast = (np.array(CLUTCH[name]) for name in CLUTCH)
     exponents = [float(np.polyfit(np.log(VOLTS), np.log(y), 1)[0]) for y in (dc, slow, fast)]
     return {
@@ -148,8 +134,8 @@ def _statements(time: Floats, step: Floats) -> dict[str, float]:
         "model.meyer.skin_corner_Hz": corners[1],
         "published.shultz.impedance_of_sliding_over_rest_least": 2.0,
         "published.shultz.impedance_of_sliding_over_rest_most": 11.0,
-        "model.shultz.impedance_with_0.5_um_over_none": z[1] / z[0],
-        "model.shultz.impedance_with_2.5_um_over_none": leaked[1] / leaked[0],
+        "model.shultz.impedance_with_0.5_um_over_none": (none + 0.0005) / none,
+        "model.shultz.impedance_with_2.5_um_over_none": (none + 0.0025) / none,
         "model.vardar.square_over_sine.15_Hz": over[0],
         "model.vardar.square_over_sine.60_Hz": over[1],
         "model.vardar.square_over_sine.480_Hz": over[2],
@@ -169,10 +155,8 @@ def _statements(time: Floats, step: Floats) -> dict[str, float]:
 def _draw(
     frequency: Floats, curves: dict[str, Any], swings: dict[str, Floats], step: tuple[Floats, Floats]
 ) -> Figure:
-    figure = new_figure(7.6)
-    axes = figure.subplots(3, 2)
-    for ax, letter in zip(axes.flat, "abcdef", strict=True):
-        panel_letter(ax, letter)
+    figure, axes = panels(7.6, 2, rows=3)
+    axes = axes.reshape(3, 2)
     for ax, kind in zip(axes[0], ("skin ", "leak "), strict=True):
         names = [name for name in curves if name.startswith(kind)]
         for name, colour, dash in zip(names, LINES, ("-", "-", "--", ":"), strict=False):

@@ -16,17 +16,15 @@ neighbours; none without ridges.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure
 
 PITCH, PERIOD, RUN_IN, FRICTION = 0.5, 4.0, 1.0, 0.3
 SPEEDS = (20.0, 40.0)
@@ -48,19 +46,12 @@ def surface() -> ev.SelfAffine:
 def slid(ridges: bool, speed: float, steps: int) -> Floats:
     """Tangential over normal force in each step of one period of the surface (steps,)."""
     before = max(2, round(steps * RUN_IN / PERIOD / 4.0))
-    scene = ev.Scene(
-        ev.FingerPad(ridges=ridges, ridge_width=PITCH, resolution="coarse", viscosity=1e-3),
-        surface(),
-        motion=[
-            ev.Press(force=0.05, steps=2),
-            ev.Slide(RUN_IN, steps=before, speed=speed, hold="force"),
-            ev.Slide(PERIOD, steps=steps, speed=speed, hold="force"),
-        ],
-        solver=ev.Solver(dynamics="viscous"),
-        output=ev.Output(every=100_000),
-        name="friction_spectrum",
-    )
-    result = ev.simulate(scene)
+    finger = ev.FingerPad(ridges=ridges, ridge_width=PITCH, resolution="coarse", viscosity=1e-3)
+    motion = [ev.Press(force=0.05, steps=2)]
+    for distance, count in ((RUN_IN, before), (PERIOD, steps)):
+        motion.append(ev.Slide(distance, steps=count, speed=speed, hold="force"))
+    how = {"solver": ev.Solver(dynamics="viscous"), "output": ev.Output(every=100_000)}
+    result = ev.simulate(ev.Scene(finger, surface(), motion=motion, **how))
     return np.asarray((result.tangential_force / result.normal_force)[-steps:])
 
 
@@ -93,14 +84,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
             series.append(Series(f"gain.{key}", frequency[there], gain, "1/mm"))
         numbers[f"verdict.line_Hz.{speed:g}_mm_s"] = speed / PITCH
     parameters = {"steps": steps, "speeds": speeds}
-    study = Study("friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "friction_spectrum", numbers, {}, ASSUMPTIONS, series, lambda: draw(series), parameters
+    ).finish(out, quick)
 
 
 def _strongest(frequency: Floats, found: Floats, line: int) -> float:
-    """Frequency (Hz) of the strongest wave shorter than four pitches: longer ones lift the whole
-    finger.
-    """
+    """Frequency (Hz) of the strongest wave below four pitches: longer ones lift the whole finger."""
     short = slice((line + 1) // 4, None)
     return float(frequency[short][np.argmax(found[short])])
 

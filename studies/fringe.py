@@ -32,7 +32,7 @@ from collections import OrderedDict
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -42,11 +42,9 @@ from evfem.field.outlines import graded
 from evfem.field.rigid import rigid_field
 from evfem.simulation.model import Model, make_model
 
-from .common import CASES, COLOURS, Series, Study, new_figure, panel_letter, participants
+from .common import CASES, Series, Study, participants
 from .measured import participant_forces
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .plots import COLOURS, Figure, panels
 
 PITCH, HEIGHT = 0.5, 0.15
 INSULATORS = {"film": ev.FILM, "touchscreen": ev.TOUCHSCREEN}
@@ -140,14 +138,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
                 series.append(Series(name, gaps, [one[key] for one in found], "% over mm"))
     numbers |= {f"spreading.{name}": spreading(rough) for name, rough in ROUGH.items()}
     numbers |= {f"spreading.filled.{name}": spreading(rough, True) for name, rough in ROUGH.items()}
-    numbers |= finger_numbers(quick)
-    numbers |= participant_numbers(quick)
+    numbers |= finger_numbers(quick) | participant_numbers(quick)
     on_electrodes, over_edge = electrode_numbers(quick)
-    numbers |= on_electrodes
-    series += over_edge
+    numbers, series = numbers | on_electrodes, series + over_edge
     parameters = {"pitch_mm": PITCH, "height_mm": HEIGHT, "load_N_per_mm": LOAD}
-    study = Study("fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "fringe", numbers, {}, ASSUMPTIONS, series, lambda: _draw(series, numbers), parameters
+    ).finish(out, quick)
 
 
 def finger_numbers(quick: bool) -> dict[str, float]:
@@ -237,16 +234,12 @@ def electrode_numbers(quick: bool) -> tuple[dict[str, float], list[Series]]:
         for floating in (False, True):
             name = f"stripes.{pitch:g}mm.{'floating' if floating else 'grounded'}_over_whole"
             numbers[name] = float(-force(rows, floating)[1] / whole)
-    series = [
-        Series("edge normal", places, -over[:, 1], "1 over mm"),
-        Series("edge x", places, over[:, 0], "1 over mm"),
-    ]
-    return numbers, series
+    ways = {"normal": -over[:, 1], "x": over[:, 0]}
+    return numbers, [Series(f"edge {name}", places, y, "1 over mm") for name, y in ways.items()]
 
 
 def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
-    figure = new_figure(3.6, 12.0)
-    axes = figure.subplots(1, 5, width_ratios=(1.0, 1.0, 1.2, 1.0, 1.0))
+    figure, axes = panels(3.6, 5, 12.0, width_ratios=(1.0, 1.0, 1.2, 1.0, 1.0))
     _draw_errors(axes[:2], series)
     _draw_gains(axes[2], numbers)
     ways = (("towards the display", "kaczmarek"), ("along x", "strong_troxel"))
@@ -268,8 +261,6 @@ def _draw(series: list[Series], numbers: dict[str, float]) -> Figure:
     axes[4].set_ylabel("participants' median (mN)")
     axes[4].margins(y=0.4)
     axes[4].legend(fontsize=7, loc="upper right")
-    for axis, letter in zip(axes, "abcde", strict=True):
-        panel_letter(axis, letter)
     return figure
 
 
@@ -299,13 +290,10 @@ def _draw_gains(axis: Any, numbers: dict[str, float]) -> None:
     bars = [100.0 * (numbers[key] - 1.0) for key in keys]
     labels = [" ".join(key.split(".")[1:3]) for key in keys]
     colours = [COLOURS["kaczmarek"]] * len(keys)
-    for kind, skin, colour in (
-        ("", "grooved", COLOURS["fe"]),
-        ("filled.", "filled", COLOURS["strong_troxel"]),
-    ):
+    for kind, skin, name in (("", "grooved", "fe"), ("filled.", "filled", "strong_troxel")):
         labels += [f"{skin} skin, {1e3 * gap:g} um gap" for gap in ROUGH.values()]
-        bars += [100.0 * (numbers[f"spreading.{kind}{name}"] - 1.0) for name in ROUGH]
-        colours += [colour] * len(ROUGH)
+        bars += [100.0 * (numbers[f"spreading.{kind}{rough}"] - 1.0) for rough in ROUGH]
+        colours += [COLOURS[name]] * len(ROUGH)
     axis.barh(labels, bars, color=colours)
     axis.invert_yaxis()
     axis.tick_params(axis="y", labelsize=7)

@@ -1,29 +1,14 @@
-"""Shared by Figs 9 and 10: attraction of a hovering finger over voltage and distance, with
-measured boxes.
-"""
+"""Shared by Figs 9 and 10: attraction of a hovering finger over voltage and distance."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    LAWS,
-    Series,
-    law_line,
-    measured_boxes,
-    new_figure,
-    panel_letter,
-    participants,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import CASES, LAWS, Series, participants
+from .plots import COLOURS, LABELS, Figure, law_line, measured_boxes, panels
 
 #: force in N of (law, parameter, gap in mm, voltage in V), vectorised over gap and voltage
 Force = Callable[[str, float, Any, Any], Any]
@@ -42,9 +27,7 @@ def case_numbers(force: Force, parameters: Mapping[str, float]) -> dict[str, flo
 
 
 def verdict(numbers: Mapping[str, float], key: str) -> dict[str, float]:
-    """Computed over measured median per case, and the trends of laws and measurement, at parameter
-    `key`.
-    """
+    """Computed over measured median by case, and the trends of laws and measurement, at `key`."""
     median = {case: float(np.median(participants()[case])) for case in CASES}
     found = {
         "verdict.measured.HVLD_over_LVLD": median["HVLD"] / median["LVLD"],
@@ -59,45 +42,32 @@ def verdict(numbers: Mapping[str, float], key: str) -> dict[str, float]:
 
 
 def curves(force: Force, parameters: Mapping[str, float], quick: bool) -> list[Series]:
-    """mN over the voltage at 0.25 mm and over the distance at 2000 V, one series per law and
-    parameter.
-    """
-    voltage, gap = (
-        np.linspace(1000.0, 2500.0, 16 if quick else 61),
-        np.linspace(0.0, 0.75, 16 if quick else 151),
-    )
+    """mN over the voltage at 0.25 mm and over the distance at 2000 V, by law and parameter."""
+    voltage = np.linspace(1000.0, 2500.0, 16 if quick else 61)
+    gap = np.linspace(0.0, 0.75, 16 if quick else 151)
     found = []
     for law in LAWS:
         for key, value in parameters.items():
-            found.append(
-                Series(
-                    f"{law} {key} over voltage", voltage, 1e3 * force(law, value, 0.25, voltage), "mN over V"
-                )
-            )
-            found.append(
-                Series(f"{law} {key} over distance", gap, 1e3 * force(law, value, gap, 2000.0), "mN over mm")
-            )
+            over_voltage, over_gap = force(law, value, 0.25, voltage), force(law, value, gap, 2000.0)
+            found.append(Series(f"{law} {key} over voltage", voltage, 1e3 * over_voltage, "mN over V"))
+            found.append(Series(f"{law} {key} over distance", gap, 1e3 * over_gap, "mN over mm"))
     return found
 
 
 def draw(
     series: list[Series], parameters: Mapping[str, float], names: Mapping[str, str], top: float
 ) -> Figure:
-    """Panel a over voltage, b over distance; curves in the law's colour, thicker for later
-    parameters.
-    """
+    """Panel a over voltage, b over distance; curves of later parameters are thicker."""
     from matplotlib.lines import Line2D
 
-    figure = new_figure(3.9)
-    axes = figure.subplots(1, 2, sharey=True)
+    figure, axes = panels(3.9, 2, sharey=True)
     named = {one.name: one for one in series}
     widths = dict(zip(parameters, np.linspace(0.7, 2.6, len(parameters)), strict=True))
-    for ax, over, letter in zip(axes, ("voltage", "distance"), "ab", strict=True):
+    for ax, over in zip(axes, ("voltage", "distance"), strict=True):
         for law in LAWS:
             for key, width in widths.items():
                 one = named[f"{law} {key} over {over}"]
                 law_line(ax, law, one.x, one.y, linewidth=width)
-        panel_letter(ax, letter)
     measured_boxes(axes[0], VOLTAGE_AT, 90.0)
     measured_boxes(axes[1], GAP_AT, 0.045)
     axes[0].set(xlabel="effective voltage (V), gap 0.25 mm", ylabel="$F_e$ (mN)", ylim=(0.0, top))

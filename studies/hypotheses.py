@@ -18,7 +18,7 @@ the pads' sizes) were not asked.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,21 +27,9 @@ from evfem.common.arrays import Floats
 from evfem.electrostatics.forces import pad_force
 from evfem.electrostatics.laws import StrongTroxel, eps_0
 
-from .common import (
-    CASES,
-    COLOURS,
-    Series,
-    Study,
-    draw_box,
-    new_figure,
-    panel_letter,
-    participants,
-    table2_layers,
-)
+from .common import CASES, Study, by_participant, participants, table2_layers
 from .measured import participant_forces, participant_pads
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .plots import COLOURS, Figure, draw_box, note, panels
 
 #: field (V/mm) at which air breaks down over millimetres, and with it the charge on a face in the open
 BREAKDOWN = 3000.0
@@ -66,9 +54,8 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     """Required sizes by case and participant, their medians and spreads, and a figure."""
     needed = {name: np.array(values) for name, values in _needed().items()}
     numbers = _numbers(needed)
-    names = participants()["participant"]
     series = [
-        Series(f"{what} {case}", names, values[i], f"{UNITS[what]} over participant")
+        by_participant(f"{what} {case}", values[i], UNITS[what])
         for what, values in needed.items()
         for i, case in enumerate(CASES)
     ]
@@ -92,9 +79,7 @@ def _needed() -> dict[str, list[Floats]]:
 
 
 def _farther(voltage: float, gap: float, measured: Floats) -> Floats:
-    """Additional gap (mm) at which the law gives the measured forces (mN), by bisection; negative
-    where the finger would have to be nearer.
-    """
+    """Additional gap (mm) at which the law gives the measured forces (mN); negative: nearer."""
     pads, layers = participant_pads(), table2_layers()
     low, high = np.full(measured.shape, -0.9 * gap), np.full(measured.shape, LARGEST_DISTANCE)
     for _ in range(HALVINGS):
@@ -125,26 +110,20 @@ def _numbers(needed: dict[str, Floats]) -> dict[str, float]:
 
 
 def _draw(needed: dict[str, Floats]) -> Figure:
-    figure = new_figure(3.2)
-    axes = figure.subplots(1, 3)
-    limits = {"charge": 1e6 * eps_0 * 1e3 * BREAKDOWN, "distance": ROUGHNESS}
-    said = {"charge": "breakdown of air", "distance": "roughness"}
-    for ax, letter, (what, values) in zip(axes, "abc", needed.items(), strict=True):
-        panel_letter(ax, letter)
+    figure, axes = panels(3.2, 3)
+    limits = {
+        "charge": (1e6 * eps_0 * 1e3 * BREAKDOWN, "breakdown of air"),
+        "distance": (ROUGHNESS, "roughness"),
+    }
+    look = {"color": COLOURS["measured"]}
+    for ax, (what, values) in zip(axes, needed.items(), strict=True):
         ax.axhline(0.0, color=COLOURS["neutral"], linewidth=0.6)
         for place, each in enumerate(values):
             draw_box(ax, place, each, 0.6, COLOURS["strong_troxel"])
         if what in limits:
-            ax.axhline(limits[what], color=COLOURS["measured"], linestyle="--")
-            ax.annotate(
-                said[what],
-                (2.4, limits[what]),
-                (0, 3),
-                textcoords="offset points",
-                ha="right",
-                fontsize="x-small",
-                color=COLOURS["measured"],
-            )
+            limit, said = limits[what]
+            ax.axhline(limit, linestyle="--", **look)
+            note(ax, said, (2.4, limit), (0, 3), ha="right", fontsize="x-small", **look)
         ax.set_xticks(range(len(CASES)), list(CASES))
         ax.set(ylabel=f"{what} needed ({UNITS[what]})", xlim=(-0.6, 2.6))
     return figure

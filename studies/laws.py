@@ -15,34 +15,19 @@ of the medians and Strong-Troxel's 1.4 to 1.9 times above. Where skin touches, t
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from evfem import data
 from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth
 from evfem.electrostatics.laws import Layer, eps_0
 from evfem.reference import cylinder_force
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    LAWS,
-    Series,
-    Study,
-    draw_box,
-    law_line,
-    new_figure,
-    panel_letter,
-    participants,
-    table2_layers,
-)
+from .common import CASES, LAWS, Series, Study, by_participant, paper_display, participants, table2_layers
 from .measured import comparison, participant_forces
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .plots import COLOURS, LABELS, Figure, draw_box, law_line, note, panels
 
 VOLTAGE, GAP, RADIUS = 2000.0, 0.25, 8.34
 IMAGES, CHARGES = 70, 48
@@ -61,9 +46,7 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     exact = np.array([cylinder_over_slab(gap) for gap in gaps])
     pads = EllipsoidalPad(2 * RADIUS, 2 * RADIUS, 1.0)
     layers = table2_layers()
-    by_law = {
-        law: pad_force_per_depth(force_law, pads, gaps, VOLTAGE, layers) for law, force_law in LAWS.items()
-    }
+    by_law = {law: pad_force_per_depth(LAWS[law], pads, gaps, VOLTAGE, layers) for law in LAWS}
     forces = participant_forces()
     pressure = {law: force_law.traction(gaps, VOLTAGE, layers) for law, force_law in LAWS.items()}
     numbers = _cylinder_numbers(pads) | comparison(forces)
@@ -74,16 +57,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series = [Series("electrostatics cylinder", gaps, 1e3 * exact, "mN/mm over mm")]
     series += [Series(f"{law} cylinder", gaps, 1e3 * y, "mN/mm over mm") for law, y in by_law.items()]
     series += [Series(f"{law} pressure", gaps, 1e3 * y, "kPa over mm") for law, y in pressure.items()]
-    names = participants()["participant"]
-    for (law, case), values in forces.items():
-        series.append(
-            Series(f"{law} over measured {case}", names, values / participants()[case], "1 over participant")
-        )
+    series += [
+        by_participant(f"{law} over measured {case}", values / participants()[case], "1")
+        for (law, case), values in forces.items()
+    ]
     parameters = {"U_V": VOLTAGE, "gap_mm": GAP, "radius_mm": RADIUS}
-    study = Study(
-        "laws", numbers, {}, ASSUMPTIONS, series, lambda: _draw(gaps, exact, by_law, forces), parameters
-    )
-    return study.finish(out, quick)
+    picture = partial(_draw, gaps, exact, by_law, forces)
+    return Study("laws", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
 def _cylinder_numbers(pads: EllipsoidalPad) -> dict[str, float]:
@@ -112,9 +92,7 @@ def cylinder_over_slab(
     4, by matching D and potential at the slab). Their strengths follow from the potential on the
     cylinder; the force is that of all images on all charges.
     """
-    if slab is None:
-        table = data.load("table2")
-        slab = Layer(table.value("d_i"), table.value("eps_i"))
+    slab = slab or paper_display(0.0).insulator
     plane = slab.thickness / slab.eps_r  # electrode this far below the surface, without a slab
     centre = radius + gap
     focus = np.sqrt((centre + plane) ** 2 - radius**2)
@@ -145,8 +123,7 @@ def _images(slab: Layer) -> tuple[Any, Any]:
 
 
 def _draw(gaps: Any, exact: Any, by_law: dict[str, Any], forces: dict[Any, Any]) -> Figure:
-    figure = new_figure(3.6)
-    axes = figure.subplots(1, 3)
+    figure, axes = panels(3.6, 3)
     axes[0].plot(gaps, 1e3 * exact, "k.", markersize=4, label="electrostatics")
     for law, y in by_law.items():
         law_line(axes[0], law, gaps, 1e3 * y, label=LABELS[law])
@@ -162,16 +139,7 @@ def _draw(gaps: Any, exact: Any, by_law: dict[str, Any], forces: dict[Any, Any])
     for law, force_law in LAWS.items():
         law_line(axes[2], law, near, 1e3 * force_law.traction(near, VOLTAGE, table2_layers()))
         touching = 1e3 * force_law.traction(0.0, VOLTAGE, table2_layers())
-        axes[2].annotate(
-            f"{touching:.3g} kPa",
-            (1.2e-3, 0.55 * touching),
-            (0, -12),
-            textcoords="offset points",
-            fontsize="small",
-        )
-    axes[2].set(
-        xscale="log", yscale="log", xlabel="gap (mm)", ylabel="pressure at 2000 V (kPa)", xlim=(1e-3, 0.5)
-    )
-    for ax, letter in zip(axes, "abc", strict=True):
-        panel_letter(ax, letter)
+        note(axes[2], f"{touching:.3g} kPa", (1.2e-3, 0.55 * touching), (0, -12))
+    axes[2].set(xscale="log", yscale="log", xlabel="gap (mm)", xlim=(1e-3, 0.5))
+    axes[2].set_ylabel("pressure at 2000 V (kPa)")
     return figure

@@ -15,17 +15,13 @@ INCLINATION = np.radians(30.0)  # of the finger against the plate, section 2.2
 
 
 def participant_pads() -> EllipsoidalPad:
-    """The eleven ellipsoids: full axes a_i, b_i and the horizontal projection c_i cos 30 degrees,
-    in mm.
-    """
+    """The eleven ellipsoids: full axes a_i, b_i and, projected, c_i cos 30 degrees, in mm."""
     table = participants()
     return EllipsoidalPad(table["a"], table["b"], table["c"] * np.cos(INCLINATION))
 
 
 def participant_forces() -> dict[tuple[str, str], Floats]:
-    """(law, case) -> eleven forces in mN by (8a) or (8b) with (24) over the rectangle, Table 2's
-    layers.
-    """
+    """(law, case) -> eleven forces in mN by (8a) or (8b) with (24), Table 2's layers."""
     pads, layers = participant_pads(), table2_layers()
     return {
         (law, case): 1e3 * pad_force(force_law, pads, gap, voltage, layers)
@@ -35,9 +31,7 @@ def participant_forces() -> dict[tuple[str, str], Floats]:
 
 
 def comparison(forces: dict[tuple[str, str], Floats]) -> dict[str, float]:
-    """Per law and case: ratio of medians, median ratio, rank correlation and its p value, relative
-    spread.
-    """
+    """By law and case: ratio of medians, median ratio, rank correlation with its p value, spread."""
     from scipy.stats import spearmanr
 
     found: dict[str, Any] = {}

@@ -1,5 +1,4 @@
-"""Eleven participants, two laws, three hover cases by finite elements, as one sweep; measurements
-beside it.
+"""Eleven participants, two laws, three hover cases by finite elements, as one sweep.
 
 Each participant has a finger of his or her own (`FingerPad.participant`): width and height a_i,
 b_i of Table 1, bone, nail and the layers below the stratum corneum scaled with it from Table 2's
@@ -14,33 +13,18 @@ a factor of three for fingers of the same size, are not theirs to explain.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from evfem import data
+import evfem as ev
 from evfem.electrostatics.forces import pad_force, pad_force_per_depth
-from evfem.sweeps.file import Sweep
-from evfem.sweeps.run import SweepResult, sweep
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    LAWS,
-    Floats,
-    Series,
-    Study,
-    new_figure,
-    panel_letter,
-    participants,
-    table2_layers,
-)
+from .common import CASES, LAWS, Floats, Study, by_participant, paper_display, participants, table2_layers
 from .measured import participant_forces, participant_pads
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .plots import COLOURS, LABELS, Figure, panels
 
 ASSUMPTIONS = {
     "fingers": "width a_i and height b_i; nail, bone, epidermis and dermis scaled with a_i / 16.68 mm",
@@ -49,14 +33,14 @@ ASSUMPTIONS = {
     "mesh": "coarse, 0.2 % below medium with Kaczmarek's law; quick: the first three participants",
 }
 
+DASH = {"marker": "_", "markersize": 11, "markeredgewidth": 1.6}
+
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Forces per participant, law and case by finite elements, beside the closed forms and those
-    measured.
-    """
+    """Forces by finite elements, beside the closed forms and those measured."""
     names = participants()["participant"][: 3 if quick else None]
     # few points: starting processes costs more than they save
-    table = sweep(plan(names), workers=1 if quick else None)
+    table = ev.sweep(plan(names), workers=1 if quick else None)
     forces = widths(len(names))
     for law, case in forces:
         chosen = [
@@ -66,52 +50,31 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         ]
         forces[law, case] *= 1e3 * np.array(chosen)
     closed = {key: values[: len(names)] for key, values in participant_forces().items()}
-    numbers = _numbers(names, forces, closed) | {"points": len(table.rows), "done": _done(table)}
-    series = [
-        Series(f"{kind} {law} {case}", names, values, "mN over participant")
-        for kind, found in (("fe", forces), ("closed form", closed))
-        for (law, case), values in found.items()
-    ]
-    series += [
-        Series(f"measured {case}", names, participants()[case][: len(names)], "mN over participant")
-        for case in CASES
-    ]
+    done = sum(row["status"] == "done" for row in table.rows)
+    numbers = _numbers(names, forces, closed) | {"points": len(table.rows), "done": done}
+    every = {f"fe {law} {case}": values for (law, case), values in forces.items()}
+    every |= {f"closed form {law} {case}": values for (law, case), values in closed.items()}
+    every |= {f"measured {case}": participants()[case][: len(names)] for case in CASES}
+    series = [by_participant(name, values) for name, values in every.items()]
     parameters = {"sweep": table.provenance["scene"], "grid": table.provenance["grid"]}
-    study = Study(
-        "participants", numbers, {}, ASSUMPTIONS, series, lambda: _draw(names, forces, closed), parameters
-    )
-    return study.finish(out, quick)
+    picture = partial(_draw, names, forces, closed)
+    return Study("participants", numbers, {}, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
-def plan(names: list[str]) -> Sweep:
-    """The sweep: a coarse finger of Table 2 hovering over its display; laws, cases and
-    participants.
-    """
-    values = data.load("table2")
-    scene = {
-        "version": 1,
-        "finger": {"resolution": "coarse"},
-        "surface": {"kind": "flat", "friction": values.value("mu")},
-        "electrostatics": {
-            "law": "kaczmarek",
-            "voltage": 2000.0,
-            "insulator_thickness": values.value("d_i"),
-            "insulator_eps_r": values.value("eps_i"),
-        },
-        "motion": [{"kind": "hover", "gap": 0.25}],
-    }
+def plan(names: list[str]) -> ev.Sweep:
+    """The sweep: a coarse finger of Table 2 hovering over its display."""
+    display, hover = paper_display(ev.data.load("table2").value("mu")), ev.Hover(gap=0.25)
+    scene = ev.Scene(ev.FingerPad(resolution="coarse"), display, ev.Kaczmarek(), 2000.0, [hover])
     cases = {
         case: {"electrostatics.voltage": voltage, "motion.0.gap": gap}
         for case, (voltage, gap) in CASES.items()
     }
     grid = {"electrostatics.law": list(LAWS), "case": cases, "finger.participant": names}
-    return Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
+    return ev.Sweep(scene, grid, outputs=("electrostatic_force.last", "min_gap.last"), name="participants")
 
 
 def widths(count: int) -> dict[tuple[str, str], Floats]:
-    """(law, case) -> width out of the plane in mm of each participant, from the rigid closed
-    forms.
-    """
+    """(law, case) -> width out of the plane in mm of each participant, from the closed forms."""
     pads, layers = participant_pads(), table2_layers()
     found = {}
     for name, law in LAWS.items():
@@ -119,10 +82,6 @@ def widths(count: int) -> dict[tuple[str, str], Floats]:
             ratio = pad_force(law, pads, gap, voltage, layers)
             found[name, case] = (ratio / pad_force_per_depth(law, pads, gap, voltage, layers))[:count]
     return found
-
-
-def _done(table: SweepResult) -> int:
-    return sum(row["status"] == "done" for row in table.rows)
 
 
 def _numbers(names: list[str], forces: dict[Any, Floats], closed: dict[Any, Floats]) -> dict[str, Any]:
@@ -143,43 +102,24 @@ def _numbers(names: list[str], forces: dict[Any, Floats], closed: dict[Any, Floa
 
 
 def _draw(names: list[str], forces: dict[Any, Floats], closed: dict[Any, Floats]) -> Figure:
-    figure = new_figure(5.6)
-    axes = figure.subplots(3, 1, sharex=True)
+    figure, axes = panels(5.6, 1, rows=3, sharex=True)
     place = np.arange(len(names))
-    for ax, (case, (voltage, gap)), letter in zip(axes, CASES.items(), "abc", strict=True):
-        ax.plot(place, participants()[case][: len(names)], "D", color=COLOURS["measured"], markersize=5)
+    for ax, (case, (voltage, gap)) in zip(axes, CASES.items(), strict=True):
+        measured = participants()[case][: len(names)]
+        ax.plot(place, measured, "D", color=COLOURS["measured"], markersize=5, label="measured")
         for law, shift in (("kaczmarek", -0.14), ("strong_troxel", 0.14)):
-            ax.plot(place + shift, forces[law, case], "o", color=COLOURS[law], markersize=5)
-            ax.plot(
-                place + shift, closed[law, case], "_", color=COLOURS[law], markersize=11, markeredgewidth=1.6
+            style = {"color": COLOURS[law], "linestyle": ""}
+            kinds = (
+                ("finite elements", forces, {"marker": "o", "markersize": 5}),
+                ("closed form", closed, DASH),
             )
+            for kind, found, mark in kinds:
+                label = f"{LABELS[law]}, {kind}"
+                ax.plot(place + shift, found[law, case], label=label, **style, **mark)
         ax.set(ylabel="force (mN)", ylim=(0, None))
         ax.set_title(f"{case}: {voltage:g} V, {gap:.2f} mm", fontsize="medium")
-        panel_letter(ax, letter)
         ax.grid(axis="y", linewidth=0.4, alpha=0.5)
     axes[-1].set_xticks(place, names)
     axes[-1].set_xlabel("participant")
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=3, fontsize="small")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize="small")
     return figure
-
-
-def _handles() -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], linestyle="", marker="D", color=COLOURS["measured"], label="measured")]
-    for law in ("kaczmarek", "strong_troxel"):
-        colour = COLOURS[law]
-        label = f"{LABELS[law]}, finite elements"
-        handles.append(Line2D([], [], linestyle="", marker="o", color=colour, label=label))
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="",
-                marker="_",
-                markersize=11,
-                color=colour,
-                label=f"{LABELS[law]}, closed form",
-            )
-        )
-    return handles

@@ -1,37 +1,21 @@
-"""A pad pressed to a series of loads, with and without voltage: the runs, and what its outline
-tells.
-"""
+"""A pad pressed to a series of loads, with and without voltage: runs, and what its outline tells."""
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from evfem import data
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Layer, Layers
-from evfem.finger.fingerpad import FingerPad
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.faces import layer_thickness
-from evfem.scene.motion import Press, VoltageRamp
-from evfem.scene.scene import Scene
-from evfem.simulation.result import Frame, Result, Saved
-from evfem.simulation.run import simulate
 from evfem.surface.edge import outline_nodes
-from evfem.surface.surfaces import Display
-from evfem.tissue.laws import NeoHookean
 
-from .common import LAWS
-from .parallel import side_by_side
-
-#: which length of the outline stands for A_j: its projection now, its arc now, its arc before deformation
-AREAS = ("projected", "current", "reference")
+from .common import LAWS, paper_display, side_by_side, table2_layers, tissue
 
 
 @dataclass(frozen=True)
@@ -47,22 +31,12 @@ class Pad:
     stiffness: float = 1.0
     stratum_corneum_E: float = TABLE_2["stratum_corneum"][0]
 
-    def finger(self) -> FingerPad:
+    def finger(self) -> ev.FingerPad:
         """The pad with these values, else Table 2."""
-        soft = {
-            name: (self.stiffness * (self.stratum_corneum_E if name == "stratum_corneum" else E), nu)
-            for name, (E, nu) in TABLE_2.items()
-            if name != "nail"
-        }
-        return FingerPad(
-            ridges=self.ridges,
-            ridge_phase=self.phase,
-            ridge_exponent=self.exponent,
-            ridge_crest=self.crest,
-            ridge_groove=self.groove,
-            resolution=self.resolution,
-            materials={name: NeoHookean(E=E, nu=nu) for name, (E, nu) in soft.items()},
-        )
+        soft = tissue(self.stiffness, stratum_corneum=self.stratum_corneum_E)
+        shape = {name: getattr(self, name) for name in ("phase", "exponent", "crest", "groove")}
+        ridge = {f"ridge_{name}": value for name, value in shape.items()}
+        return ev.FingerPad(ridges=self.ridges, resolution=self.resolution, materials=soft, **ridge)
 
 
 @dataclass(frozen=True)
@@ -79,12 +53,10 @@ class Case:
     friction: float = 0.0
     voltage_first: bool = False
 
-    def scene(self, *motion: Any, voltage: float) -> Scene:
+    def scene(self, *motion: Any, voltage: float) -> ev.Scene:
         """The scene of some motions, at a voltage from the start."""
-        table = data.load("table2")
-        film = Layer(table.value("d_i"), table.value("eps_i"))
-        display = Display(insulator=film, friction=self.friction)
-        return Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
+        display = paper_display(self.friction)
+        return ev.Scene(self.pad.finger(), display, law=LAWS[self.law], voltage=voltage, motion=motion)
 
 
 def contact_spans(x: Floats, gap: Floats, touching: Any) -> Floats:
@@ -116,9 +88,7 @@ def contact_spans(x: Floats, gap: Floats, touching: Any) -> Floats:
 
 
 def _reach(x: Floats, gap: Floats, touching: Any, last: int, step: int, wide: bool) -> float:
-    """How far contact reaches beyond the node `last`, in spacings of nodes: from -1/2 (0 for a
-    lone node) to 1.
-    """
+    """How far contact reaches beyond `last`, in spacings of nodes: from -1/2 (a lone node 0) to 1."""
     outside: list[int] = []
     for node in range(last + step, last + 4 * step, step):
         if not 0 <= node < x.size or touching[node]:
@@ -162,7 +132,6 @@ class Pressed:
     gap: Floats
     touching: Any
     force: Floats
-    nodes: int
     iterations: int
 
     def spans(self, load: int) -> Floats:
@@ -170,9 +139,7 @@ class Pressed:
         return contact_spans(self.x[load], self.gap[load], self.touching[load])
 
     def widths(self) -> tuple[Floats, Floats]:
-        """Width of real contact, and from its outermost left to its outermost right end, per load
-        (mm).
-        """
+        """Width of real contact, and between its outermost ends, per load (mm)."""
         real, gross = [], []
         for load, x in enumerate(self.x):
             ends = np.interp(self.spans(load), np.arange(x.size), x)
@@ -181,9 +148,7 @@ class Pressed:
         return np.array(real), np.array(gross)
 
     def line(self, load: int, area: str) -> Floats:
-        """Coordinate along the outline whose differences are the lengths of an area convention
-        (P,), mm.
-        """
+        """Coordinate (P,) along the outline in mm whose differences are an area convention's lengths."""
         if area == "projected":
             return self.x[load]
         if area == "reference":
@@ -194,15 +159,13 @@ class Pressed:
 
     def pressure(self, gap: Any, voltage: float, law: str, thickness: Any = None) -> Floats:
         """Attraction in MPa of every outline node at a gap."""
-        table = data.load("table2")
-        d = self.thickness if thickness is None else np.full_like(self.thickness, thickness)
-        layers = Layers.of(Layer(d, table.value("eps_sc")), Layer(table.value("d_i"), table.value("eps_i")))
+        layers = table2_layers(
+            self.thickness if thickness is None else np.full_like(self.thickness, thickness)
+        )
         return np.asarray(LAWS[law].traction(gap, voltage, layers))
 
     def shares(self, load: int, area: str) -> Floats:
-        """Length of outline per node as (9b) needs it: 1/6, 4/6, 1/6 of every quadratic edge (P,),
-        mm.
-        """
+        """Length (P,) of outline per node in mm for (9b): 1/6, 4/6, 1/6 of every quadratic edge."""
         line = self.line(load, area)
         edge = np.maximum(line[2::2] - line[:-2:2], 0.0)
         share = np.zeros_like(line)
@@ -213,18 +176,13 @@ class Pressed:
 
     def total(self, voltage: float, law: str, area: str = "projected", thickness: Any = None) -> Floats:
         """(9a), (9b): attraction of all nodes at their gaps, per load (N/mm)."""
-        return np.array(
-            [
-                self.pressure(np.maximum(gap, 0.0), voltage, law, thickness) @ self.shares(load, area)
-                for load, gap in enumerate(self.gap)
-            ]
-        )
+        pull = [self.pressure(np.maximum(gap, 0.0), voltage, law, thickness) for gap in self.gap]
+        return np.array([one @ self.shares(load, area) for load, one in enumerate(pull)])
 
     def contact_only(
         self, voltage: float, law: str, area: str = "projected", thickness: Any = None, nodal: bool = False
     ) -> Floats:
-        """(10): attraction of what touches, per load (N/mm), between the interpolated ends of
-        contact.
+        """(10): attraction between the interpolated ends of contact, per load (N/mm).
 
         `nodal` takes the touching nodes with their shares instead, as the sum in (10) is written.
         """
@@ -244,44 +202,18 @@ class Pressed:
 
 def run(case: Case) -> Pressed:
     """Press through the loads as the case says."""
-    motion = [Press(force=load, steps=1) for load in case.loads]
+    motion = [ev.Press(force=load, steps=1) for load in case.loads]
     if case.voltage and case.friction and not case.voltage_first:
-        return _bundle(case, *_branches(case, motion))
-    result = simulate(case.scene(*motion, voltage=case.voltage))
-    return _bundle(case, result, result.frames, result.electrostatic_force, result.newton_iterations)
+        on = ev.VoltageRamp(case.voltage, steps=1, hold="force")
+        ways = [case.scene(*motion[: k + 1], on, voltage=0.0) for k in range(len(motion))]
+        results = [ev.simulate(way) for way in ways]
+        return _bundle(case, results, [one.frames[-1] for one in results], -1)
+    result = ev.simulate(case.scene(*motion, voltage=case.voltage))
+    return _bundle(case, [result], result.frames, slice(None))
 
 
-class _Keeper:
-    """Observer that keeps what is needed to go on from every step."""
-
-    def __init__(self) -> None:
-        self.rows: list[dict[str, Any]] = []
-        self.arrays: list[dict[str, Any]] = []
-
-    def step(self, row: dict[str, Any], _: Frame | None, checkpoint: Any) -> None:
-        """Called after every converged step."""
-        self.rows.append(row)
-        self.arrays.append({name: np.copy(array) for name, array in checkpoint().items()})
-
-
-def _branches(case: Case, motion: list[Press]) -> tuple[Result, list[Frame], Floats, Any]:
-    """Press once without voltage; from every load on, switch the voltage on with the load held."""
-    kept = _Keeper()
-    result = simulate(case.scene(*motion, voltage=0.0), observers=[kept])
-    frames, forces, iterations = [], [], [result.newton_iterations.sum()]
-    for k, arrays in enumerate(kept.arrays):
-        switch_on = VoltageRamp(case.voltage, steps=1, hold="force")
-        branch = simulate(
-            case.scene(*motion[: k + 1], switch_on, voltage=0.0), resume=Saved(arrays, kept.rows[: k + 1])
-        )
-        frames.append(branch.frames[-1])
-        forces.append(branch.electrostatic_force[-1])
-        iterations.append(branch.newton_iterations[-1])
-    return result, frames, np.array(forces), np.array(iterations)
-
-
-def _bundle(case: Case, result: Result, frames: list[Frame], force: Floats, iterations: Any) -> Pressed:
-    mesh = result.mesh
+def _bundle(case: Case, results: list[ev.Result], frames: list[ev.Frame], rows: Any) -> Pressed:
+    mesh = results[0].mesh
     nodes = outline_nodes(mesh)
     points = mesh.points[nodes]
     return Pressed(
@@ -291,33 +223,15 @@ def _bundle(case: Case, result: Result, frames: list[Frame], force: Floats, iter
         np.stack([points[:, 0] + frame.displacement[nodes, 0] for frame in frames]),
         np.stack([frame.gap[nodes] for frame in frames]),
         np.stack([frame.contact_status[nodes] > 0 for frame in frames]),
-        np.asarray(force, dtype=float),
-        len(mesh.points),
-        int(np.sum(iterations)),
+        np.hstack([one.electrostatic_force[rows] for one in results]),
+        int(sum(one.newton_iterations.sum() for one in results)),
     )
 
 
 def run_all(cases: Iterable[Case], processes: int = 1) -> dict[Case, Pressed]:
     """Every case once, the dearest first, in this process or in several."""
     wanted = sorted(set(cases), key=_cost, reverse=True)
-    with one_thread_each():
-        return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
-
-
-@contextmanager
-def one_thread_each() -> Iterator[None]:
-    """New processes use one thread in dense algebra: with more, they only wait for each other's
-    cores.
-    """
-    before = os.environ.get("OMP_NUM_THREADS")
-    os.environ["OMP_NUM_THREADS"] = "1"
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ["OMP_NUM_THREADS"]
-        else:
-            os.environ["OMP_NUM_THREADS"] = before
+    return dict(zip(wanted, side_by_side(run, wanted, processes), strict=True))
 
 
 def _cost(case: Case) -> float:

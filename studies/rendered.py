@@ -11,26 +11,10 @@ import time
 import warnings
 from dataclasses import dataclass, field, replace
 
+import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-from evfem.finger.fingerpad import Electrical, FingerPad
-from evfem.finger.layers import TABLE_2
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.rendering import (
-    ApparentFriction,
-    Recording,
-    Signal,
-    apparent_friction,
-    compare,
-    exact,
-    record,
-    replay,
-    voltage_for,
-)
-from evfem.surface.surfaces import Display, Flat, Sinusoid
-from evfem.tissue.laws import NeoHookean
+from evfem.simulation import rendering
 
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0
@@ -53,8 +37,6 @@ class Case:
     """One reference, and what is tried on the display; the defaults are those of the figures.
 
     `friction` is that of the texture; without it the surface is level with a step in friction.
-    `softness` multiplies the moduli of all tissue, `crest` is the flat share of a ridge (and of a
-    groove).
     """
 
     friction: float | None = None
@@ -63,13 +45,8 @@ class Case:
     steps: int = 60
     path: float = PATH
     force: float = 0.05
-    hold: str = "indentation"
     viscosity: float = 0.0
-    speed: float = 20.0
     dynamics: str = "quasistatic"
-    softness: float = 1.0
-    ridge_exponent: float = 7.0
-    crest: float = 0.0
     skin: float = SKIN
     encodings: tuple[str, ...] = ("open", "exact")
 
@@ -110,7 +87,7 @@ class Outcome:
     full_slip: float
     lowest_friction: float
     friction: float
-    signal: Signal
+    signal: rendering.Signal
     rendered: dict[str, Rendered]
     costs: dict[str, float] = field(default_factory=dict)
 
@@ -120,45 +97,33 @@ class Outcome:
         return self.force / self.load
 
 
-def pad(case: Case) -> FingerPad:
+def pad(case: Case) -> ev.FingerPad:
     """The finger of a case."""
-    soft = {}
-    if case.softness != 1.0:
-        tissue = {name: law for name, law in TABLE_2.items() if name != "nail"}
-        soft = {name: NeoHookean(E=case.softness * E, nu=nu) for name, (E, nu) in tissue.items()}
-    return FingerPad(
-        ridges=case.ridges,
-        resolution=case.resolution,
-        ridge_exponent=case.ridge_exponent,
-        ridge_crest=case.crest,
-        ridge_groove=case.crest,
-        materials=soft,
-        viscosity=case.viscosity,
-        electrical=Electrical(stratum_corneum_thickness=case.skin),
-    )
+    skin = ev.Electrical(stratum_corneum_thickness=case.skin)
+    shape = {"ridges": case.ridges, "resolution": case.resolution, "ridge_exponent": 7.0}
+    return ev.FingerPad(**shape, viscosity=case.viscosity, electrical=skin)
 
 
-def reference_scene(case: Case, every: int = 1_000_000) -> Scene:
+def reference_scene(case: Case, every: int = 1_000_000) -> ev.Scene:
     """The reference of a case, with fields of every `every`-th step."""
-    surface: Flat | Sinusoid = Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
+    surface: ev.Flat | ev.Sinusoid = ev.Flat(friction=[[0.0, BEFORE], [JUMP, BEFORE], [JUMP, AFTER]])
     if case.friction is not None:
-        surface = Sinusoid(friction=case.friction)
-    slide = Slide(case.path, steps=case.steps, hold=case.hold, speed=case.speed)
-    motion = (Press(force=case.force, steps=5), slide)
-    solver, output = Solver(dynamics=case.dynamics), Output(every=every)
-    return Scene(pad(case), surface, motion=motion, solver=solver, output=output)
+        surface = ev.Sinusoid(friction=case.friction)
+    slide = ev.Slide(case.path, steps=case.steps, hold="indentation", speed=20.0)
+    motion = (ev.Press(force=case.force, steps=5), slide)
+    solver, output = ev.Solver(dynamics=case.dynamics), ev.Output(every=every)
+    return ev.Scene(pad(case), surface, motion=motion, solver=solver, output=output)
 
 
-def reference_of(case: Case) -> Recording:
+def reference_of(case: Case) -> rendering.Recording:
     """The run of a case's reference; that the load drifts where its indentation is held is known."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "motion 1 slides with the indentation held")
-        return record(reference_scene(case))
+        return rendering.record(reference_scene(case))
 
 
-def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tuple[float, float]:
-    """Smallest apparent friction of the reference after full slip, and the friction of the
-    display.
+def display_friction(case: Case, felt: rendering.ApparentFriction, full_slip: float) -> tuple[float, float]:
+    """Smallest apparent friction of the reference after full slip, and friction of the display.
 
     On the step the display has the coefficient before it; on texture the smallest apparent
     friction, or a fifth of the texture's own coefficient if that is larger (a negative one cannot
@@ -172,8 +137,8 @@ def display_friction(case: Case, felt: ApparentFriction, full_slip: float) -> tu
 
 def display_encoding(friction: float) -> Encoding:
     """(20a) with the stratum corneum and the area law that give the paper's voltage."""
-    skin, film = Layer(SKIN, 1650.0), Layer(0.09, 3.35)
-    return Encoding(Kaczmarek(), Layers.of(skin, film), AREA, friction)
+    skin, film = ev.Layer(SKIN, 1650.0), ev.Layer(0.09, 3.35)
+    return Encoding(ev.Kaczmarek(), ev.Layers.of(skin, film), AREA, friction)
 
 
 def render(case: Case) -> Outcome:
@@ -184,10 +149,10 @@ def render(case: Case) -> Outcome:
     """
     begin = time.process_time()
     reference = reference_of(case)
-    felt = apparent_friction(reference.result)
+    felt = rendering.apparent_friction(reference.result)
     full_slip = reference.full_slip if reference.full_slip is not None else float(felt.position[1])
     lowest, friction = display_friction(case, felt, full_slip)
-    signal = voltage_for(felt, display_encoding(friction))
+    signal = rendering.voltage_for(felt, display_encoding(friction))
     costs = {"reference_cpu_s": time.process_time() - begin} | _costs(reference)
     rendered = {}
     for kind in case.encodings:
@@ -195,45 +160,33 @@ def render(case: Case) -> Outcome:
         rendered[kind] = _rendered(reference, found, full_slip)
         costs |= {f"{kind}_{name}": value for name, value in _costs(found).items()}
     costs["cpu_s"] = time.process_time() - begin
-    return Outcome(
-        case,
-        felt.position[1:],
-        felt.normal_force[1:],
-        felt.tangential_force[1:],
-        full_slip,
-        lowest,
-        friction,
-        signal,
-        rendered,
-        costs,
-    )
+    position, load, force = (x[1:] for x in (felt.position, felt.normal_force, felt.tangential_force))
+    return Outcome(case, position, load, force, full_slip, lowest, friction, signal, rendered, costs)
 
 
-def _replayed(kind: str, case: Case, reference: Recording, friction: float, signal: Signal) -> Recording:
-    display = Display(friction=friction)
+def _replayed(
+    kind: str, case: Case, reference: rendering.Recording, friction: float, signal: rendering.Signal
+) -> rendering.Recording:
+    display = ev.Display(friction=friction)
     if kind == "exact":
-        return exact(reference, display, Kaczmarek())
+        return rendering.exact(reference, display, ev.Kaczmarek())
     if kind == "thick":
         finger = pad(replace(case, skin=0.38))
         reference = replace(reference, scene=replace(reference.scene, finger=finger))
-    return replay(reference, display, Kaczmarek(), signal.profile)
+    return rendering.replay(reference, display, ev.Kaczmarek(), signal.profile)
 
 
-def _rendered(reference: Recording, found: Recording, full_slip: float) -> Rendered:
-    fidelity, felt = compare(reference.result, found.result), apparent_friction(found.result)
-    slide = found.result.motion == "slide"
-    return Rendered(
-        felt.tangential_force[1:],
-        felt.normal_force[1:],
-        found.result.voltage[slide],
-        fidelity.pearson,
-        fidelity.relative_l2,
-        fidelity.largest_error,
-        felt.minimum(after=full_slip),
+def _rendered(reference: rendering.Recording, found: rendering.Recording, full_slip: float) -> Rendered:
+    fidelity, felt = (
+        rendering.compare(reference.result, found.result),
+        rendering.apparent_friction(found.result),
     )
+    slide = found.result.motion == "slide"
+    judged = fidelity.pearson, fidelity.relative_l2, fidelity.largest_error, felt.minimum(after=full_slip)
+    return Rendered(felt.tangential_force[1:], felt.normal_force[1:], found.result.voltage[slide], *judged)
 
 
-def _costs(found: Recording) -> dict[str, float]:
+def _costs(found: rendering.Recording) -> dict[str, float]:
     """Steps asked for and the parts they took: every one of them is a converged equilibrium."""
     result = found.result
     return {"steps": float(len(result.step)), "parts": float(result.substeps.sum())}

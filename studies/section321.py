@@ -9,8 +9,9 @@ um is generally accepted.
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,17 +19,11 @@ from evfem import data
 from evfem.electrostatics.forces import effective_thickness_from_thresholds, stratum_corneum_from_thresholds
 from evfem.electrostatics.laws import Layer, Layers
 
-from .common import COLOURS, LABELS, LAWS, Series, Study, law_line, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import LAWS, Series, Study
+from .plots import COLOURS, LABELS, Figure, law_line, new_figure, note
 
 ACCEPTED_UM = 300.0  # palmar stratum corneum, section 3.2.1
-PAPER = {
-    "effective_thickness_um": 2.74,
-    "thickness_strong_troxel_mm": 5.48,
-    "thickness_kaczmarek_um": 76.2,
-}
+PAPER = {"effective_thickness_um": 2.74, "thickness_strong_troxel_mm": 5.48, "thickness_kaczmarek_um": 76.2}
 ASSUMPTIONS = {
     "area, friction": "the same in both experiments",
     "closed form (22)": "with d_i = d_i3 it gives 5.49 um; with d_i = d_i2 it agrees with (21), solved here",
@@ -58,16 +53,10 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     thickness = np.logspace(-2, 1, 61 if quick else 301)
     ratio = {law: _force_ratio(law, thickness, voltages, films, eps_sc) for law in LAWS}
     series = [Series(f"{law} force ratio", thickness, y, "1 over mm") for law, y in ratio.items()]
-    parameters = {
-        "voltages_V": voltages,
-        "insulators_mm": [f.thickness for f in films],
-        "eps_i": table.value("eps_i"),
-        "eps_sc": eps_sc,
-    }
-    study = Study(
-        "section321", numbers, PAPER, ASSUMPTIONS, series, lambda: _draw(thickness, ratio, found), parameters
-    )
-    return study.finish(out, quick)
+    parameters = {"voltages_V": voltages, "insulators_mm": [film.thickness for film in films]}
+    parameters |= {"eps_i": table.value("eps_i"), "eps_sc": eps_sc}
+    picture = partial(_draw, thickness, ratio, found)
+    return Study("section321", numbers, PAPER, ASSUMPTIONS, series, picture, parameters).finish(out, quick)
 
 
 def _printed_factor(lower: float, higher: float) -> float:
@@ -75,9 +64,7 @@ def _printed_factor(lower: float, higher: float) -> float:
 
 
 def _force_ratio(law: str, thickness: Any, voltages: Any, films: Any, eps_sc: float) -> Any:
-    """Force through the thinner insulator over that through the thicker one, each at its
-    threshold.
-    """
+    """Force through the thinner insulator over that through the thicker one, each at its threshold."""
     thin, thick = (
         LAWS[law].traction(0.0, u, Layers.of(Layer(thickness, eps_sc), film))
         for u, film in zip(voltages, films, strict=True)
@@ -95,18 +82,8 @@ def _draw(thickness: Any, ratio: dict[str, Any], found: dict[str, float]) -> Fig
     for law, y in ratio.items():
         law_line(ax, law, thickness, y, label=LABELS[law])
         ax.plot(found[law], 1.0, "o", color=COLOURS[law])
-        ax.annotate(
-            f"{found[law]:.3g} mm",
-            (found[law], 1.0),
-            (-6, -14),
-            textcoords="offset points",
-            ha="right",
-            fontsize="small",
-        )
-    ax.set(
-        xscale="log",
-        xlabel="thickness of the stratum corneum (mm)",
-        ylabel="ratio of the forces at threshold",
-    )
+        note(ax, f"{found[law]:.3g} mm", (found[law], 1.0), (-6, -14), ha="right")
+    label = "thickness of the stratum corneum (mm)"
+    ax.set(xscale="log", xlabel=label, ylabel="ratio of the forces at threshold")
     ax.legend(loc="upper right")
     return figure

@@ -13,19 +13,16 @@ takes from the swing of a slip what falls with the step: the period comes out sh
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
 
-from .common import COLOURS, Series, Study, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import Series, Study
+from .plots import COLOURS, Figure, new_figure
 
 LOAD, STATIC, FALL, AROUND = 0.04, 0.4, 0.5, 0.5
 HAND = ev.Hand(stiffness=0.02, mass=1e-6)
@@ -39,8 +36,7 @@ ASSUMPTIONS = {
 }
 
 
-@dataclass(frozen=True)
-class Cycle:
+class Cycle(NamedTuple):
     """Seconds of stick and of slip."""
 
     stick: float
@@ -95,15 +91,9 @@ def drawn(speed: float, steps: int) -> tuple[ev.Result, float]:
     pieces = [(first - 0.001 / speed, 3), (fine, steps), (0.98 * cycle.period - fine, 3), (fine, steps)]
     motion: list[Any] = [ev.Press(force=LOAD, steps=1)]
     motion += [ev.Slide(speed * t, steps=n, speed=speed, hold="force") for t, n in pieces]
-    scene = ev.Scene(
-        slab(),
-        ev.Flat(friction=STATIC),
-        motion=motion,
-        hand=HAND,
-        friction_law=ev.RateFriction(speed=AROUND, ratio=FALL),
-        output=ev.Output(every=100_000),
-        name="stick_slip",
-    )
+    law, name = ev.RateFriction(speed=AROUND, ratio=FALL), "stick_slip"
+    how = {"hand": HAND, "friction_law": law, "output": ev.Output(every=100_000), "name": name}
+    scene = ev.Scene(slab(), ev.Flat(friction=STATIC), motion=motion, **how)
     result = ev.simulate(scene)
     held = 3 + steps  # row of the end of the first slip, where the mass sticks again
     lacking = STATIC * LOAD - result.applied_tangential_force[held]
@@ -137,8 +127,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     series.append(Series("error", counts, errors, "%"))
     numbers["verdict.rate"] = float(np.log(errors[-2] / errors[-1]) / np.log(counts[-1] / counts[-2]))
     parameters = {"steps": counts, "speeds": speeds}
-    study = Study("stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "stick_slip", numbers, {}, ASSUMPTIONS, series, lambda: draw(series, speeds), parameters
+    ).finish(out, quick)
 
 
 def remainder(result: ev.Result) -> float:

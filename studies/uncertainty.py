@@ -1,10 +1,8 @@
 """How sure are Fig. 5's closed forms? 500 samples of what was measured or assumed.
 
 The closed forms are (8a), (8b) with (24), the rigid smooth ellipsoid of each participant by
-quadrature. They are adequate because the fingers hover: nothing touches. What they leave out, the
-study measures on some of its own samples by deformable finite elements (a sweep of scenes):
-deformation adds a few per cent with Kaczmarek's law, more with Strong-Troxel's at the smallest
-gaps, where it moves that law farther from what was measured.
+quadrature. They are adequate because the fingers hover: nothing touches. What deformation and
+ridges change is a few per cent, which `participants` computes.
 
 Each sample has one value of every input for all participants (an instrument that is off is off for
 all); the answer is the median over the eleven, as Fig. 5 has it. Latin hypercube, fixed seed.
@@ -16,76 +14,47 @@ intervals, Strong-Troxel's above them.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from evfem import data
-from evfem.electrostatics.forces import EllipsoidalPad, pad_force, pad_force_per_depth
-from evfem.electrostatics.laws import Layer, Layers
-from evfem.sweeps.file import Sweep
-from evfem.sweeps.run import sweep
-from evfem.sweeps.samples import Normal, Samples, Uniform
+import evfem as ev
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force
 
-from .common import (
-    CASES,
-    COLOURS,
-    LABELS,
-    LAWS,
-    Floats,
-    Series,
-    Study,
-    median_interval,
-    new_figure,
-    panel_letter,
-    participants,
-)
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from .common import CASES, LAWS, Floats, Series, Study, median_interval, participants
+from .plots import COLOURS, LABELS, Figure, panels
 
 COUNT, SEED = 500, 5
-INPUTS: dict[str, Uniform | Normal] = {
-    "gap_error": Uniform(-0.05, 0.05),
-    "voltage_factor": Uniform(0.99, 1.01),
-    "stratum_corneum": Uniform(0.27, 0.49),
-    "stratum_corneum_eps_r": Uniform(1000.0, 10000.0),
-    "insulator": Uniform(0.0855, 0.0945),
-    "insulator_eps_r": Uniform(3.0, 3.7),
-    "width_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "height_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "length_error": Normal(0.0, 0.3, between=(-0.9, 0.9)),
-    "inclination": Normal(30.0, 3.0, between=(21.0, 39.0)),
+#: what varies, and how the figure calls it (s: standard deviation)
+GIVEN: dict[str, tuple[ev.Uniform | ev.Normal, str]] = {
+    "gap_error": (ev.Uniform(-0.05, 0.05), "air gap, ±0.05 mm"),
+    "voltage_factor": (ev.Uniform(0.99, 1.01), "voltage, ±1 %"),
+    "stratum_corneum": (ev.Uniform(0.27, 0.49), "stratum corneum, 0.27-0.49 mm"),
+    "stratum_corneum_eps_r": (ev.Uniform(1000.0, 10000.0), "its permittivity, 1000-10000"),
+    "insulator": (ev.Uniform(0.0855, 0.0945), "insulator, 0.09 mm ±5 %"),
+    "insulator_eps_r": (ev.Uniform(3.0, 3.7), "its permittivity, 3.0-3.7"),
+    "width_error": (ev.Normal(0.0, 0.3, between=(-0.9, 0.9)), "finger width, s 0.3 mm"),
+    "height_error": (ev.Normal(0.0, 0.3, between=(-0.9, 0.9)), "finger height, s 0.3 mm"),
+    "length_error": (ev.Normal(0.0, 0.3, between=(-0.9, 0.9)), "finger length, s 0.3 mm"),
+    "inclination": (ev.Normal(30.0, 3.0, between=(21.0, 39.0)), "inclination, s 3 deg"),
 }
-SHOWN = {
-    "gap_error": "air gap, ±0.05 mm",
-    "voltage_factor": "voltage, ±1 %",
-    "stratum_corneum": "stratum corneum, 0.27-0.49 mm",
-    "stratum_corneum_eps_r": "its permittivity, 1000-10000",
-    "insulator": "insulator, 0.09 mm ±5 %",
-    "insulator_eps_r": "its permittivity, 3.0-3.7",
-    "width_error": "finger width, s 0.3 mm",
-    "height_error": "finger height, s 0.3 mm",
-    "length_error": "finger length, s 0.3 mm",
-    "inclination": "inclination, s 3 deg",
-}
+INPUTS = {name: one for name, (one, _) in GIVEN.items()}
+SHOWN = {name: said for name, (_, said) in GIVEN.items()}
 ASSUMPTIONS = {
     "stratum corneum": "0.27 to 0.49 mm as in Fig. 10, permittivity 1000 to 10000 as in Fig. 7; uniform",
     "other spreads": "assumed, the paper states none: see the labels of the figure (s: standard deviation)",
     "independent": "inputs vary independently; one value for all participants",
-    "model": "rigid smooth ellipsoid over the rectangle; deformation is checked, ridges are left out",
+    "model": "rigid smooth ellipsoid over the rectangle; deformation and ridges are left out",
 }
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """Distribution of the median force by both laws in each case, what it depends on, and the
-    check.
-    """
-    samples = Samples(INPUTS, 60 if quick else COUNT, SEED)
+    """Distribution of the median force by both laws in each case, and what it depends on."""
+    samples = ev.Samples(INPUTS, 60 if quick else COUNT, SEED)
     drawn = samples.draw()
     medians = {(law, case): np.median(forces(drawn, law, case), axis=1) for law in LAWS for case in CASES}
     ranks = {key: _rank_correlations(drawn, values) for key, values in medians.items()}
-    numbers = _numbers(medians, ranks) | check(samples, 1 if quick else 8)
+    numbers = _numbers(medians, ranks)
     series = [
         Series(f"median {law} {case}", np.arange(len(v)), v, "mN over sample")
         for (law, case), v in medians.items()
@@ -96,8 +65,9 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     ]
     parameters = {"count": samples.count, "seed": SEED, "method": samples.method}
     parameters["inputs"] = {name: repr(one) for name, one in INPUTS.items()}
-    study = Study("uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters)
-    return study.finish(out, quick)
+    return Study(
+        "uncertainty", numbers, {}, ASSUMPTIONS, series, lambda: _draw(medians, ranks), parameters
+    ).finish(out, quick)
 
 
 def forces(drawn: dict[str, Floats], law: str, case: str) -> Floats:
@@ -108,62 +78,9 @@ def forces(drawn: dict[str, Floats], law: str, case: str) -> Floats:
     length = (table["c"] + one["length_error"]) * np.cos(np.radians(one["inclination"]))
     pads = EllipsoidalPad(table["a"] + one["width_error"], table["b"] + one["height_error"], length)
     gaps, voltages = gap + one["gap_error"], voltage * one["voltage_factor"]
-    return 1e3 * pad_force(LAWS[law], pads, gaps, voltages, _layers(one))
-
-
-def _layers(one: dict[str, Any]) -> Layers:
-    skin = Layer(one["stratum_corneum"], one["stratum_corneum_eps_r"])
-    return Layers.of(skin, Layer(one["insulator"], one["insulator_eps_r"]))
-
-
-def check(samples: Samples, count: int) -> dict[str, float]:
-    """Deformable finite elements over the rigid cross-section, smallest and largest ratio less 1:
-    the mean finger, smooth and coarse, in `count` of the samples, both laws and all cases.
-    """
-    drawn = samples.draw()
-    picked = np.linspace(0, samples.count - 1, count).astype(int)
-    chosen = {
-        f"{case} {i}": (case, {name: float(values[i]) for name, values in drawn.items()})
-        for case in CASES
-        for i in picked
-    }
-    rows = {label: _keys(*sample) for label, sample in chosen.items()}
-    scene = {
-        "version": 1,
-        "finger": {"resolution": "coarse", "ridges": False},
-        "surface": {"kind": "flat"},
-        "electrostatics": {"law": "kaczmarek", "insulator_thickness": 0.09, "insulator_eps_r": 3.35},
-        "motion": [{"kind": "hover"}],
-    }
-    grid = {"electrostatics.law": list(LAWS), "sample": rows}
-    table = sweep(Sweep(scene, grid, outputs=("electrostatic_force.last",)), workers=1)
-    changes: dict[str, list[float]] = {law: [] for law in LAWS}
-    for row in table.rows:
-        pad = EllipsoidalPad(row["finger.width"], row["finger.height"], 1.0)
-        gap, voltage = row["motion.0.gap"], row["electrostatics.voltage"]
-        layers = _layers(chosen[row["sample"]][1])
-        rigid = pad_force_per_depth(LAWS[row["electrostatics.law"]], pad, gap, voltage, layers)
-        changes[row["electrostatics.law"]].append(row["electrostatic_force.last"] / rigid - 1.0)
-    found: dict[str, float] = {"check.points": len(table.rows)}
-    for law, values in changes.items():
-        found[f"check.deformable_over_rigid_lowest.{law}"] = min(values)
-        found[f"check.deformable_over_rigid_highest.{law}"] = max(values)
-    return found
-
-
-def _keys(case: str, one: dict[str, float]) -> dict[str, float]:
-    """A sample as keys of a scene."""
-    (voltage, gap), table = CASES[case], data.load("table2")
-    return {
-        "electrostatics.voltage": voltage * one["voltage_factor"],
-        "electrostatics.insulator_thickness": one["insulator"],
-        "electrostatics.insulator_eps_r": one["insulator_eps_r"],
-        "finger.width": table.value("a") + one["width_error"],
-        "finger.height": table.value("b") + one["height_error"],
-        "finger.stratum_corneum_thickness": one["stratum_corneum"],
-        "finger.electrical.stratum_corneum_eps_r": one["stratum_corneum_eps_r"],
-        "motion.0.gap": gap + one["gap_error"],
-    }
+    skin = ev.Layer(one["stratum_corneum"], one["stratum_corneum_eps_r"])
+    layers = ev.Layers.of(skin, ev.Layer(one["insulator"], one["insulator_eps_r"]))
+    return 1e3 * pad_force(LAWS[law], pads, gaps, voltages, layers)
 
 
 def _rank_correlations(drawn: dict[str, Floats], values: Floats) -> dict[str, float]:
@@ -193,13 +110,13 @@ def _numbers(medians: dict[Any, Floats], ranks: dict[Any, dict[str, float]]) -> 
 
 
 def _draw(medians: dict[Any, Floats], ranks: dict[Any, dict[str, float]]) -> Figure:
-    figure = new_figure(4.4, 8.4)
-    left, right = figure.subplots(1, 2, width_ratios=[1.0, 0.9])
+    from matplotlib.patches import Patch
+
+    figure, (left, right) = panels(4.4, 2, 8.4, width_ratios=[1.0, 0.9])
     for place, case in enumerate(CASES):
         low, high, _ = median_interval(participants()[case])
-        left.plot(
-            [place - 0.3] * 2, [low, high], color=COLOURS["measured"], linewidth=5, solid_capstyle="butt"
-        )
+        look = {"color": COLOURS["measured"], "linewidth": 5, "solid_capstyle": "butt"}
+        left.plot([place - 0.3] * 2, [low, high], **look)
         left.plot(place - 0.3, np.median(participants()[case]), "_", color="black", markersize=11)
         for law, at in (("kaczmarek", 0.0), ("strong_troxel", 0.27)):
             parts = left.violinplot([medians[law, case]], [place + at], widths=0.24, showextrema=False)
@@ -210,7 +127,6 @@ def _draw(medians: dict[Any, Floats], ranks: dict[Any, dict[str, float]]) -> Fig
             left.plot(place + at, middle, "o", color=COLOURS[law], markersize=4)
     left.set_xticks(range(len(CASES)), [f"{c}\n{u:g} V\n{g:.2f} mm" for c, (u, g) in CASES.items()])
     left.set(ylabel="median force of the eleven (mN)", ylim=(0, None))
-    panel_letter(left, "a")
     names = list(reversed(SHOWN))
     place = np.arange(len(names))
     for law, at in (("kaczmarek", 0.2), ("strong_troxel", -0.2)):
@@ -218,17 +134,9 @@ def _draw(medians: dict[Any, Floats], ranks: dict[Any, dict[str, float]]) -> Fig
     right.axvline(0.0, color=COLOURS["neutral"], linewidth=0.8)
     right.set_yticks(place, [SHOWN[name] for name in names], fontsize="small")
     right.set(xlabel="rank correlation with the force, HVLD", xlim=(-1, 1))
-    panel_letter(right, "b")
-    figure.legend(handles=_handles(), loc="outside lower center", ncols=3, fontsize="small")
+    handles = [Patch(color=COLOURS["measured"], label="measured median, 93.5 % interval")]
+    for law in ("kaczmarek", "strong_troxel"):
+        label = f"{LABELS[law]}, line: 5 to 95 %"
+        handles.append(Patch(facecolor=COLOURS[law], alpha=0.7, label=label))
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, fontsize="small")
     return figure
-
-
-def _handles() -> list[Any]:
-    from matplotlib.patches import Patch
-
-    measured = Patch(color=COLOURS["measured"], label="measured median, 93.5 % interval")
-    laws = [
-        Patch(facecolor=COLOURS[law], alpha=0.7, label=f"{LABELS[law]}, line: 5 to 95 %")
-        for law in ("kaczmarek", "strong_troxel")
-    ]
-    return [measured, *laws]

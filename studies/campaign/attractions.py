@@ -7,8 +7,7 @@ from __future__ import annotations
 from evfem.electrostatics.dielectrics import SKINS
 from evfem.electrostatics.laws import INSULATORS
 
-from .draws import Draw, six_digits
-from .tables import Tables
+from .tables import Draw, Tables, six_digits
 
 LARGEST_FIELD = 60e3  # V/mm
 LARGEST_VOLTAGE = 3000.0
@@ -108,9 +107,7 @@ def largest_voltage(table: Tables) -> float:
 
 
 def add_voltage(random: Draw, tables: Tables) -> None:
-    """A constant voltage, one along the way or over time, or the targets of the ramps, up and
-    down.
-    """
+    """A constant voltage, one along the way or over time, or the targets of the ramps."""
     if "electrostatics" not in tables:
         return
     table, ramps = tables["electrostatics"], [one for one in tables["motion"] if one["kind"] == "voltage"]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .draws import Draw, six_digits
-from .tables import Tables
+from .tables import Draw, Tables, six_digits
 
 TABLE_2_WIDTH = 16.68
 #: layers of the pad: default thickness (mm) and modulus (MPa) of Table 2
@@ -73,9 +72,7 @@ def _bone(wide: float, height: float, layers: float) -> Tables:
 
 
 def _ridges(random: Draw, wide: float, skin: float) -> Tables:
-    """Ridges that are at most 0.3 of their pitch high and leave 0.3 of the `skin` (mm) below them,
-    with walls that can be meshed.
-    """
+    """Ridges up to 0.3 of their pitch high that leave 0.3 of the `skin` (mm), with walls to be meshed."""
     pitch = random.between(0.3, min(0.8, 0.045 * wide))
     table: Tables = {"ridge_width": pitch, "ridge_phase": random.between(-1.0, 1.0)}
     exponent = random.between(2.0, 8.0)

@@ -17,9 +17,8 @@ from evfem.scene.file import loads
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 
-from . import twins
-from .invariants import Broken, broken, remainder
-from .tables import Tables, mirrored, text_of, with_files, with_half_steps
+from .invariants import broken, remainder
+from .tables import Tables, text_of, with_files
 
 #: classes of ends, the good ones first
 GOOD = ("equilibrium", "explained")
@@ -33,8 +32,7 @@ class Ending:
     """The class of an end, what was said, and what the run cost until then.
 
     `kind` is what was said without numbers, for counting; `steps` of `requested` were done;
-    `remainder` is the largest one of the books in any row; `cpu_s` is that of the scene alone,
-    without its twins.
+    `remainder` is the largest one of the books in any row.
     """
 
     outcome: str
@@ -55,86 +53,45 @@ class Ending:
         return self.outcome in GOOD
 
 
-def judge(tables: Tables, with_twins: bool) -> Ending:
-    """Run a scene, and with its twins the mirrored one and half the steps where they must agree."""
+def judge(tables: Tables) -> Ending:
+    """Run a scene and check its rows."""
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         # surfaces finer than the nodes and the like are what a campaign is about
         warnings.simplefilter("ignore")
-        ending = _judged(tables, Path(folder), with_twins)
+        ending = _judged(tables, Path(folder))
     return replace(ending, said=" ".join(ending.said.split()))
 
 
-def _judged(tables: Tables, folder: Path, with_twins: bool) -> Ending:
+def _judged(tables: Tables, folder: Path) -> Ending:
+    begin, result = time.process_time(), None
     try:
         scene = loads(text_of(with_files(tables, folder)), folder)
+        begin = time.process_time()
+        result, end = simulate(scene), Ending("equilibrium")
     except InputError as error:
         return Ending("refused", str(error), error.key)
-    begin, requested = time.process_time(), scene.total_steps
-    try:
-        result = simulate(scene)
     except NotConverged as error:
-        spent, partial = time.process_time() - begin, error.result
-        found = broken(scene, partial) if isinstance(partial, Result) else []
-        costs = _costs(partial, requested, spent)
-        if found:  # what was accepted is worse than what was not
-            return replace(costs, outcome="invariants_broken", said=_sentence(found), kind=_names(found))
-        explained = EXPLANATION in error.advice
-        outcome = "explained" if explained else "not_converged"
-        return replace(costs, outcome=outcome, said=str(error), kind=kind(error.advice))
-    except InputError as error:
-        return Ending("refused", str(error), error.key, requested)
+        result, outcome = error.result, "explained" if EXPLANATION in error.advice else "not_converged"
+        end = Ending(outcome, str(error), kind(error.advice))
     except Exception as error:  # an end like others: the table names it, the campaign goes on
-        said = f"{type(error).__name__}: {error}"
-        return Ending("error", said, type(error).__name__, requested, cpu_s=time.process_time() - begin)
-    costs = _costs(result, requested, time.process_time() - begin)
-    found = broken(scene, result)
-    if with_twins and not found:
-        found = _twins(tables, folder, result)
-    if found:
-        return replace(costs, outcome="invariants_broken", said=_sentence(found), kind=_names(found))
-    return costs
-
-
-def _costs(result: Any, requested: int, cpu_s: float) -> Ending:
+        end = Ending("error", f"{type(error).__name__}: {error}", type(error).__name__)
+    end = replace(end, cpu_s=time.process_time() - begin)
     if not isinstance(result, Result):
-        return Ending("equilibrium", requested=requested, cpu_s=cpu_s)
+        return end
+    if found := broken(scene, result):  # what was accepted is worse than what was not
+        said, names = "; ".join(map(str, found)), ", ".join(one.name for one in found)
+        end = replace(end, outcome="invariants_broken", said=said, kind=names)
+    return replace(end, **_costs(result))
+
+
+def _costs(result: Result) -> dict[str, Any]:
     solver = result.provenance["solver"]
-    return Ending(
-        "equilibrium",
-        requested=requested,
-        steps=len(result.step),
-        unknowns=int(solver["unknowns"]),
-        iterations=int(solver["iterations"]),
-        substeps=int(result.substeps.sum()),
-        cuts=int(solver["cuts"]),
-        cpu_s=cpu_s,
-        remainder=float(np.abs(remainder(result)).max(initial=0.0)),
-    )
-
-
-def _twins(tables: Tables, folder: Path, result: Result) -> list[Broken]:
-    """What the twins of a scene find; one that does not end says so by its own end."""
-    if not twins.smooth(result):
-        return []
-    found: list[Broken | None] = []
-    scene = loads(text_of(tables), folder)
-    try:
-        other = simulate(loads(text_of(mirrored(tables)), folder))
-        found.append(twins.mirror_broken(result, other) if twins.smooth(other) else None)
-        if twins.free_of_path(scene):
-            finer = simulate(loads(text_of(with_half_steps(tables)), folder))
-            found.append(twins.steps_broken(result, finer) if twins.smooth(finer) else None)
-    except NotConverged as error:
-        return [Broken("twin ends", error.step, 1.0, 0.0)]
-    return [one for one in found if one is not None]
-
-
-def _sentence(found: list[Broken]) -> str:
-    return "; ".join(map(str, found))
-
-
-def _names(found: list[Broken]) -> str:
-    return ", ".join(one.name for one in found)
+    return {
+        **{name: int(solver[name]) for name in ("unknowns", "iterations", "cuts")},
+        "steps": len(result.step),
+        "substeps": int(result.substeps.sum()),
+        "remainder": float(np.abs(remainder(result)).max(initial=0.0)),
+    }
 
 
 def kind(advice: str) -> str:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections import Counter
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 
-from ..common import COLOURS, new_figure
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .ending import OUTCOMES, Ending
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BAD = "#D55E00"
 #: outcome -> marker, colour and name; told apart by shape as well
@@ -46,7 +42,7 @@ def draw(ends: list[Ending], slowness: Floats) -> Figure:
 
 def _counts(ax: Axes, ends: list[Ending]) -> None:
     """How many scenes end how, with their shares."""
-    counts = {name: sum(one.outcome == name for one in ends) for name in OUTCOMES}
+    counts = Counter(one.outcome for one in ends)
     seen = [name for name in OUTCOMES if counts[name]]
     names, colours = [MARKS[name][2] for name in seen], [MARKS[name][1] for name in seen]
     bars = ax.barh(names, [counts[name] for name in seen], color=colours, height=0.7)
@@ -55,10 +51,10 @@ def _counts(ax: Axes, ends: list[Ending]) -> None:
     for place, name in enumerate(seen):  # the marker of the panels below
         ax.plot(0.78, place, MARKS[name][0], color="white", markersize=5, markeredgewidth=0.0)
     ax.set(xscale="log", xlim=(0.7, 4.0 * max(len(ends), 1)), xlabel=f"of {len(ends)} scenes")
+    ax.set_ylim(len(seen) - 0.5, -0.5)
+    ax.tick_params(axis="y", length=0)
     ax.xaxis.set_major_formatter("{x:g}")
     ax.xaxis.set_minor_formatter("")
-    ax.tick_params(axis="y", length=0)
-    ax.set_ylim(len(seen) - 0.5, -0.5)
     ax.spines[["top", "right"]].set_visible(False)
 
 
@@ -66,34 +62,21 @@ def _scatter(ax: Axes, ends: list[Ending], values: list[float] | list[int], labe
     """What scenes cost over their size; those without a value are left out."""
     for name, (marker, colour, _) in MARKS.items():
         chosen = [i for i, one in enumerate(ends) if one.outcome == name and values[i] > 0]
-        if chosen:
-            steps = [max(ends[i].requested, 1) for i in chosen]
-            size = 3 if name == "equilibrium" else 7
-            points = [values[i] for i in chosen]
-            ax.plot(steps, points, marker, color=colour, alpha=0.75, markersize=size, markeredgewidth=0.0)
+        look = {"markersize": 3 if name == "equilibrium" else 7, "alpha": 0.75, "markeredgewidth": 0.0}
+        steps = [max(ends[i].requested, 1) for i in chosen]
+        ax.plot(steps, [values[i] for i in chosen], marker, color=colour, **look)
     ax.set(xscale="log", yscale="log", xlabel="requested steps", ylabel=label)
-    for axis in (ax.xaxis, ax.yaxis):
-        axis.set_major_formatter("{x:g}")
-        axis.set_minor_formatter("")
-    ax.grid(color="#DDDDDD", linewidth=0.5)
-    ax.set_axisbelow(True)
-    ax.spines[["top", "right"]].set_visible(False)
+    plain_ticks(ax)
 
 
 def _median(ax: Axes, ends: list[Ending], slowness: Floats) -> None:
-    """The median time of scenes of the same size, and `SLOW` times that."""
-    points = sorted(
-        (max(one.requested, 1), one.cpu_s / slow)
-        for one, slow in zip(ends, slowness, strict=True)
-        if slow > 0.0
-    )
+    """The median time of scenes of the same size, and `SLOW` times that, named beside the panel."""
+    found = zip(ends, slowness, strict=True)
+    points = sorted((max(one.requested, 1), one.cpu_s / slow) for one, slow in found if slow > 0.0)
     if not points:
         return
     steps, medians = np.array(points).T
     for factor, style, text in ((1.0, "-", "median"), (SLOW, "--", f"{SLOW:g} times\nthe median")):
         ax.plot(steps, factor * medians, style, color="black", linewidth=1.0)
-        at = factor * medians[-1]
-        # beside the panel, where no scene is
-        ax.annotate(
-            text, (1.0, at), (4, 0), ("axes fraction", "data"), "offset points", fontsize=8, va="center"
-        )
+        place = (1.0, factor * medians[-1]), (4, 0), ("axes fraction", "data"), "offset points"
+        ax.annotate(text, *place, fontsize=8, va="center")

@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from .bodies import width
-from .draws import Draw, six_digits
-from .tables import Tables
+from .tables import Draw, Tables, six_digits
 
 LARGEST_FRICTION = 1.5
 STEEPEST = 0.4

@@ -1,41 +1,46 @@
-"""A campaign as it runs: processes that take the next scene, with a limit of its CPU time."""
+"""A campaign as it runs: processes that take the next scene, with a limit of its CPU time.
+
+On disk stand, after every scene, `campaign/ends.csv` with a row per scene, and in
+`campaign/failures/` each scene that ended badly as it was drawn, complete in itself.
+"""
 
 from __future__ import annotations
 
 import signal
-from collections.abc import Sequence
-from dataclasses import replace
+import textwrap
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from pathlib import Path
 
 from evfem.common import notices
 from evfem.common.pools import Died, processes
+from evfem.common.storage import write_text
+from evfem.common.tables import csv_text
 
+from ..common import make_folder
 from ..stability.case import warm_up
 from .drawing import draw
 from .ending import Ending, judge
-from .records import Key, Records
-from .tables import steps_of
+from .tables import put_mesh, text_of
 
-#: every so many scenes is run with its twins, which take as long again or longer
-TWINS = 4
+Key = tuple[int, int]
+COLUMNS = [spec.name for spec in fields(Ending)]
 
 
-def run(keys: Sequence[Key], records: Records, workers: int, limit_s: float) -> None:
-    """Judge the scenes that have no end yet, or were given up earlier than after `limit_s` CPU
-    seconds; what is done is on disk.
-    """
-    tasks = {key: (key, limit_s) for key in keys if not _ended(records.known(key, draw(*key)), limit_s)}
-    total, done, drawn = len(keys), len(keys) - len(tasks), notices.drawable() and bool(tasks)
-    with processes(workers) as pool, notices.bar(total, "scene", done, drawn) as bar:
-        for key, found in pool(judged, tasks):
-            tables = draw(*key)
+def run(keys: Sequence[Key], folder: Path | None, workers: int, limit_s: float) -> list[Ending]:
+    """Judge the scenes, each with at most `limit_s` CPU seconds; what is done is in `folder`."""
+    ends: dict[Key, Ending] = {}
+    with processes(workers) as pool, notices.bar(len(keys), "scene", 0, notices.drawable()) as bar:
+        for key, found in pool(judged, {key: (key, limit_s) for key in keys}):
             ending = _lost(found, limit_s) if isinstance(found, Exception) else found
-            # a process that came to its limit could not say how large its scene is
-            requested = sum(map(steps_of, tables["motion"]))
-            records.add(key, tables, replace(ending, requested=requested))
+            requested = sum(motion["steps"] for motion in draw(*key)["motion"])
+            ends[key] = replace(ending, requested=requested)
+            if folder is not None:
+                keep(folder, ends, key)
             bar.update(1)
-            done += 1
-            if not drawn:
-                notices.milestone("scene", done, total)
+            if not notices.drawable():
+                notices.milestone("scene", len(ends), len(keys))
+    return [ends[key] for key in keys]
 
 
 def judged(task: tuple[Key, float]) -> Ending:
@@ -46,7 +51,7 @@ def judged(task: tuple[Key, float]) -> Ending:
     warm_up()
     signal.setitimer(signal.ITIMER_PROF, limit_s)
     try:
-        return judge(draw(*key), key[1] % TWINS == 0)
+        return judge(draw(*key))
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
 
@@ -61,5 +66,14 @@ def _lost(error: Exception, limit_s: float) -> Ending:
     return Ending("error", f"the process died with status {error.status}", "process died")
 
 
-def _ended(known: Ending | None, limit_s: float) -> bool:
-    return known is not None and (known.outcome != "timeout" or known.cpu_s >= limit_s)
+def keep(folder: Path, ends: Mapping[Key, Ending], last: Key) -> None:
+    """The table of ends so far, and the last scene if it failed, headed by how it ended."""
+    rows = [[*key, *(getattr(end, name) for name in COLUMNS)] for key, end in sorted(ends.items())]
+    write_text(make_folder(folder) / "ends.csv", csv_text([["seed", "scene", *COLUMNS], *rows]))
+    ending, (seed, number) = ends[last], last
+    file = make_folder(folder / "failures") / f"seed{seed}-scene{number:04d}.toml"
+    file.unlink(missing_ok=True)
+    if not ending.good:
+        said = textwrap.wrap(f"seed {seed}, scene {number}: {ending.outcome}; {ending.said}", 96)
+        put_mesh(draw(*last), file.parent)
+        write_text(file, "".join(f"# {line}\n" for line in said) + text_of(draw(*last)))

@@ -23,8 +23,7 @@ from .. import Sample
 from ..common import Series, Study, make_folder
 from .ending import OUTCOMES, Ending
 from .figure import draw as figure_of
-from .records import Records
-from .run import TWINS, run
+from .run import run
 
 #: scenes unless said otherwise, and in the quick study
 SCENES, QUICK = 300, 6
@@ -37,22 +36,20 @@ TIME = (
 ASSUMPTIONS = {
     "outcomes": "equilibrium; explained: no equilibrium exists, and the sentence says why; not_converged; "
     "invariants_broken; timeout; refused: a mistake of the generator; error",
-    "twins": f"every {TWINS}th scene is also mirrored, and where no path counts run with half the steps",
     "remainder": "works less stored, kinetic and dissipated energy over the largest of them, in any row",
     "meshes": "coarse ones of any size, with 6,000 displacement unknowns or so",
 }
 
 
 def main(quick: bool = False, out: Path | None = None, sample: Sample | None = None) -> dict[str, Any]:
-    """Run the scenes that have no end yet, in processes; numbers, table, failed scenes and figure."""
+    """Run the scenes in processes; numbers, table, failed scenes and figure."""
     sample = sample or Sample()
     count = sample.scenes or (QUICK if quick else SCENES)
     keys = [(sample.seed, number) for number in range(count)]
-    records = Records(None if out is None else make_folder(out) / "campaign")
-    run(keys, records, min(sample.workers or cores(), count), float(sample.limit))
-    ends = [records.ends[key] for key in keys]
+    folder = None if out is None else make_folder(out) / "campaign"
+    ends = run(keys, folder, min(sample.workers or cores(), count), float(sample.limit))
     kinds = Counter(f"{one.outcome}: {one.kind}" for one in ends if not one.good)
-    study = Study(
+    return Study(
         "campaign",
         numbers(ends),
         {},
@@ -60,8 +57,7 @@ def main(quick: bool = False, out: Path | None = None, sample: Sample | None = N
         series(ends),
         lambda: figure_of(ends, slowness(ends)),
         {"scenes": count, "seed": sample.seed, "limit": sample.limit},
-    )
-    return study.finish(out, quick)
+    ).finish(out, quick)
 
 
 def numbers(ends: list[Ending]) -> dict[str, float]:

@@ -1,15 +1,13 @@
-"""The tables of a scene file as plain values: copies, text, files beside them, and their mirror
-image.
-"""
+"""The tables of a scene file as plain values: random numbers for them, their text, files beside them."""
 
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
 from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import tomli_w
 from evfem.meshes import FOLDER
 
@@ -17,18 +15,8 @@ from evfem.common.storage import disk, write_text
 from evfem.common.tables import csv_text
 from evfem.scene.file import loads
 from evfem.scene.scene import Scene
-from evfem.surface.textures import SelfAffine
 
 Tables = dict[str, Any]
-#: keys of a surface of the kind self_affine alone
-ROUGH = ("hurst", "rms", "period", "shortest", "longest", "seed")
-#: steps of a motion that does not say how many
-USUAL_STEPS = {"press": 10, "slide": 100, "hover": 1, "voltage": 10, "wait": 100}
-
-
-def copied(tables: Tables) -> Tables:
-    """A copy that shares nothing."""
-    return deepcopy(tables)
 
 
 def text_of(tables: Tables) -> str:
@@ -36,16 +24,14 @@ def text_of(tables: Tables) -> str:
     return tomli_w.dumps({key: value for key, value in tables.items() if value != {}})
 
 
-def scene_of(tables: Tables, name: str = "scene") -> Scene:
+def scene_of(tables: Tables) -> Scene:
     """The scene; raises InputError if it is none."""
-    return loads(text_of(tables), FOLDER, name=name)
+    return loads(text_of(tables), FOLDER)
 
 
 def with_files(tables: Tables, folder: Path) -> Tables:
-    """The same scene with its profile and its voltage in csv files and its mesh in `folder`, as
-    users have them.
-    """
-    tables = copied(tables)
+    """The same scene with profile and voltage in csv files and its mesh in `folder`, as users have them."""
+    tables = deepcopy(tables)
     put_mesh(tables, folder)
     surface, electrostatics = tables["surface"], tables.get("electrostatics", {})
     if "points" in surface:
@@ -65,53 +51,47 @@ def put_mesh(tables: Tables, folder: Path) -> None:
             shutil.copy(FOLDER / tables["finger"]["mesh"], folder)
 
 
-def mirrored(tables: Tables) -> Tables:
-    """The scene seen in a mirror: x becomes -x in finger, surface, friction, voltage and motion."""
-    tables = copied(tables)
-    finger, surface = tables["finger"], tables["surface"]
-    if "ridge_phase" in finger:
-        finger["ridge_phase"] = -finger["ridge_phase"]
-    for rows in _along(tables):
-        rows[:] = [[-x, value] for x, value in reversed(rows)]
-    if surface["kind"] == "self_affine":
-        _as_waves(surface)
-    if "phase" in surface:
-        surface["phase"] = -surface["phase"]
-    if surface["kind"] == "sinusoid" and "terms" in surface:
-        surface["terms"] = [[a, -k, phase] for a, k, phase in surface["terms"]]
-    elif surface["kind"] == "sinusoid":
-        surface["terms"] = [[0.025, -6.0, 0.0], [0.05 / 2.0, 12.0, 1.5707963267948966]]
-        surface["terms"].append([-0.025, 0.0, 1.5707963267948966])
-    for motion in tables["motion"]:
-        if "angle" in motion:
-            motion["angle"] = float(f"{180.0 - motion['angle']:.9g}")
-        elif motion["kind"] == "slide":
-            motion["distance"] = -motion["distance"]
-    return tables
+# -- random numbers
+
+#: of the generator itself: another one draws other scenes
+GENERATOR = 2
 
 
-def _as_waves(surface: Tables) -> None:
-    """Roughness as the waves that it is made of: no seed gives its mirror image."""
-    own = {name: surface.pop(name) for name in ROUGH if name in surface}
-    surface |= {"kind": "sinusoid", "terms": [list(row) for row in SelfAffine(**own).terms]}
+class Draw:
+    """Random numbers of one scene: the same for the same seed, number and `further` ones."""
+
+    def __init__(self, seed: int, number: int, *further: int) -> None:
+        self._random = np.random.default_rng([GENERATOR, seed, number, *further])
+
+    def chance(self, probability: float) -> bool:
+        """True with that probability."""
+        return bool(self._random.random() < probability)
+
+    def between(self, low: float, high: float) -> float:
+        """Evenly between two numbers, with six digits."""
+        return six_digits(self._random.uniform(low, high))
+
+    def spread(self, low: float, high: float) -> float:
+        """Evenly on a logarithmic scale between two positive numbers, with six digits."""
+        return six_digits(np.exp(self._random.uniform(np.log(low), np.log(high))))
+
+    def whole(self, low: int, high: int) -> int:
+        """A whole number, both ends included; small ones are as likely as large ones."""
+        return int(np.clip(np.rint(self.spread(max(low, 1) - 0.49, high + 0.49)), low, high))
+
+    def sign(self) -> float:
+        """1 or -1."""
+        return 1.0 if self.chance(0.5) else -1.0
+
+    def one_of(self, *choices: Any) -> Any:
+        """One of the choices, each as likely."""
+        return choices[int(self._random.integers(len(choices)))]
+
+    def places(self, count: int, low: float, high: float) -> list[float]:
+        """Increasing positions, with six digits."""
+        return sorted(map(six_digits, self._random.uniform(low, high, count)))
 
 
-def _along(tables: Tables) -> Iterator[list[list[float]]]:
-    """Everything that is a table over x."""
-    if isinstance(tables["surface"]["friction"], list):
-        yield tables["surface"]["friction"]
-    if "points" in tables["surface"]:
-        yield tables["surface"]["points"]
-    if "voltage_profile" in tables.get("electrostatics", {}):
-        yield tables["electrostatics"]["voltage_profile"]
-
-
-def steps_of(motion: Tables) -> int:
-    """Requested steps of a motion's table."""
-    return motion.get("steps", USUAL_STEPS[motion["kind"]])
-
-
-def with_half_steps(tables: Tables) -> Tables:
-    """The scene with steps half as long."""
-    motions = [motion | {"steps": 2 * steps_of(motion)} for motion in tables["motion"]]
-    return copied(tables | {"motion": motions})
+def six_digits(value: float) -> float:
+    """The number that stands in the file."""
+    return float(f"{value:.6g}")

@@ -130,9 +130,7 @@ def newton(
 
 
 def followed(peer: Any) -> dict[str, Any]:
-    """Forces after every step of the problem's path (N/mm), and the iterations they took, each
-    with a factorisation.
-    """
+    """Forces (N/mm) after every step, and the iterations they took, each with a factorisation."""
     history, iterations = [], 0
     for place in peer.problem.path:
         iterations += peer.move(*place)
@@ -180,8 +178,6 @@ def cpu_seconds() -> float:
 
 
 def main(solve: Callable[[Problem], dict[str, Any]], versions: dict[str, str]) -> None:
-    """Solve the problem whose file is named on the command line; print what was found as a line of
-    JSON.
-    """
+    """Solve the problem whose file the command line names; print what was found as a line of JSON."""
     found = measured(lambda: solve(read(sys.argv[1])))
     print(json.dumps(found | {"versions": versions}))

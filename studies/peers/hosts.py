@@ -24,9 +24,7 @@ from .problem import GIVEN, Way, write
 
 @dataclass(frozen=True)
 class Package:
-    """What a package needs to take part, how it is installed, and its script if that runs without
-    evfem.
-    """
+    """What a package needs, how it is installed, and its script if that runs without evfem."""
 
     needs: tuple[str, ...]
     install: str
@@ -68,9 +66,7 @@ def host(package: str) -> str | None:
 
 
 def environment(python: str) -> dict[str, str]:
-    """The variables of a process: one thread; this interpreter's packages only for itself; modules
-    compiled once, as installed packages are.
-    """
+    """The variables of a process: one thread; this interpreter's packages only for itself."""
     path = os.pathsep.join(p for p in sys.path if p) if python == sys.executable else ""
     kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONHOME", "PYTHONDONTWRITEBYTECODE")}
     return kept | ONE_THREAD | {"PYTHONPATH": path}
@@ -98,8 +94,8 @@ def run_once(
             write(problem, scene, element, level, way)
             words = [python, str(Path(__file__).with_name(PACKAGES[package].script)), str(problem)]
         else:
-            module = f"{__package__}.run"
-            words = [python, "-P", "-m", module, package, element, scene, str(level), way.words]
+            given = [level, way.press, way.slide, way.tolerance]
+            words = [python, "-P", "-m", f"{__package__}.run", package, element, scene, *map(str, given)]
         done = subprocess.run(words, env=variables, capture_output=True, text=True)
     if done.returncode:
         return {"failed": (done.stderr.strip().splitlines() or [f"status {done.returncode}"])[-1]}

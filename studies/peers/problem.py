@@ -14,20 +14,17 @@ from typing import Any
 
 import numpy as np
 
+import evfem as ev
 from evfem.common.arrays import Floats
-from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.mesh.mesh import Mesh
-from evfem.tissue.laws import NeoHookean
 
 from ..benchmark import benchmark_mesh
 
-SCENES = ("A", "B", "C")
-MATERIALS = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.30)}
+MATERIALS = {"tissue": ev.NeoHookean(E=0.05, nu=0.48), "skin": ev.NeoHookean(E=1.0, nu=0.30)}
 PLANE = -6.395  # height of the rigid surface, mm
 FRICTION = {"A": 0.0, "B": 0.3, "C": 0.0}
 VOLTAGE = {"A": 0.0, "B": 0.0, "C": 1000.0}
-STRATUM_CORNEUM, INSULATOR = Layer(0.38, 1650.0), Layer(0.09, 3.35)
-LAYERS = Layers.of(STRATUM_CORNEUM, INSULATOR)
+STRATUM_CORNEUM, INSULATOR = ev.Layer(0.38, 1650.0), ev.Layer(0.09, 3.35)
+LAYERS = ev.Layers.of(STRATUM_CORNEUM, INSULATOR)
 TOLERANCE = 1e-8  # largest free residual over the largest force on the bone
 
 
@@ -46,69 +43,38 @@ class Way:
     def __str__(self) -> str:
         return f"{self.press}+{self.slide}"
 
-    @classmethod
-    def of(cls, words: str) -> Way:
-        """From `words`."""
-        press, slide, tolerance = words.split(",")
-        return cls(int(press), int(slide), float(tolerance))
-
-    @property
-    def words(self) -> str:
-        """As an argument of a command."""
-        return f"{self.press},{self.slide},{self.tolerance:g}"
-
 
 #: as the comparison on the same nodes has it
 GIVEN = Way()
 #: what was converged with exact contact and quadratic elements of two packages that agree, N/mm
 REFERENCE: Mapping[str, Mapping[str, float]] = {
     "A": {"Fn_at_0.5": 0.07098, "Fn_at_1.0": 0.24112, "Fn_at_1.5": 0.54337},
-    "B": {
-        "Fn_at_0.5": 0.0721,
-        "Fn_at_1.0": 0.2556,
-        "Fn_at_1.5": 0.6017,
-        "Ft_after_0.1": 0.00687,
-        "Ft_after_0.5": 0.03364,
-        "Ft_after_3.0": 0.1564,
-        "Fn_after_3.0": 0.5214,
-        "Ft_mean_2_to_3": 0.1473,
-    },
+    "B": {"Fn_at_0.5": 0.0721, "Fn_at_1.0": 0.2556, "Fn_at_1.5": 0.6017}
+    | {"Ft_after_0.1": 0.00687, "Ft_after_0.5": 0.03364, "Ft_after_3.0": 0.1564}
+    | {"Fn_after_3.0": 0.5214, "Ft_mean_2_to_3": 0.1473},
     "C": {},
 }
 #: its uncertainty: the largest of a scene's values, %
 UNCERTAINTY = {"A": 0.04, "B": 0.2}
 
 
-def scene_mesh(element: str, level: int) -> Mesh:
-    """The nodes of a level, as linear quads for q1, as a quarter as many quadratic ones for the
-    others.
-    """
-    return benchmark_mesh(level, 1 if element == "q1" else 2, same_nodes=element != "q1")
+def scene_mesh(element: str, level: int) -> ev.Mesh:
+    """The nodes of a level, as linear quads for q1 and q1_fbar, else as a quarter as many quadratic ones."""
+    linear = element in ("q1", "q1_fbar")
+    return benchmark_mesh(level, 1 if linear else 2, same_nodes=not linear)
 
 
 def write(target: Path, scene: str, element: str, level: int, way: Way = GIVEN) -> None:
-    """The scene as a file of arrays for programs without evfem; `apart.Problem` says what is in
-    it.
-    """
+    """The scene as a file of arrays, those of `apart.Problem`, for programs without evfem."""
     mesh = scene_mesh(element, level)
     lame = np.empty((2, len(mesh.cells)))
     for name, law in MATERIALS.items():
         lame[:, mesh.cells_of(name)] = np.array([[law.mu], [law.lmbda]])
-    np.savez(
-        target,
-        points=mesh.points,
-        cells=mesh.cells,
-        mu=lame[0],
-        lmbda=lame[1],
-        pad=mesh.node_sets["pad"],
-        bone=mesh.node_sets["bone"],
-        path=path(scene, way),
-        plane=PLANE,
-        friction=FRICTION[scene],
-        pull=0.5 * eps_0 * VOLTAGE[scene] ** 2,
-        layers=np.array([LAYERS.reduced, LAYERS.thickness]),
-        tolerance=way.tolerance,
-    )
+    arrays: dict[str, Any] = {name: mesh.node_sets[name] for name in ("pad", "bone")}
+    arrays |= {"points": mesh.points, "cells": mesh.cells, "mu": lame[0], "lmbda": lame[1]}
+    arrays |= {"path": path(scene, way), "plane": PLANE, "friction": FRICTION[scene]}
+    arrays |= {"pull": 0.5 * ev.eps_0 * VOLTAGE[scene] ** 2, "tolerance": way.tolerance}
+    np.savez(target, layers=np.array([LAYERS.reduced, LAYERS.thickness]), **arrays)
 
 
 def path(scene: str, way: Way = GIVEN) -> Floats:
@@ -119,9 +85,7 @@ def path(scene: str, way: Way = GIVEN) -> Floats:
 
 
 def quantities(scene: str, history: Any, way: Way = GIVEN) -> dict[str, float]:
-    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm; where
-    the steps of the `way` end there.
-    """
+    """What is compared, from normal, tangential and electrostatic force (steps, 3) in N/mm."""
     normal, tangential, electrostatic = np.asarray(history, dtype=float).T
     pressed = {d: place for d in (0.5, 1.0, 1.5) if (place := _end(way.press, d / 1.5)) is not None}
     found = {f"Fn_at_{d}": normal[place] for d, place in pressed.items()}

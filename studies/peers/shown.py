@@ -1,30 +1,23 @@
-"""How the study `peers` is shown: its table, its Markdown page, its figure."""
+"""How the study `peers` is shown: its tables and its figure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
-from ..common import COLOURS, Series, new_figure
+from ..common import Series, markdown
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .evaluation import JUDGED, Run, series
 from .problem import GIVEN, UNCERTAINTY, errors
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-HEAD = (
-    "scene",
-    "level",
-    "package",
-    "element",
-    "CPU s",
-    "with imports",
-    "wall s",
-    "iterations",
-    "factorisations",
-    "peak MB",
-    "largest error %",
+HEAD = ("scene", "level", "package", "element", "CPU s", "with imports", "wall s", "iterations")
+HEAD += ("factorisations", "peak MB", "largest error %")
+#: title, part and ending of the names of numbers, how they are written
+BLOCKS = (
+    ("CPU seconds of a first run that compiles its forms", "", ".cold_cpu_s", ".1f"),
+    ("A peer's CPU seconds over evfem's", "_over_evfem", ".cpu_s", ".1f"),
+    ("The same with imports", "_over_evfem", ".process_cpu_s", ".1f"),
+    ("CPU seconds of the race to 0.1 %", "race.", "", ".3g"),
+    ("Packages apart, same element, %", ".apart_percent.", "", ".4f"),
 )
 #: name, colour and marker of a package
 STYLE = {
@@ -35,62 +28,31 @@ STYLE = {
 }
 
 
-def table(runs: list[Run], failed: Mapping[str, str]) -> list[str]:
-    """The runs, and what could not be run, as lines of a Markdown table."""
-    lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
+def tables(runs: list[Run], failed: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, list[str]]:
+    """The runs, and what could not be run, and ratios, as tables of Markdown by their titles."""
+    rows = []
     for run in runs:
         m = run.measured
         element = run.element if run.way == GIVEN else f"{run.element}, {run.way} steps"
         cells = [run.scene, f"L{run.level}", run.package, element]
         cells += [f"{m[name]:.2f}" for name in ("cpu_s", "process_cpu_s", "wall_s")]
-        cells += [str(m["iterations"]), str(m["factorisations"])]
-        cells.append(f"{m['peak_MB']:.0f}")
-        cells.append(f"{run.error():.3f}" if errors(run.scene, run.forces) else "-")
-        lines.append(f"| {' | '.join(cells)} |")
+        cells += [str(m["iterations"]), str(m["factorisations"]), f"{m['peak_MB']:.0f}"]
+        rows.append([*cells, f"{run.error():.3f}" if errors(run.scene, run.forces) else "-"])
     done = {run.key for run in runs}
-    for key, why in failed.items():
-        if key not in done:
-            scene, level, who = key.split(".")
-            cells = [scene, level, *who.split("_"), f"not done: {why}", *["-"] * (len(HEAD) - 5)]
-            lines.append(f"| {' | '.join(cells)} |")
-    return lines
-
-
-def page(result: Mapping[str, Any]) -> str:
-    """The table with its date, versions and ratios, as Markdown."""
-    said, made, numbers = result["assumptions"], result["provenance"], result["numbers"]
-    versions = ", ".join(f"{name} {number}" for name, number in (made["versions"] | said["peers"]).items())
-    lines = [
-        "# evfem beside its peers",
-        "",
-        f"{made['date']}; {versions}; one thread.",
-        "",
-        *said["table"],
-        "",
-    ]
-    lines += [f"Missing: {name}.\n" for name in said["missing"]]
-    lines += [f"Failed: {name}: {why}.\n" for name, why in said["failed"].items()]
-    lines += _block("CPU seconds of a first run that compiles its forms", numbers, ".cold_cpu_s", ".1f")
-    lines += _block("A peer's CPU seconds over evfem's", numbers, "_over_evfem", ".1f", ending=".cpu_s")
-    lines += _block("The same with imports", numbers, "_over_evfem", ".1f", ending=".process_cpu_s")
-    lines += _block("CPU seconds of the race to 0.1 %", numbers, "race.", ".3g")
-    lines += _block("Packages apart, same element, %", numbers, ".apart_percent.", ".4f")
-    return "\n".join(lines) + "\n"
-
-
-def _block(title: str, numbers: Mapping[str, float], part: str, how: str, *, ending: str = "") -> list[str]:
-    """The numbers whose names have this part and this ending, as a table of two columns."""
-    rows = {key: value for key, value in numbers.items() if part in key and key.endswith(ending)}
-    if not rows:
-        return []
-    lines = [f"| {key.removesuffix('.cpu_s')} | {value:{how}} |" for key, value in rows.items()]
-    return [f"| {title} | |", "|---|---|", *lines, ""]
+    for key in (key for key in failed if key not in done):
+        scene, level, who = key.split(".")
+        cells = [scene, level, *who.split("_"), f"not done: {failed[key]}"]
+        rows.append([*cells, *["-"] * (len(HEAD) - len(cells))])
+    found = {"Runs": markdown(HEAD, rows)}
+    for title, part, ending, how in BLOCKS:
+        chosen = {key: value for key, value in numbers.items() if part in key and key.endswith(ending)}
+        rows = [[key.removesuffix(".cpu_s"), f"{value:{how}}"] for key, value in chosen.items()]
+        found |= {title: markdown((title, ""), rows)} if rows else {}
+    return found
 
 
 def draw(runs: list[Run]) -> Figure:
-    """A panel for each scene with a reference; inside the grey band its uncertainty hides the
-    error.
-    """
+    """A panel for each scene with a reference, whose uncertainty is a grey band."""
     scenes = [scene for scene in JUDGED if any(run.scene == scene for run in runs)]
     figure = new_figure(4.2)
     curves = series(runs)
@@ -105,8 +67,6 @@ def draw(runs: list[Run]) -> Figure:
 
 
 def _panel(ax: Axes, scene: str, curves: list[Series]) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     for curve in curves:
         _, package, element = curve.name.split()
         name, colour, marker = STYLE[package]
@@ -115,8 +75,5 @@ def _panel(ax: Axes, scene: str, curves: list[Series]) -> None:
         ax.plot(curve.x, curve.y, style, color=colour, marker=marker, markerfacecolor=face, label=label)
     ax.axhspan(1e-4, UNCERTAINTY[scene], color=COLOURS["neutral"], alpha=0.15, label="reference uncertain")
     ax.set(xscale="log", yscale="log", xlabel="CPU seconds")
-    ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    ax.xaxis.set_major_formatter("{x:g}")
-    ax.xaxis.set_minor_formatter(NullFormatter())  # its labels would overlap where the axis is short
-    ax.tick_params(axis="x", labelsize="small")
+    plain_ticks(ax)
     ax.set_title(f"Scene {scene}", loc="left", fontsize="medium")

@@ -18,18 +18,15 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from evfem.common.storage import write_text
-
-from ..common import Study, make_folder
-from .evaluation import CONTENDERS, Run, histories, numbers, series
+from ..common import Study
+from .evaluation import CONTENDERS, FEWER, Run, numbers, race, series
 from .hosts import PACKAGES, missing, run_once
 from .problem import GIVEN, TOLERANCE, Way
-from .race import FEWER, LEVELS
-from .race import numbers as race
-from .shown import draw, page, table
+from .shown import draw, tables
 
 #: level -> scenes and rounds
 FULL: Mapping[int, tuple[str, int]] = {0: ("ABC", 3), 1: ("ABC", 3), 2: ("ABC", 1)}
+RACE: Mapping[int, tuple[str, int]] = {0: ("AB", 3), 1: ("AB", 3), 2: ("AB", 1)}
 #: the finest level of a package that is several times slower than the others there
 FINEST: Mapping[str, int] = {"getfem": 1}
 QUICK: Mapping[int, tuple[str, int]] = {0: ("A", 1)}
@@ -117,9 +114,7 @@ def warm_up(
 
 
 def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
-    """All runs, their numbers, table and figure; a package that is not installed is named and left
-    out.
-    """
+    """All runs, their numbers, tables and figure; a package that is not installed is named."""
     absent = missing()
     for name in absent:
         how = PACKAGES[name].install
@@ -130,16 +125,13 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
         cold = {} if quick else warm_up("BAC", min(FULL), present, compiled)
         runs, failed = compete(QUICK if quick else FULL, present, compiled)
         for way in () if quick else FEWER:
-            more, lost = compete(LEVELS, present, compiled, way)
+            more, lost = compete(RACE, present, compiled, way)
             runs, failed = runs + more, failed | lost
-    said = {"missing": absent, "failed": failed, "peers": versions(runs), "table": table(runs, failed)}
-    curves = series(runs) + histories(runs)
+    said = {"missing": absent, "failed": failed, "peers": versions(runs)}
     found = numbers(runs, cold) | ({} if quick else race(runs))
-    study = Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs))
-    result = study.finish(out, quick)
-    if out is not None:
-        write_text(make_folder(out) / "peers.md", page(result))
-    return result
+    curves, shown = series(runs), tables(runs, failed, found)
+    study = Study("peers", found, {}, ASSUMPTIONS | said, curves, lambda: draw(runs), tables=shown)
+    return study.finish(out, quick)
 
 
 def versions(runs: Iterable[Run]) -> dict[str, str]:

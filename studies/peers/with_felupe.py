@@ -26,17 +26,7 @@ from evfem.surface.pad import make_pad
 from evfem.surface.surfaces import Flat
 
 from .apart import MOST_ITERATIONS, PENALTY, SMALLEST_FORCE, PenaltyContact
-from .problem import (
-    FRICTION,
-    GIVEN,
-    LAYERS,
-    MATERIALS,
-    PLANE,
-    VOLTAGE,
-    Way,
-    path,
-    scene_mesh,
-)
+from .problem import FRICTION, GIVEN, LAYERS, MATERIALS, PLANE, VOLTAGE, Way, path, scene_mesh
 
 POSITIVE, GENERAL = 2, 11  # kinds of matrix in PARDISO: symmetric positive definite, unsymmetric
 
@@ -148,38 +138,23 @@ class Peer:
         """Move the bone and find the equilibrium; the number of iterations."""
         for boundary, value in zip(self.held, (position, -indentation), strict=True):
             boundary.update(value)
-        result = fem.newtonraphson(
-            x0=self.field,
-            items=self.items,
-            dof0=self.dof0,
-            dof1=self.dof1,
-            ext0=fem.dof.apply(self.field, self.bounds, self.dof0),
-            solver=self.solver,
-            check=self.check,
-            tol=self.tolerance,
-            maxiter=MOST_ITERATIONS,
-            verbose=0,
-        )
+        known = fem.dof.apply(self.field, self.bounds, self.dof0)
+        how = {"check": self.check, "tol": self.tolerance, "maxiter": MOST_ITERATIONS, "verbose": 0}
+        free = {"dof0": self.dof0, "dof1": self.dof1, "ext0": known, "solver": self.solver}
+        result = fem.newtonraphson(x0=self.field, items=self.items, **free, **how)
         self.contact.state.keep()
         return int(result.iterations)
 
     def check(self, dx: Floats, f: Floats, ftol: float, **_: Any) -> tuple[float, float, bool]:
-        """FElupe's question whether an iteration has converged, answered as evfem does: the
-        largest free residual over the largest force on the bone.
-        """
+        """Whether an iteration has converged: largest free residual over the largest force on the bone."""
         bone = f.reshape(-1, 2)[self.bone].sum(axis=0)
         residual = np.abs(f[self.dof1]).max() / max(np.abs(bone).max(), SMALLEST_FORCE)
-        return (
-            float(np.linalg.norm(dx)),
-            float(residual),
-            bool(residual <= ftol and not self.contact.state.turning.any()),
-        )
+        done = bool(residual <= ftol and not self.contact.state.turning.any())
+        return float(np.linalg.norm(dx)), float(residual), done
 
 
 def plane_strain(points: Floats, cells: Ints) -> Any:
-    """FElupe's displacement field on linear (2 x 2 points of integration) or quadratic quads (3 x
-    3).
-    """
+    """FElupe's displacement field on linear (2 x 2 points) or quadratic quads (3 x 3)."""
     region = fem.RegionQuad if cells.shape[1] == 4 else fem.RegionBiQuadraticQuad
     return fem.FieldPlaneStrain(region(fem.Mesh(points, cells, "quad")), dim=2)
 
@@ -191,9 +166,7 @@ def _mask(points: Floats, nodes: Ints, axis: int) -> Any:
 
 
 def solve(scene: str, element: str, level: int, way: Way = GIVEN) -> dict[str, Any]:
-    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations they
-    took.
-    """
+    """Normal, tangential and electrostatic force (N/mm) after every step, and the iterations."""
     peer = Peer(scene, element, level, way.tolerance)
     history, iterations = [], 0
     for position, indentation in path(scene, way):

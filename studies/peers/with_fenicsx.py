@@ -174,9 +174,7 @@ def pad_facets(mesh: Any, problem: Problem) -> Any:
 
 
 def solve(problem: Problem) -> dict[str, Any]:
-    """Forces after every step (N/mm), the iterations they took, CPU seconds spent on getting the
-    forms.
-    """
+    """Forces (N/mm) after every step, the iterations they took, CPU seconds of getting the forms."""
     peer = Peer(problem)
     return followed(peer) | {"form_cpu_s": peer.form_cpu_s}
 

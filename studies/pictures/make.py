@@ -61,9 +61,7 @@ def draw_readme(path: Path = README) -> None:
 
 
 def draw_from_page(page: str, pictures: Iterable[str]) -> None:
-    """Run the Python blocks of the page in a folder of their own and keep the pictures that they
-    write.
-    """
+    """Run the Python blocks of the page in a folder of their own and keep the pictures."""
     code = "\n".join(block for mark, block in CODE.findall((DOCS / page).read_text("utf-8")) if not mark)
     with TemporaryDirectory() as folder, chdir(folder):
         exec(compile(code, page, "exec"), {"__name__": "page"})

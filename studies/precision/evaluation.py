@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..common import Series
-from .models import Model
+from ..common import Series, markdown
 from .runs import STEPS, Run
 from .scenes import PROBLEMS, Case
 
+Models = Mapping[str, tuple[float, float]]
 #: %, for which the cheapest way is looked for
 GOALS = (1.0, 0.1, 0.01)
 
@@ -84,7 +84,7 @@ def error(run: Run, known: Mapping[str, Reference]) -> float | None:
     return known[run.case.problem].error(run.forces) if run.case.problem in known else None
 
 
-def numbers(runs: Sequence[Run], models: Sequence[Model]) -> dict[str, float]:
+def numbers(runs: Sequence[Run], models: Models) -> dict[str, float]:
     """Costs and errors of the runs, references, ratios, the cheapest way to every goal."""
     known, found = references(runs), {}
     for problem, one in known.items():
@@ -97,17 +97,19 @@ def numbers(runs: Sequence[Run], models: Sequence[Model]) -> dict[str, float]:
         found |= {f"{key}.{name}": value for name, value in run.forces.items()}
         deviation = error(run, known)
         found |= {} if deviation is None else {f"{key}.error_percent": deviation}
-    for model in models:
-        found |= {f"hover.{model.key}.cpu_s": model.cpu_s, f"hover.{model.key}.Fe": model.force}
+    for key, (cpu_s, force) in models.items():
+        found |= {f"hover.{key}.cpu_s": cpu_s, f"hover.{key}.Fe": force}
         if "hover" in known:
-            found[f"hover.{model.key}.error_percent"] = known["hover"].error({"Fe": model.force})
-    return found | compared(runs) | step_errors(runs) | _cheapest_numbers(runs)
+            found[f"hover.{key}.error_percent"] = known["hover"].error({"Fe": force})
+    for problem in PROBLEMS:
+        for goal in GOALS:
+            if best := cheapest(runs, problem, goal):
+                found[f"{problem}.to_{goal:g}_percent.cpu_s"] = best.cpu_s
+    return found | compared(runs) | step_errors(runs)
 
 
 def compared(runs: Sequence[Run]) -> dict[str, float]:
-    """Every variant beside the recommended way on the same mesh: ratio of CPU, largest change of a
-    force.
-    """
+    """Every variant beside the usual way on the same mesh: ratio of CPU, largest change of a force."""
     found: dict[str, float] = {}
     for run in runs:
         usual = next((r for r in runs if r.case == Case(run.case.problem, run.case.level)), None)
@@ -128,48 +130,31 @@ def step_errors(runs: Sequence[Run]) -> dict[str, float]:
 
 
 def cheapest(runs: Sequence[Run], problem: str, goal: float) -> Run | None:
-    """The cheapest measured run, as recommended but for element and mesh, that reaches the goal
-    (%).
-    """
+    """The cheapest measured run, as recommended but for element and mesh, that reaches the goal (%)."""
     known = references(runs)
-    good = [
-        run
-        for run in runs
-        if run.case == Case(problem, run.case.level, run.case.element) and _at_most(run, known, goal)
-    ]
+    usual = [run for run in runs if run.case == Case(problem, run.case.level, run.case.element)]
+    good = [run for run in usual if problem in known and known[problem].error(run.forces) <= goal]
     return min(good, key=lambda run: run.cpu_s, default=None)
 
 
-def _at_most(run: Run, known: Mapping[str, Reference], goal: float) -> bool:
-    deviation = error(run, known)
-    return deviation is not None and deviation <= goal
-
-
-def _cheapest_numbers(runs: Sequence[Run]) -> dict[str, float]:
-    found = {}
-    for problem in PROBLEMS:
-        for goal in GOALS:
-            best = cheapest(runs, problem, goal)
-            if best is not None:
-                found[f"{problem}.to_{goal:g}_percent.cpu_s"] = best.cpu_s
-    return found
-
-
 def recommended(runs: Sequence[Run]) -> list[str]:
-    """The cheapest way to every goal, as lines of a Markdown table; a star where the reference is
-    not so certain.
-    """
-    head = " | ".join(f"to {goal:g} %" for goal in GOALS)
-    lines = [f"| problem | {head} | reference uncertain by |", "|---" * (len(GOALS) + 2) + "|"]
-    known = references(runs)
-    for problem, one in known.items():
+    """The cheapest way to every goal, as a table; a star where the reference is not so certain."""
+    rows = []
+    for problem, one in references(runs).items():
         cells = [PROBLEMS[problem]]
         for goal in GOALS:
             best = cheapest(runs, problem, goal)
-            star = " *" if one.uncertainty > goal else ""
-            cells.append("none" if best is None else _told(best) + star)
-        lines.append(f"| {' | '.join([*cells, f'{one.uncertainty:.2g} %'])} |")
-    return lines
+            cells.append("none" if best is None else _told(best) + " *" * (one.uncertainty > goal))
+        rows.append([*cells, f"{one.uncertainty:.2g} %"])
+    return markdown(("problem", *(f"to {goal:g} %" for goal in GOALS), "reference uncertain by"), rows)
+
+
+def variants(found: Mapping[str, float]) -> list[str]:
+    """Ratio of CPU time and change of the forces of everything that is not as recommended."""
+    ending = ".cpu_over_usual"
+    ratios = {key.removesuffix(ending): ratio for key, ratio in found.items() if key.endswith(ending)}
+    rows = [[key, f"{r:.2f}", f"{found[f'{key}.change_percent']:.1g}"] for key, r in ratios.items()]
+    return markdown(("run", "CPU over the usual", "largest change %"), rows)
 
 
 def _told(run: Run) -> str:
@@ -177,7 +162,7 @@ def _told(run: Run) -> str:
     return f"{run.case.mesh_name} {element} ({run.cpu_s:.2g} s)"
 
 
-def series(runs: Sequence[Run], models: Sequence[Model]) -> list[Series]:
+def series(runs: Sequence[Run], models: Models) -> list[Series]:
     """Error against CPU seconds: a curve over the meshes for each problem and variant."""
     known, found, unit = references(runs), [], "% over CPU s"
     for problem in known:
@@ -187,9 +172,8 @@ def series(runs: Sequence[Run], models: Sequence[Model]) -> list[Series]:
             y = [known[problem].error(r.forces) for r in mine]
             found.append(Series(f"{problem} {variant}", [r.cpu_s for r in mine], y, unit))
     if "hover" in known:
-        for model in models:
-            y = [known["hover"].error({"Fe": model.force})]
-            found.append(Series(f"hover {model.key}", [model.cpu_s], y, unit))
+        for key, (cpu_s, force) in models.items():
+            found.append(Series(f"hover {key}", [cpu_s], [known["hover"].error({"Fe": force})], unit))
     limit = step_reference(runs)
     if limit is not None:
         mine = step_runs(runs)

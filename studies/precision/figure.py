@@ -1,21 +1,15 @@
-"""The picture of the study `work_precision`: a panel for each problem, one for growth, one for
-shares.
-"""
+"""The picture of `work_precision`: a panel for each problem, one for growth, one for shares."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
-from ..common import COLOURS, Series, new_figure
+from ..common import Series
+from ..plots import COLOURS, Axes, Figure, new_figure, plain_ticks
 from .evaluation import Reference
 from .growth import Size
 from .scenes import PROBLEMS
 from .shares import PARTS, PHASES
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: element -> label, colour, marker, line
 ELEMENTS = {
@@ -37,9 +31,8 @@ POINTS = {
 }
 STEPS = "Q2-P1 on L0, steps 0.3 to 0.025 mm, against their limit"
 #: part of a step -> colour
-PART_COLOURS = dict(
-    zip(PARTS, ("#0072B2", "#E69F00", "#009E73", "#B04A85", "#56B4E9", "#BBBBBB"), strict=True)
-)
+HUES = ("#0072B2", "#E69F00", "#009E73", "#B04A85", "#56B4E9", "#BBBBBB")
+PART_COLOURS = dict(zip(PARTS, HUES, strict=True))
 SMALLEST = 1e-4  # %, below which no error is drawn
 
 
@@ -66,14 +59,8 @@ def draw(
     found: dict[str, object] = {}
     for ax in axes[: len(shown)]:
         found |= {label: handle for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)}
-    figure.legend(
-        list(found.values()),
-        list(found),
-        loc="outside lower center",
-        ncols=4,
-        fontsize="small",
-        frameon=False,
-    )
+    place = {"loc": "outside lower center", "ncols": 4, "fontsize": "small", "frameon": False}
+    figure.legend(list(found.values()), list(found), **place)
     return figure
 
 
@@ -90,15 +77,13 @@ def _problem(ax: Axes, title: str, curves: Sequence[Series], uncertain: float) -
             ax.plot(curve.x, y, linestyle="", color="black", marker=marker, markersize=7, label=label)
         elif variant == "steps":
             ax.plot(curve.x, y, ":", color="black", marker=".", label=STEPS)
-    ax.axhspan(
-        SMALLEST, max(uncertain, SMALLEST), color=COLOURS["neutral"], alpha=0.15, linewidth=0.0,
-        label="reference uncertain",
-    )  # fmt: skip
+    look = {"color": COLOURS["neutral"], "alpha": 0.15, "linewidth": 0.0, "label": "reference uncertain"}
+    ax.axhspan(SMALLEST, max(uncertain, SMALLEST), **look)
     ax.set(xscale="log", yscale="log")
     drawn = [max(value, SMALLEST) for curve in curves for value in curve.y]
     ax.set_ylim(bottom=0.4 * min([uncertain, *drawn]))
     _titled(ax, title, "CPU seconds")
-    _plain_ticks(ax)
+    plain_ticks(ax)
 
 
 def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> None:
@@ -108,20 +93,18 @@ def _growth(ax: Axes, sizes: Sequence[Size], numbers: Mapping[str, float]) -> No
         ("slide_s", "slide step, CPU s", COLOURS["strong_troxel"], "s"),
     ):
         power = numbers[f"growth.exponent.{name}"]
-        y = [getattr(one, name) for one in sizes]
-        ax.plot(
-            nodes, y, color=colour, marker=marker, markersize=4.5, label=f"{label} ~ nodes$^{{{power:.2f}}}$"
-        )
+        y, label = [getattr(one, name) for one in sizes], f"{label} ~ nodes$^{{{power:.2f}}}$"
+        ax.plot(nodes, y, color=colour, marker=marker, markersize=4.5, label=label)
     memory = [one.peak_MB / 1024.0 for one in sizes]
     ax.plot(nodes, memory, "--", color=COLOURS["fe"], marker="^", markersize=4.5, label="peak memory, GB")
     ax.set(xscale="log", yscale="log")
     _titled(ax, "growth of a step", "nodes")
     ax.legend(fontsize="x-small", frameon=False)
-    _plain_ticks(ax)
+    plain_ticks(ax)
 
 
 def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
-    names = [f"{phase.replace('_', ' ')}" for phase in PHASES]
+    names = [phase.replace("_", " ") for phase in PHASES]
     left = [0.0] * len(names)
     for part in PARTS:
         width = [100.0 * numbers[f"shares.{phase}.share.{part}"] for phase in PHASES]
@@ -130,9 +113,7 @@ def _shares(ax: Axes, numbers: Mapping[str, float]) -> None:
             if share > 9.0:
                 ax.text(start + 0.5 * share, place, f"{share:.0f}", ha="center", va="center", fontsize=7)
         left = [start + share for start, share in zip(left, width, strict=True)]
-    ax.set(xlim=(0.0, 100.0), ylim=(-0.5, len(names) + 0.6))
-    ax.invert_yaxis()
-    ax.set_ylim(len(names) - 0.5, -1.5)
+    ax.set(xlim=(0.0, 100.0), ylim=(len(names) - 0.5, -1.5))
     _titled(ax, f"a step's time, {numbers['shares.nodes']:,.0f} nodes", "share of CPU time (%)")
     ax.legend(ncols=3, fontsize="x-small", frameon=False, loc="upper center")
     ax.tick_params(labelsize="small")
@@ -142,17 +123,3 @@ def _titled(ax: Axes, title: str, label: str) -> None:
     ax.set_title(title, loc="left", fontsize="medium")
     ax.set_xlabel(label, fontsize="small")
     ax.spines[["top", "right"]].set_visible(False)
-
-
-def _plain_ticks(ax: Axes) -> None:
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    for axis in (ax.xaxis, ax.yaxis):
-        low, high = axis.get_view_interval()
-        few = high < 100.0 * low
-        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)) if few else LogLocator(numticks=7))
-        axis.set_major_formatter("{x:,g}" if high > 1e3 else "{x:g}")
-        axis.set_minor_formatter(NullFormatter())
-    ax.tick_params(labelsize="small")
-    ax.grid(which="major", color="#E5E5E5", linewidth=0.6)
-    ax.set_axisbelow(True)

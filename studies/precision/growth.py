@@ -8,21 +8,18 @@ of its own. The first step, which analyses the matrix, counts as set-up.
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.surface.surfaces import Flat
+import evfem as ev
 
 from ..benchmark import divided_mesh
-from ..common import Series
+from ..common import Series, alone, markdown
 from ..peers.apart import resident_MB
 from ..peers.problem import PLANE, TOLERANCE
-from .apart import answer
 from .runs import ROUNDS, warm_up
 from .scenes import benchmark_finger
 
@@ -36,9 +33,7 @@ SMALL = 240
 
 @dataclass(frozen=True)
 class Size:
-    """A mesh: CPU seconds of set-up, of a mean press and slide step, iterations of both, and
-    memory in MB.
-    """
+    """A mesh: CPU seconds of set-up and of a mean step, iterations of a step, and memory in MB."""
 
     nodes: int
     setup_s: float
@@ -56,22 +51,17 @@ class Clock:
     def __init__(self) -> None:
         self.at: list[float] = []
 
-    def started(self, *_: Any) -> None:
-        """The parts are built."""
-        self.at.append(time.process_time())
-
     def step(self, *_: Any) -> None:
-        """A step has converged."""
+        """A step has converged, or the parts are built."""
         self.at.append(time.process_time())
 
+    started = step
 
-def measure_sizes(questions: Sequence[Sequence[int]]) -> list[dict[str, float]]:
-    """Costs of the sizes; the memory is that of the largest so far."""
+
+def measure_alone(divisions: tuple[int, int, int]) -> Size:
+    """One size in a process that has done nothing else."""
     warm_up()
-    return [
-        asdict(_measured((around, tissue, skin), ROUNDS if around <= SMALL else 1))
-        for around, tissue, skin in questions
-    ]
+    return _measured(divisions, ROUNDS if divisions[0] <= SMALL else 1)
 
 
 def _measured(divisions: tuple[int, int, int], rounds: int) -> Size:
@@ -96,19 +86,19 @@ def _measured(divisions: tuple[int, int, int], rounds: int) -> Size:
     )
 
 
-def scene(divisions: tuple[int, int, int]) -> Scene:
+def scene(divisions: tuple[int, int, int]) -> ev.Scene:
     """Press and slide on a mesh with so many cells."""
     finger = benchmark_finger(divided_mesh(divisions, 2, same_nodes=True))
-    motion = [Press(indentation=0.1 * STEPS, steps=STEPS), Slide(distance=0.1 * STEPS, steps=STEPS)]
-    how: dict[str, Any] = {"solver": Solver(tolerance=TOLERANCE), "output": Output(every=1000)}
-    return Scene(finger, Flat(friction=0.3, y=PLANE), motion=motion, **how)
+    motion = [ev.Press(indentation=0.1 * STEPS, steps=STEPS), ev.Slide(distance=0.1 * STEPS, steps=STEPS)]
+    how: dict[str, Any] = {"solver": ev.Solver(tolerance=TOLERANCE), "output": ev.Output(every=1000)}
+    return ev.Scene(finger, ev.Flat(friction=0.3, y=PLANE), motion=motion, **how)
 
 
 def measured(quick: bool) -> list[Size]:
     """All sizes, each in its own process; the quick ones in this one, whose memory says little."""
     if quick:
         return [_measured(one, 1) for one in QUICK]
-    return [Size(**answer("growth", [one])[0]) for one in SIZES]
+    return [alone(measure_alone, one) for one in SIZES]
 
 
 def numbers(sizes: list[Size]) -> dict[str, float]:
@@ -143,11 +133,11 @@ def exponent(nodes: Any, cost: Any) -> float:
 
 def table(found: Mapping[str, float], sizes: list[Size]) -> list[str]:
     """The sizes as lines of a Markdown table, with the exponents below."""
-    head = "| nodes | set-up with first step: CPU s | press step: CPU s (iterations) | slide step | peak MB |"
-    lines = [head, "|---|---|---|---|---|"]
+    rows = []
     for one in sizes:
         press = f"{one.press_s:.3g} ({one.press_iterations:.1f})"
         slide = f"{one.slide_s:.3g} ({one.slide_iterations:.1f})"
-        lines.append(f"| {one.nodes:,} | {one.setup_s:.3g} | {press} | {slide} | {one.peak_MB:.0f} |")
+        rows.append([f"{one.nodes:,}", f"{one.setup_s:.3g}", press, slide, f"{one.peak_MB:.0f}"])
     powers = [found[f"growth.exponent.{name}"] for name in ("setup_s", "press_s", "slide_s", "memory")]
-    return [*lines, f"| exponent | {' | '.join(f'{p:.2f}' for p in powers)} |"]
+    head = ("nodes", "set-up with first step: CPU s", "press step: CPU s (iterations)", "slide step")
+    return markdown((*head, "peak MB"), [*rows, ["exponent", *(f"{power:.2f}" for power in powers)]])

@@ -7,12 +7,18 @@ that has run everything once on the coarsest mesh; cheap runs are repeated and t
 from __future__ import annotations
 
 import gc
+import sys
 import time
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
-from .apart import answer
-from .scenes import ELEMENTS, PADS, Case, build, forces
+from evfem.electrostatics.forces import EllipsoidalPad, pad_force_per_depth, plate_force
+from evfem.electrostatics.laws import Kaczmarek
+
+from ..benchmark import OUTER
+from ..common import alone
+from ..peers.problem import LAYERS
+from .scenes import ELEMENTS, GAP, HOVER_VOLTAGE, PADS, Case, build, forces
 
 #: N/mm3: soft, and about as stiff as penalty codes take it
 PENALTIES = (100.0, 10_000.0)
@@ -20,13 +26,14 @@ PENALTIES = (100.0, 10_000.0)
 STEPS = (10, 30, 60, 120)
 #: runs shorter than this are repeated (CPU s)
 SHORT, ROUNDS = 1.2, 3
+#: evaluations of a closed form
+REPEATS = 200
+_FINGERS = ("A", "B", "C", "hover", "ramp")
 
 
 @dataclass(frozen=True)
 class Run:
-    """A case and what it took: CPU seconds, outer iterations, factorisations, nodes, and what it
-    is judged by.
-    """
+    """A case, its CPU seconds, outer iterations, factorisations and nodes, and what it is judged by."""
 
     case: Case
     cpu_s: float
@@ -60,18 +67,37 @@ def measure(case: Case, rounds: int = ROUNDS) -> Run:
     return Run(case, least, record["iterations"], record["factorisations"], nodes, forces(case, result))
 
 
-def measure_plain(given: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The same for another process: cases and runs as dictionaries."""
+def measure_plain(cases: list[Case]) -> list[Run]:
+    """The same in a process that cannot import the package of evfem[fast] from now on."""
+    sys.modules["pypardiso"] = None  # type: ignore[assignment]
     warm_up()
-    return [asdict(measure(Case(**one))) for one in given]
+    return [measure(case) for case in cases]
 
 
-def without_fast(cases: list[Case]) -> list[Run]:
-    """The cases in a process in which the packages of evfem[fast] cannot be imported."""
-    if not cases:
-        return []
-    found = answer("runs", [asdict(one) for one in cases], fast=False)
-    return [Run(**(one | {"case": Case(**one["case"])})) for one in found]
+def measured(cases: list[Case], rounds: int) -> list[Run]:
+    """The runs with evfem[fast], then those without."""
+    warm_up()
+    plain = [case for case in cases if not case.fast]
+    return [measure(case, rounds) for case in cases if case.fast] + alone(measure_plain, plain)
+
+
+def models() -> dict[str, tuple[float, float]]:
+    """CPU seconds and attraction (N/mm) of the hovering finger without a mesh: a plate as wide as the
+    finger, equation (7), and the traction over the ellipse, equation (8b).
+    """
+    width, height = 2.0 * OUTER[0], 2.0 * OUTER[1]
+    law, pad, at = Kaczmarek(), EllipsoidalPad(width, height, 1.0), (GAP, HOVER_VOLTAGE, LAYERS)
+    forms: dict[str, Callable[[], float]] = {
+        "closed_form_plate": lambda: float(plate_force(law, width, *at)),
+        "outline_quadrature": lambda: float(pad_force_per_depth(law, pad, *at)),
+    }
+    found = {}
+    for key, force in forms.items():
+        value, begin = force(), time.process_time()
+        for _ in range(REPEATS):
+            force()
+        found[key] = ((time.process_time() - begin) / REPEATS, value)
+    return found
 
 
 def full() -> list[Case]:
@@ -86,11 +112,8 @@ def full() -> list[Case]:
     cases += [Case(pad, "coarse", e) for pad in PADS for e in ELEMENTS]
     cases += [Case(pad, "medium", e) for pad in PADS for e in ("q1_fbar", "q2p1")]
     cases += [Case(pad, preset) for preset in ("paper", "fine") for pad in PADS]
-    return cases + [replace(one, fast=False) for one in cases if _also_plain(one)]
-
-
-def _also_plain(case: Case) -> bool:
-    return case in [Case(problem, 0) for problem in _FINGERS] + [Case("A", 1)]
+    plain = [*(Case(problem, 0) for problem in _FINGERS), Case("A", 1)]
+    return cases + [replace(one, fast=False) for one in cases if one in plain]
 
 
 def quick() -> list[Case]:
@@ -99,6 +122,3 @@ def quick() -> list[Case]:
     cases += [Case("A", 1), Case("hover", 1), Case("C", 0), Case("C", 0, coupling="staggered")]
     cases += [Case("A", 0, penalty=penalty) for penalty in PENALTIES]
     return [*cases, Case("hover", 0, rigid=True), Case("hover", 0, fast=False)]
-
-
-_FINGERS = ("A", "B", "C", "hover", "ramp")

@@ -13,25 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.laws import Kaczmarek
-from evfem.finger.fingerpad import Electrical, FingerPad, MeshedFinger
-from evfem.mesh.mesh import Mesh
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.result import Result
-from evfem.surface.surfaces import Display
+import evfem as ev
+from evfem.scene.motion import Motion
 
-from ..benchmark import benchmark_mesh
-from ..peers.problem import (
-    FRICTION,
-    INSULATOR,
-    MATERIALS,
-    PLANE,
-    STRATUM_CORNEUM,
-    TOLERANCE,
-    VOLTAGE,
-    quantities,
-)
+from ..peers import problem
 
 PROBLEMS = {
     "A": "press (A)",
@@ -53,8 +38,8 @@ class Case:
     """One way to compute one problem.
 
     `level` of the benchmark's meshes, or the finger pad's preset; `penalty` (N/mm3) instead of
-    exact contact; `steps` of the slide; `rigid`: the hovering outline does not deform; `fast`:
-    with evfem[fast].
+    exact contact; steps of A's to C's `press` and of the slide; `rigid`: the hovering outline does
+    not deform; `fast`: with evfem[fast].
     """
 
     problem: str
@@ -65,6 +50,8 @@ class Case:
     steps: int = 30
     rigid: bool = False
     fast: bool = True
+    press: int = 15
+    tolerance: float = problem.TOLERANCE
 
     @property
     def variant(self) -> str:
@@ -87,56 +74,54 @@ class Case:
         return f"{self.problem}.{self.mesh_name}.{self.variant}"
 
 
-def body(level: int, element: str) -> Mesh:
-    """The nodes of a level with cells for the element."""
-    linear = element in ("q1", "q1_fbar")
-    return benchmark_mesh(level, 1 if linear else 2, same_nodes=not linear)
-
-
-def benchmark_finger(mesh: Mesh) -> MeshedFinger:
+def benchmark_finger(mesh: ev.Mesh) -> ev.MeshedFinger:
     """The benchmark's finger on a mesh of it."""
-    return MeshedFinger(mesh, MATERIALS, Electrical(STRATUM_CORNEUM.thickness, STRATUM_CORNEUM.eps_r))
+    return ev.MeshedFinger(
+        mesh,
+        problem.MATERIALS,
+        ev.Electrical(problem.STRATUM_CORNEUM.thickness, problem.STRATUM_CORNEUM.eps_r),
+    )
 
 
-def build(case: Case) -> Scene:
+def build(case: Case) -> ev.Scene:
     """The case as a scene."""
-    solver: dict[str, Any] = {"element": case.element, "tolerance": TOLERANCE}
+    solver: dict[str, Any] = {"element": case.element, "tolerance": case.tolerance}
     if case.penalty:
         solver |= {"contact": "penalty", "penalty_normal": case.penalty, "penalty_tangential": case.penalty}
-    friction = 0.3 if case.problem in PADS else FRICTION.get(case.problem, 0.0)
+    friction = 0.3 if case.problem in PADS else problem.FRICTION.get(case.problem, 0.0)
     if isinstance(case.level, int):
-        finger: Any = benchmark_finger(body(case.level, case.element))
+        finger: Any = benchmark_finger(problem.scene_mesh(case.element, case.level))
     else:
-        finger = FingerPad(ridges=case.problem == "ridged", resolution=case.level)
-    y = PLANE if case.problem in "ABC" else None
-    surface = Display(insulator=INSULATOR, friction=friction, y=y)
-    voltage, law = _voltage(case), Kaczmarek() if case.problem not in "AB" else None
-    how: dict[str, Any] = {"solver": Solver(**solver), "output": Output(every=1000)}
-    return Scene(finger, surface, law, voltage, _motion(case), coupling=case.coupling, **how)
+        finger = ev.FingerPad(ridges=case.problem == "ridged", resolution=case.level)
+    y = problem.PLANE if case.problem in "ABC" else None
+    surface = ev.Display(insulator=problem.INSULATOR, friction=friction, y=y)
+    voltage, law = _voltage(case), ev.Kaczmarek() if case.problem not in "AB" else None
+    how: dict[str, Any] = {"solver": ev.Solver(**solver), "output": ev.Output(every=1000)}
+    return ev.Scene(finger, surface, law, voltage, _motion(case), coupling=case.coupling, **how)
 
 
 def _voltage(case: Case) -> float:
     if case.problem == "hover":
         return RIGID_VOLTAGE if case.rigid else HOVER_VOLTAGE
-    return 1000.0 if case.problem in PADS else VOLTAGE.get(case.problem, 0.0)
+    return 1000.0 if case.problem in PADS else problem.VOLTAGE.get(case.problem, 0.0)
 
 
 def _motion(case: Case) -> list[Motion]:
     if case.problem == "hover":
-        return [Hover(gap=GAP)]
+        return [ev.Hover(gap=GAP)]
     if case.problem == "ramp":
-        return [Press(indentation=0.5, steps=5), VoltageRamp(2000.0, steps=10)]
+        return [ev.Press(indentation=0.5, steps=5), ev.VoltageRamp(2000.0, steps=10)]
     if case.problem in PADS:
-        return [Press(force=0.05, steps=5), Slide(distance=0.5, steps=5)]
-    press = Press(indentation=1.5, steps=15)
-    return [press, Slide(distance=3.0, steps=case.steps)] if case.problem == "B" else [press]
+        return [ev.Press(force=0.05, steps=5), ev.Slide(distance=0.5, steps=5)]
+    press = ev.Press(indentation=1.5, steps=case.press)
+    return [press, ev.Slide(distance=3.0, steps=case.steps)] if case.problem == "B" else [press]
 
 
-def forces(case: Case, result: Result) -> dict[str, float]:
+def forces(case: Case, result: ev.Result) -> dict[str, float]:
     """What the problem is judged by: forces in N/mm, and the pad's indentation in mm."""
     normal, tangential, pull = result.normal_force, result.tangential_force, result.electrostatic_force
     if case.problem in "AC":
-        return quantities(case.problem, np.stack([normal, tangential, pull], axis=1))
+        return problem.quantities(case.problem, np.stack([normal, tangential, pull], axis=1))
     if case.problem == "B":
         places = np.searchsorted(result.position[15:], np.array([0.3, 0.6, 3.0]) * (1.0 - 1e-9)) + 15
         found = {f"Fn_at_{d}": float(normal[round(10 * d) - 1]) for d in (0.5, 1.0, 1.5)}

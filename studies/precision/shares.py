@@ -9,7 +9,7 @@ out) of the tangent at the end of the run, in the same process.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from functools import wraps
 from importlib.util import find_spec
@@ -18,39 +18,24 @@ from unittest.mock import patch
 
 import numpy as np
 
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene
-
+from ..common import markdown
 from .growth import Clock
 from .runs import warm_up
 from .scenes import Case, build
 
 PARTS = ("assembly", "factorisation", "solve", "contact", "output", "rest")
 #: part -> module, class (or none) and functions that do its work
-WORK: Mapping[str, tuple[tuple[str, str, tuple[str, ...]], ...]] = {
-    "assembly": (
-        ("tissue.body", "Body", ("forces", "tangent")),
-        ("tissue.weakform", "Tissue", ("smallest_J",)),
-    ),
-    "factorisation": (
-        ("solver.condensation", "Pardiso", ("factorise",)),
-        ("solver.condensation", "SuperLU", ("factorise",)),
-    ),
-    "solve": (
-        ("solver.condensation", "Pardiso", ("forward", "backward")),
-        ("solver.condensation", "SuperLU", ("forward", "backward")),
-    ),
+WORK: Mapping[str, tuple[tuple[str, str, str], ...]] = {
+    "assembly": (("tissue.body", "Body", "forces tangent"), ("tissue.weakform", "Tissue", "smallest_J")),
+    "factorisation": tuple(("solver.condensation", name, "factorise") for name in ("Pardiso", "SuperLU")),
+    "solve": tuple(("solver.condensation", name, "forward backward") for name in ("Pardiso", "SuperLU")),
     "contact": (
-        ("contact.condensed", "LinearContactStep", ("solve",)),
-        ("contact.condensed", "", ("_inverse",)),
-        (
-            "solver.interface",
-            "Interface",
-            ("candidates", "obeyed", "shallowest_penetration", "contact_forces"),
-        ),
-        ("solver.linearisation", "Linearisation", ("choose_candidates",)),
+        ("contact.condensed", "LinearContactStep", "solve"),
+        ("contact.condensed", "", "_inverse"),
+        ("solver.interface", "Interface", "candidates obeyed shallowest_penetration contact_forces"),
+        ("solver.linearisation", "Linearisation", "choose_candidates"),
     ),
-    "output": (("simulation.ledger", "Ledger", ("accept", "row")), ("simulation.run", "", ("frame_of",))),
+    "output": (("simulation.ledger", "Ledger", "accept row"), ("simulation.run", "", "frame_of")),
 }
 #: ways through the run: which steps; everything slips from s = 2.7 mm on, and the last step keeps its fields
 PHASES = {"press": slice(0, 20), "stick_slip": slice(20, 44), "full_slip": slice(47, 49)}
@@ -99,16 +84,16 @@ class Parts(Clock):
                 for module, owner, names in places:
                     found: Any = import_module(f"evfem.{module}")
                     found = getattr(found, owner) if owner else found
-                    for name in names:
+                    for name in names.split():
                         timed = self.timed(part, getattr(found, name))
                         patches.enter_context(patch.object(found, name, timed))
             yield
 
 
-def measure_shares(questions: Sequence[int]) -> list[dict[str, float]]:
-    """Shares and costs on the levels asked for, as numbers with dotted names."""
+def measured_alone(level: int) -> dict[str, float]:
+    """The same in a process that has done nothing else."""
     warm_up()
-    return [measured(level) for level in questions]
+    return measured(level)
 
 
 def measured(level: int) -> dict[str, float]:
@@ -117,14 +102,7 @@ def measured(level: int) -> dict[str, float]:
     from evfem.simulation.run import Run
 
     begin = time.process_time()
-    usual = build(Case("B", level))
-    scene = Scene(
-        usual.finger,
-        usual.surface,
-        motion=[Press(indentation=1.5, steps=20), Slide(distance=3.0, steps=30)],
-        solver=usual.solver,
-        output=usual.output,
-    )
+    scene = build(Case("B", level, press=20))
     parts = Parts()
     with parts.watching():
         run = Run(scene, None)
@@ -136,10 +114,8 @@ def measured(level: int) -> dict[str, float]:
     model: Model = run.model
     cost = np.diff(parts.at)
     setup = parts.at[0] - begin
-    found = {
-        "nodes": float(len(model.mesh.points)),
-        "setup_share_of_a_20_step_press": setup / (setup + cost[:20].sum()),
-    }
+    found = {"nodes": float(len(model.mesh.points))}
+    found["setup_share_of_a_20_step_press"] = setup / (setup + cost[:20].sum())
     yardstick = factorisation_s(model, run.state.u)
     for phase, steps in PHASES.items():
         found[f"{phase}.step_s"] = float(cost[steps].mean())
@@ -154,9 +130,7 @@ def measured(level: int) -> dict[str, float]:
 
 
 def factorisation_s(model: Any, u: Any) -> float | None:
-    """CPU seconds of one numerical LDL^T factorisation of the tangent, the least of five; None
-    without PARDISO.
-    """
+    """CPU seconds of an LDL^T factorisation of the tangent, the least of five; None without PARDISO."""
     if not find_spec("pypardiso"):
         return None
     import scipy.sparse as sparse
@@ -179,13 +153,10 @@ def factorisation_s(model: Any, u: Any) -> float | None:
 
 def table(found: Mapping[str, float]) -> list[str]:
     """Phases by parts, as lines of a Markdown table."""
-    head = f"| step | CPU s | factorisations | iterations | {' | '.join(PARTS)} |"
-    lines = [head, "|---" * (4 + len(PARTS)) + "|"]
+    rows = []
     for phase in PHASES:
-        key = f"shares.{phase}"
-        cells = [phase.replace("_", " "), f"{found[f'{key}.step_s']:.3f}"]
-        cells.append(f"{found.get(f'{key}.factorisations', np.nan):.2f}")
-        cells.append(f"{found[f'{key}.iterations']:.1f}")
-        cells += [f"{100 * found[f'{key}.share.{part}']:.0f} %" for part in PARTS]
-        lines.append(f"| {' | '.join(cells)} |")
-    return lines
+        own = {key.removeprefix(f"shares.{phase}."): value for key, value in found.items()}
+        cells = [phase.replace("_", " "), f"{own['step_s']:.3f}", f"{own.get('factorisations', np.nan):.2f}"]
+        cells.append(f"{own['iterations']:.1f}")
+        rows.append(cells + [f"{100 * own[f'share.{part}']:.0f} %" for part in PARTS])
+    return markdown(("step", "CPU s", "factorisations", "iterations", *PARTS), rows)

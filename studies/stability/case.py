@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.errors import InputError, NotConverged
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
@@ -23,13 +24,26 @@ from evfem.simulation.run import simulate
 
 #: smallest scale of forces (N/mm) and of energies (N): what is smaller is rounding
 FORCE, ENERGY = 1e-6, 1e-9
+KEPT = ("stored_energy", "kinetic_energy", "friction_dissipation")
+KEPT += ("viscous_dissipation", "integrator_dissipation", "snap_dissipation")
+#: outcomes that count as passed
+PASSED = ("passed", "refused", "stopped")
+#: warnings of what some cases are about: walls and noise finer than the nodes, loads that may drift, steps
+#: longer than what swings, attractions beyond the load, plates of 1 mm
+EXPECTED = (
+    "the surface is (sharper|rougher) than the node spacing",
+    "motion . slides with the indentation held",
+    "motion . has steps of",
+    "at .* V touching skin is attracted",
+    "the mesh is .* mm across",
+)
 
 Verdict = tuple[bool, str]
 
 
 @dataclass
-class Log:
-    """Costs and balances of everything a case has simulated so far."""
+class Costs:
+    """Costs of simulations, and the largest errors of their balances."""
 
     steps: int = 0
     substeps: int = 0
@@ -37,6 +51,12 @@ class Log:
     iterations: int = 0
     force_error: float = 0.0
     energy_error: float = 0.0
+
+
+@dataclass
+class Log(Costs):
+    """Costs and balances of everything a case has simulated so far."""
+
     refused: bool = False
     stopped: bool = False
 
@@ -70,9 +90,9 @@ class Log:
         raise AssertionError("finished, though it should not have been possible")
 
     def _add(self, result: Result, scene: Scene) -> None:
+        solver = result.provenance["solver"]
         self.steps += len(result.step)
         self.substeps += int(result.substeps.sum())
-        solver = result.provenance["solver"]
         self.cuts += int(solver["cuts"])
         self.iterations += int(solver["iterations"])
         if len(result.step):
@@ -81,10 +101,8 @@ class Log:
             self.energy_error = max(self.energy_error, lost_energy(result))
 
 
-def out_of_balance(result: Result) -> Any:
-    """Sum of all forces of every row (rows, 2), relative to its largest force (at least 1e-6
-    N/mm).
-    """
+def out_of_balance(result: Result) -> Floats:
+    """Sum of all forces of every row (rows, 2), relative to its largest force (at least 1e-6 N/mm)."""
     x = [result.applied_tangential_force, -result.tangential_force, result.electrostatic_force_x]
     y = [-result.applied_force, result.normal_force, -result.electrostatic_force]
     forces = np.array([x, y])
@@ -92,22 +110,23 @@ def out_of_balance(result: Result) -> Any:
 
 
 def lost_energy(result: Result) -> float:
-    """Largest energy of any row that no column of the history has, relative to the largest of
-    them.
-    """
+    """Largest energy of any row that no column has, relative to the largest of that row's."""
     given = np.array([result.external_work, result.electrostatic_work])
-    kept = np.array(
-        [
-            result.stored_energy,
-            result.kinetic_energy,
-            result.friction_dissipation,
-            result.viscous_dissipation,
-            result.integrator_dissipation,
-            result.snap_dissipation,
-        ]
-    )
-    largest = np.maximum(np.abs(given).max(axis=0), np.abs(kept).max(axis=0))
+    kept = np.array([getattr(result, name) for name in KEPT])
+    largest = np.abs(np.concatenate([given, kept])).max(axis=0)
     return float(np.max(np.abs(given.sum(axis=0) - kept.sum(axis=0)) / np.maximum(largest, ENERGY)))
+
+
+def alike(log: Log, scenes: Iterable[Scene], columns: str, allowed: float) -> Verdict:
+    """Whether scenes end in the last row of the first, in these columns."""
+    first, *others = [log.simulate(one) for one in scenes]
+    names = columns.split()
+    off = max(
+        abs(float(getattr(one, name)[-1] / getattr(first, name)[-1]) - 1.0)
+        for one in others
+        for name in names
+    )
+    return off < allowed, f"{', '.join(names)} within {off:.0e}".replace("_", " ")
 
 
 @dataclass(frozen=True)
@@ -133,9 +152,7 @@ class Group:
     name: str
     cases: list[Case] = field(default_factory=list)
 
-    def case(
-        self, name: str, expected: str, quick: bool = False
-    ) -> Callable[[Callable[[Log], Verdict]], Callable[[Log], Verdict]]:
+    def case(self, name: str, expected: str, quick: bool = False) -> Callable[[Any], Any]:
         """Decorator that adds a case."""
 
         def add(function: Callable[[Log], Verdict]) -> Callable[[Log], Verdict]:
@@ -145,12 +162,8 @@ class Group:
         return add
 
 
-#: outcomes that count as passed, and the others
-PASSED = ("passed", "refused", "stopped")
-
-
-@dataclass(frozen=True)
-class Found:
+@dataclass(kw_only=True)
+class Found(Costs):
     """What became of a case; `said` is its sentence, or the message with which it ended."""
 
     key: str
@@ -160,12 +173,6 @@ class Found:
     outcome: str
     said: str
     cpu_s: float
-    steps: int
-    substeps: int
-    cuts: int
-    iterations: int
-    force_error: float
-    energy_error: float
 
     @property
     def good(self) -> bool:
@@ -180,52 +187,31 @@ def judge(case: Case) -> Found:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            # walls and noise finer than the nodes are what some cases are about
-            warnings.filterwarnings("ignore", "the surface is (sharper|rougher) than the node spacing")
-            # as are slides whose load may drift
-            warnings.filterwarnings("ignore", "motion . slides with the indentation held")
-            # steps longer than what swings, and attractions beyond the load
-            warnings.filterwarnings("ignore", "motion . has steps of")
-            warnings.filterwarnings("ignore", "at .* V touching skin is attracted")
-            warnings.filterwarnings("ignore", "the mesh is .* mm across")  # plates of 1 mm
+            for text in EXPECTED:
+                warnings.filterwarnings("ignore", text)
             passed, said = case.function(log)
-        outcome = "passed" if passed else "wrong"
-        if passed and log.refused:
-            outcome = "refused"
-        elif passed and log.stopped:
-            outcome = "stopped"
+        outcome = "refused" if log.refused else "stopped" if log.stopped else "passed"
+        outcome = outcome if passed else "wrong"
     except NotConverged as error:
         outcome, said = "not converged", str(error)
     except AssertionError as error:
         outcome, said = "wrong", str(error)
     except Exception as error:  # an outcome like others: the table names it, the other cases go on
         outcome, said = "error", f"{type(error).__name__}: {error}"
+    costs = {one.name: getattr(log, one.name) for one in fields(Costs)}
+    about = {name: getattr(case, name) for name in ("key", "group", "name", "expected")}
     spent = time.process_time() - begin
-    return Found(
-        key=case.key,
-        group=case.group,
-        name=case.name,
-        expected=case.expected,
-        outcome=outcome,
-        said=" ".join(said.split()),
-        cpu_s=spent,
-        steps=log.steps,
-        substeps=log.substeps,
-        cuts=log.cuts,
-        iterations=log.iterations,
-        force_error=log.force_error,
-        energy_error=log.energy_error,
-    )
+    return Found(**about, outcome=outcome, said=" ".join(said.split()), cpu_s=spent, **costs)
 
 
 @cache
 def warm_up() -> None:
     """Load and compile what the first simulation of a process would have to pay for."""
     from evfem.electrostatics.laws import Kaczmarek
-    from evfem.scene.motion import Hover, Motion, Press, Slide
+    from evfem.scene.motion import Hover, Press, Slide
     from evfem.surface.surfaces import Display
 
     from .scenes import block, finger
 
-    motion: list[Motion] = [Hover(0.1), Press(indentation=0.05, steps=1), Slide(0.1, steps=1)]
+    motion = [Hover(0.1), Press(indentation=0.05, steps=1), Slide(0.1, steps=1)]
     simulate(Scene(finger(block()), Display(), Kaczmarek(), 100.0, motion))

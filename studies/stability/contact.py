@@ -1,6 +1,4 @@
-"""Cases of contact and friction: reversals, jumps, texture, deep and light contact, steps too
-large.
-"""
+"""Cases of contact and friction: reversals, jumps, texture, deep and light, steps too large."""
 
 from __future__ import annotations
 
@@ -17,7 +15,7 @@ from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
 from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
 
-from .case import Group, Log, Verdict
+from .case import Group, Log, Verdict, alike
 from .scenes import block, finger, pad, scene
 
 FRICTION = Group("friction")
@@ -45,11 +43,8 @@ def _reversals(log: Log, mu: float, ridges: bool) -> Verdict:
 
 
 for _mu in (0.0, 0.3, 1.0, 2.0):
-    FRICTION.case(
-        f"reversals mu {_mu:g}",
-        "full slip at the end of every leg: F_t = +mu, -mu, +mu F_n",
-        quick=_mu == 0.3,
-    )(partial(_reversals, mu=_mu, ridges=False))
+    _full = "full slip at the end of every leg: F_t = +mu, -mu, +mu F_n"
+    FRICTION.case(f"reversals mu {_mu:g}", _full, _mu == 0.3)(partial(_reversals, mu=_mu, ridges=False))
 FRICTION.case("ridges that fold", "mu = 1.5 drags ridges over and back: F_t = +mu, -mu, +mu F_n")(
     partial(_reversals, mu=1.5, ridges=True)
 )
@@ -105,9 +100,8 @@ def _stop_and_go(log: Log) -> Verdict:
 
 @FRICTION.case("20 mm", "full slip lasts: F_t = 0.3 F_n and the same F_n from 6 to 20 mm")
 def _far(log: Log) -> Verdict:
-    result = log.simulate(
-        scene(pad(True), Flat(friction=0.3), Press(force=0.1, steps=5), Slide(20.0, steps=80))
-    )
+    motion = Press(force=0.1, steps=5), Slide(20.0, steps=80)
+    result = log.simulate(scene(pad(True), Flat(friction=0.3), *motion))
     later = result.position > 6.0
     off = float(np.abs(result.tangential_force[later] / result.normal_force[later] - 0.3).max())
     spread = float(np.ptp(result.normal_force[later]) / result.normal_force[-1])
@@ -143,14 +137,9 @@ def _slides_over(log: Log, asked: Scene, mu: float, finer: Scene | None = None) 
 
 
 def _gained(result: Result) -> float:
-    """Energy that is there and was not given, over the largest work: what the quadrature of the works
-    misses where nodes land and leave within a step.
-    """
-    balance = (
-        result.external_work - result.stored_energy - result.friction_dissipation
-        - result.viscous_dissipation - result.kinetic_energy
-    )  # fmt: skip
-    return float(-balance.min() / result.external_work.max())
+    """Energy that was not given, over the largest work: an error of the quadrature of the works."""
+    kept = result.stored_energy + result.friction_dissipation + result.viscous_dissipation
+    return float((kept + result.kinetic_energy - result.external_work).max() / result.external_work.max())
 
 
 def grating(pitch: float = 1.0, height: float = 0.1, wall: float = 0.02) -> Profile:
@@ -235,40 +224,28 @@ def _deep(log: Log, ridges: bool) -> Verdict:
     stiffness = np.diff(result.normal_force[:15])
     least = float(result.frames[-1].J.min())
     good = bool((np.diff(stiffness) > 0.0).all()) and least > 0.0
-    return (
-        good,
-        f"F_n {result.normal_force[14]:.3f} N/mm, stiffening all the way; smallest cell J {least:.2f}",
+    said = f"F_n {result.normal_force[14]:.3f} N/mm, stiffening all the way"
+    return good, f"{said}; smallest cell J {least:.2f}"
+
+
+for _name, _ridges in (("smooth", False), ("ridged", True)):
+    MOTION.case(f"3 mm {_name}", "every further 0.2 mm costs more than the one before; cells stay valid")(
+        partial(_deep, ridges=_ridges)
     )
-
-
-MOTION.case("3 mm smooth", "every further 0.2 mm costs more than the one before; cells stay valid")(
-    partial(_deep, ridges=False)
-)
-MOTION.case("3 mm ridged", "every further 0.2 mm costs more than the one before; cells stay valid")(
-    partial(_deep, ridges=True)
-)
 
 
 def _first_touch(log: Log, voltage: float) -> Verdict:
     """From a hover of 0.3 mm and from touch: the same state at the same load."""
-    ends = []
-    for first in ([Hover(0.3)], []):
-        options = {"law": Kaczmarek(), "voltage": voltage} if voltage else {}
-        asked = scene(pad(), Display(friction=0.0), *first, Press(force=0.05, steps=5), **options)
-        ends.append(log.simulate(asked))
-    off = max(
-        abs(float(getattr(ends[0], name)[-1] / getattr(ends[1], name)[-1]) - 1.0)
-        for name in ("indentation", "normal_force", "stored_energy")
-    )
-    return off < 1e-6, f"indentation, F_n and energy within {off:.0e} of a press from touch"
+    options: dict[str, Any] = {"law": Kaczmarek(), "voltage": voltage} if voltage else {}
+    display, press = Display(friction=0.0), Press(force=0.05, steps=5)
+    asked = (scene(pad(), display, *first, press, **options) for first in ([Hover(0.3)], []))
+    return alike(log, asked, "indentation normal_force stored_energy", 1e-6)
 
 
-MOTION.case("first touch under force", "from 0.3 mm above to 0.05 N/mm: as from touch", True)(
-    partial(_first_touch, voltage=0.0)
-)
-MOTION.case("first touch under force 1000 V", "from 0.3 mm above to 0.05 N/mm: as from touch")(
-    partial(_first_touch, voltage=1000.0)
-)
+for _name, _voltage in (("", 0.0), (" 1000 V", 1000.0)):
+    MOTION.case(
+        f"first touch under force{_name}", "from 0.3 mm above to 0.05 N/mm: as from touch", not _voltage
+    )(partial(_first_touch, voltage=_voltage))
 
 
 @MOTION.case("loss of contact under force", "a load that vanishes: F_n follows it down to 1e-6 N/mm", True)
@@ -333,36 +310,25 @@ for _ridges, _mu, _depth in ((False, 0.5, 1.5), (True, 0.5, 1.5), (False, 1.0, 0
     )(partial(_at_once, ridges=_ridges, mu=_mu, depth=_depth))
 
 
-@STEPS.case("3 mm in one step", "the force of thirty steps (no friction)")
-def _deep_at_once(log: Log) -> Verdict:
-    forces = [
-        float(
-            log.simulate(scene(pad(), Flat(friction=0.0), Press(indentation=3.0, steps=n))).normal_force[-1]
-        )
-        for n in (1, 30)
-    ]
-    off = abs(forces[0] / forces[1] - 1.0)
-    return off < 1e-7, f"F_n within {off:.0e}"
+def _pressed(body: Any, *motion: Motion) -> Scene:
+    return scene(body, Flat(friction=0.0), *motion)
 
 
-@STEPS.case("0.3 N/mm in one step", "the indentation of thirty steps (no friction)")
-def _load_at_once(log: Log) -> Verdict:
-    ends = [
-        float(log.simulate(scene(pad(), Flat(friction=0.0), Press(force=0.3, steps=n))).indentation[-1])
-        for n in (1, 30)
-    ]
-    off = abs(ends[0] / ends[1] - 1.0)
-    return off < 1e-7, f"indentation within {off:.0e}"
+STEPS.case("3 mm in one step", "the force of thirty steps (no friction)")(
+    lambda log: alike(
+        log, [_pressed(pad(), Press(indentation=3.0, steps=n)) for n in (30, 1)], "normal_force", 1e-7
+    )
+)
+STEPS.case("0.3 N/mm in one step", "the indentation of thirty steps (no friction)")(
+    lambda log: alike(log, [_pressed(pad(), Press(force=0.3, steps=n)) for n in (30, 1)], "indentation", 1e-7)
+)
 
 
 @STEPS.case("touch from 1 mm above in one step", "the force of a press in ten steps (no friction)", True)
 def _touch_at_once(log: Log) -> Verdict:
-    body = finger(block(8, 3, sag=0.4))
-    forces = []
-    for motion in ([Hover(1.0), Press(indentation=0.5, steps=1)], [Press(indentation=0.5, steps=10)]):
-        forces.append(float(log.simulate(scene(body, Flat(friction=0.0), *motion)).normal_force[-1]))
-    off = abs(forces[0] / forces[1] - 1.0)
-    return off < 1e-7, f"F_n within {off:.0e}"
+    body, ways = finger(block(8, 3, sag=0.4)), ([], [Hover(1.0)])
+    asked = [_pressed(body, *way, Press(indentation=0.5, steps=1 if way else 10)) for way in ways]
+    return alike(log, asked, "normal_force", 1e-7)
 
 
 @STEPS.case(

@@ -8,21 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel, eps_0
-from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
-from evfem.finger.fingerpad import Electrical, MeshedFinger
+import evfem as ev
 from evfem.reference import PullIn, pull_in_kaczmarek, pull_in_strong_troxel
-from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Scene
-from evfem.scene.terms import Boundary
-from evfem.simulation.result import Result
-from evfem.surface.surfaces import Display
-from evfem.tissue.forms import form
-from evfem.tissue.laws import NeoHookean
 
 from ..common import LAWS
-from .case import Group, Log, Verdict
+from .case import Group, Log, Verdict, alike
 from .scenes import SKIN, block, finger, pad, scene
 
 PULL_IN = Group("pull-in")
@@ -35,8 +25,8 @@ GROUPS = (PULL_IN, THIN, VOLTAGE)
 
 
 def _hysteresis(log: Log, law: str, top: float) -> Verdict:
-    up, down = VoltageRamp(top, steps=10), VoltageRamp(0.0, steps=10)
-    result = log.simulate(scene(pad(), Display(), Hover(0.05), up, down, law=LAWS[law]))
+    up, down = ev.VoltageRamp(top, steps=10), ev.VoltageRamp(0.0, steps=10)
+    result = log.simulate(scene(pad(), ev.Display(), ev.Hover(0.05), up, down, law=LAWS[law]))
     touching = result.contact_width > 0.0
     if touching[0] or not touching[10] or touching[-1]:
         return False, "open, closed and open again at 0 V, full voltage and 0 V: not so"
@@ -56,7 +46,7 @@ for _law, _top in (("strong_troxel", 3000.0), ("kaczmarek", 5000.0)):
 # -- a plate: a soft layer between rollers, whose travel is far below its thickness
 
 
-@form
+@ev.form
 def rollers(u: Any, v: Any, w: Any) -> Any:
     """Sides that cannot move sideways: a spring of 1e4 MPa/mm."""
     return 1e4 * u[0] * v[0]
@@ -65,8 +55,8 @@ def rollers(u: Any, v: Any, w: Any) -> Any:
 #: wider than about three thicknesses, a nearly incompressible layer would wrinkle below the plate's pull-in
 #: (10.1103/PhysRevLett.86.119)
 GAP, WIDTH, E, NU = 0.005, 0.5, 0.05, 0.45
-THIN_LAYER = Layer(thickness=0.01, eps_r=3.35)
-SKIN_AND_INSULATOR = Layers.of(Layer(0.38, 1650.0), THIN_LAYER)
+THIN_LAYER = ev.Layer(thickness=0.01, eps_r=3.35)
+SKIN_AND_INSULATOR = ev.Layers.of(ev.Layer(0.38, 1650.0), THIN_LAYER)
 
 
 @dataclass(frozen=True)
@@ -77,22 +67,21 @@ class Plate:
     thickness: float
     solver: str = "monolithic"
 
-    def scene(self, *motion: VoltageRamp, law: Any = None) -> Scene:
+    def scene(self, *motion: ev.VoltageRamp, law: Any = None) -> ev.Scene:
         """Hover, then ramps of the voltage."""
         mesh = block(4, 4, width=WIDTH, height=self.thickness)
         sides = np.flatnonzero(np.abs(mesh.points[:, 0]) > 0.499 * WIDTH)
         mesh = replace(mesh, node_sets={**mesh.node_sets, "sides": sides})
-        body = MeshedFinger(mesh, {"tissue": NeoHookean(E=E, nu=NU)}, SKIN)
-        whole = scene(
-            body, Display(THIN_LAYER), Hover(GAP), *motion, law=law or self.law, coupling=self.solver
-        )
-        return whole.with_term(rollers, on=Boundary("sides"))
+        body = ev.MeshedFinger(mesh, {"tissue": ev.NeoHookean(E=E, nu=NU)}, SKIN)
+        how = {"law": law or self.law, "coupling": self.solver}
+        whole = scene(body, ev.Display(THIN_LAYER), ev.Hover(GAP), *motion, **how)
+        return whole.with_term(rollers, on=ev.Boundary("sides"))
 
     @property
     def exact(self) -> PullIn:
         """Pull-in of the rigid plate on a spring of the layer's constrained modulus."""
         modulus = E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU))
-        formula = pull_in_strong_troxel if isinstance(self.law, StrongTroxel) else pull_in_kaczmarek
+        formula = pull_in_strong_troxel if isinstance(self.law, ev.StrongTroxel) else pull_in_kaczmarek
         return formula(modulus / self.thickness, GAP, 1.0, SKIN_AND_INSULATOR)  # N/mm on 1 mm2
 
     @property
@@ -106,27 +95,25 @@ class Plate:
         def minus_voltage(x: float) -> float:
             stretch = 1.0 + x / self.thickness
             stress = mu * (stretch - 1.0 / stretch) + lmbda * np.log(stretch) / stretch
-            return -float(np.sqrt(2.0 * stress / eps_0)) * (a - x)
+            return -float(np.sqrt(2.0 * stress / ev.eps_0)) * (a - x)
 
         found = minimize_scalar(minus_voltage, bounds=(0.2 * a, 0.5 * a), method="bounded")
         return -float(found.fun)
 
 
-def _snap(result: Result) -> tuple[float, float]:
+def _snap(result: ev.Result) -> tuple[float, float]:
     """The last open and the first closed voltage of a ramp."""
     first = int(np.argmax(result.contact_width > 0.0))
     return float(result.voltage[first - 1]), float(result.voltage[first])
 
 
 def _plate(log: Log, law: str) -> Verdict:
-    """Ramps around the formula: the bracket must hold it, the deviation fall with travel over
-    thickness.
-    """
+    """Ramps around the formula: it lies between them, the nearer the thicker the layer."""
     deviations = []
     for thickness, reach, steps in ((1.0, 0.02, 40), (10.0, 0.002, 40)):
         plate = Plate(LAWS[law], thickness)
         exact = plate.exact.voltage
-        ramps = VoltageRamp((1.0 - reach) * exact, 10), VoltageRamp((1.0 + reach) * exact, steps)
+        ramps = ev.VoltageRamp((1.0 - reach) * exact, 10), ev.VoltageRamp((1.0 + reach) * exact, steps)
         result = log.simulate(plate.scene(*ramps))
         if not (result.contact_width > 0.0).any():
             return False, f"open at {1.0 + reach:g} times the formula's {exact:.2f} V ({thickness:g} mm)"
@@ -151,12 +138,12 @@ class FixedCharge:
     charge-controlled.
     """
 
-    def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+    def traction(self, gap: Any, voltage: Any, layers: ev.Layers) -> Any:
         """sigma^2 / (2 eps_0), whatever the gap."""
-        charge = eps_0 * voltage / (GAP + layers.reduced)
-        return 0.5 * charge**2 / eps_0 + 0.0 * gap
+        charge = ev.eps_0 * voltage / (GAP + layers.reduced)
+        return 0.5 * charge**2 / ev.eps_0 + 0.0 * gap
 
-    def traction_derivative(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+    def traction_derivative(self, gap: Any, voltage: Any, layers: ev.Layers) -> Any:
         """Zero."""
         return 0.0 * gap * voltage
 
@@ -165,13 +152,13 @@ class FixedCharge:
     "unstable branch", "a given charge per area: voltage rises to the formula's and falls again", quick=True
 )
 def _charge(log: Log) -> Verdict:
-    plate = Plate(StrongTroxel(), 10.0)
+    plate = Plate(ev.StrongTroxel(), 10.0)
     exact, a = plate.exact, GAP + SKIN_AND_INSULATOR.reduced
     # travel x under the charge of U0 = U a / (a - x); the last one is at 95 % of the gap
     x = 0.95 * GAP
     k = 8.0 * a**3 / (27.0 * exact.voltage**2)  # eps_0 / (stiffness per area) from the formula
     top = float(np.sqrt(2.0 * x / k)) * a
-    result = log.simulate(plate.scene(VoltageRamp(top, steps=60), law=FixedCharge()))
+    result = log.simulate(plate.scene(ev.VoltageRamp(top, steps=60), law=FixedCharge()))
     gap = result.min_gap
     voltage = result.voltage * (a - GAP + gap) / a
     peak = int(np.argmax(voltage))
@@ -188,13 +175,13 @@ def _charge(log: Log) -> Verdict:
     "0.003 % below pull-in staggered rounds do not settle: such parts are solved all at once, and counted",
 )
 def _staggered(log: Log) -> Verdict:
-    plate = Plate(StrongTroxel(), 10.0)
-    ramp = VoltageRamp((1.0 - 3e-5) * plate.finite_strain_voltage, steps=5)
+    plate = Plate(ev.StrongTroxel(), 10.0)
+    ramp = ev.VoltageRamp((1.0 - 3e-5) * plate.finite_strain_voltage, steps=5)
     together = log.simulate(plate.scene(ramp))
     if together.contact_width.any():
         return False, "closed below its pull-in"
     travel = (GAP - float(together.min_gap[-1])) / plate.exact.travel
-    rounds = log.simulate(Plate(StrongTroxel(), 10.0, "staggered").scene(ramp))
+    rounds = log.simulate(Plate(ev.StrongTroxel(), 10.0, "staggered").scene(ramp))
     unsettled = int(rounds.provenance["solver"]["unsettled"])
     apart = float(np.abs(rounds.min_gap - together.min_gap).max())
     return (
@@ -207,15 +194,14 @@ def _staggered(log: Log) -> Verdict:
 
 
 def _thin(log: Log, law: str, thickness: float) -> Verdict:
-    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact
-    width. Under Strong-Troxel's law that is more than the shear of the pad can overcome: it
-    sticks.
+    """Touching nodes carry p(0), the others less: F_e is at least p(0) times the real contact width.
+    Under Strong-Troxel's law that is more than the shear of the pad can overcome: it sticks.
     """
-    display = Display(Layer(thickness, 3.35), friction=0.3)
-    motion = Press(force=0.05, steps=5), Slide(3.0, steps=15)
+    display = ev.Display(ev.Layer(thickness, 3.35), friction=0.3)
+    motion = ev.Press(force=0.05, steps=5), ev.Slide(3.0, steps=15)
     result = log.simulate(scene(pad(), display, *motion, law=LAWS[law], voltage=140.0))
-    skin = Layer(0.38, 1650.0)
-    closed = LAWS[law].traction(0.0, 140.0, Layers.of(skin, Layer(thickness, 3.35)))
+    skin = ev.Layer(0.38, 1650.0)
+    closed = LAWS[law].traction(0.0, 140.0, ev.Layers.of(skin, ev.Layer(thickness, 3.35)))
     least = float(closed) * float(result.real_contact_width[4])
     share = float(result.electrostatic_force[4]) / least
     ratio = float(result.tangential_force[-1] / result.normal_force[-1])
@@ -244,8 +230,8 @@ def _bare(log: Log) -> Verdict:
     "conductive contact", "zero solid thickness refused with a sentence, by scene and by law", quick=True
 )
 def _conductive(log: Log) -> Verdict:
-    first = log.refusal(lambda: Electrical(stratum_corneum_thickness=0.0))
-    nothing = Layers.of(Layer(0.0, 1.0), Layer(0.0, 3.35))
+    first = log.refusal(lambda: ev.Electrical(stratum_corneum_thickness=0.0))
+    nothing = ev.Layers.of(ev.Layer(0.0, 1.0), ev.Layer(0.0, 3.35))
     both = [log.refusal(partial(law.traction, 0.0, 100.0, nothing)) for law in LAWS.values()]
     good = "thickness" in first and all("without any insulation" in said for said in both)
     return good, f"{first}; {both[0]}"
@@ -259,9 +245,9 @@ def _square(log: Log) -> Verdict:
     edges = np.arange(2.0, 6.0, 0.5)
     position = np.concatenate([[0.0], np.repeat(edges, 2), [8.0]])
     level = np.concatenate([[0.0, 0.0], np.repeat(np.arange(1, len(edges) + 1) % 2, 2)])[: len(position)]
-    voltage = VoltageProfile(position, 1000.0 * level)
-    motion = Press(force=0.05, steps=5), Slide(6.0, steps=60, hold="force")
-    result = log.simulate(scene(pad(), Display(), *motion, law=Kaczmarek(), voltage=voltage))
+    voltage = ev.VoltageProfile(position, 1000.0 * level)
+    motion = ev.Press(force=0.05, steps=5), ev.Slide(6.0, steps=60, hold="force")
+    result = log.simulate(scene(pad(), ev.Display(), *motion, law=ev.Kaczmarek(), voltage=voltage))
     later = result.position > 3.0
     ratio = result.tangential_force[later] / result.normal_force[later]
     on = result.voltage[later] > 999.0
@@ -274,21 +260,19 @@ def _square(log: Log) -> Verdict:
 
 @VOLTAGE.case("3000 V in one step", "the state that a ramp of 20 steps reaches")
 def _at_once(log: Log) -> Verdict:
-    ends = []
-    for steps in (1, 20):
-        motion = Press(force=0.05, steps=5), VoltageRamp(3000.0, steps=steps, hold="force")
-        ends.append(log.simulate(scene(pad(), Display(friction=0.0), *motion, law=Kaczmarek())))
-    error = max(
-        abs(float(getattr(ends[0], name)[-1] / getattr(ends[1], name)[-1]) - 1.0)
-        for name in ("electrostatic_force", "normal_force", "indentation")
-    )
-    return error < 1e-6, f"forces and indentation within {error:.0e}"
+    asked = []
+    for steps in (20, 1):
+        motion = ev.Press(force=0.05, steps=5), ev.VoltageRamp(3000.0, steps=steps, hold="force")
+        asked.append(scene(pad(), ev.Display(friction=0.0), *motion, law=ev.Kaczmarek()))
+    return alike(log, asked, "electrostatic_force normal_force indentation", 1e-6)
 
 
 @VOLTAGE.case("3000 V from the first step", "Strong-Troxel on ridges: forces balance, F_t at most 0.3 F_n")
 def _full(log: Log) -> Verdict:
-    motion = Press(indentation=0.5, steps=3), Slide(1.0, steps=2)
-    result = log.simulate(scene(pad(ridges=True), Display(), *motion, law=StrongTroxel(), voltage=3000.0))
+    motion = ev.Press(indentation=0.5, steps=3), ev.Slide(1.0, steps=2)
+    result = log.simulate(
+        scene(pad(ridges=True), ev.Display(), *motion, law=ev.StrongTroxel(), voltage=3000.0)
+    )
     ratio = float(result.tangential_force[-1] / result.normal_force[-1])
     good = 0.0 < ratio <= 0.3 * (1.0 + 1e-9) and log.force_error < 1e-7
     return good, f"F_t/F_n = {ratio:.4f} after 1 mm, F_e = {result.electrostatic_force[-1]:.3f} N/mm"
@@ -298,9 +282,8 @@ def _full(log: Log) -> Verdict:
 def _alone(log: Log) -> Verdict:
     worst = 0.0
     for body in (finger(block(8, 3, sag=0.4)), pad()):
-        result = log.simulate(
-            scene(body, Display(), Press(force=0.0, steps=2), law=Kaczmarek(), voltage=1000.0)
-        )
+        how = {"law": ev.Kaczmarek(), "voltage": 1000.0}
+        result = log.simulate(scene(body, ev.Display(), ev.Press(force=0.0, steps=2), **how))
         worst = max(worst, abs(float(result.normal_force[-1] / result.electrostatic_force[-1]) - 1.0))
         if result.indentation[-1] <= 0.0:
             return False, "not pulled in"
@@ -314,14 +297,13 @@ def _infinite(log: Log) -> Verdict:
     class Broken:
         """Infinite where it touches."""
 
-        def traction(self, gap: Any, voltage: Any, layers: Layers) -> Any:
+        def traction(self, gap: Any, voltage: Any, layers: ev.Layers) -> Any:
             return voltage**2 * np.where(np.real(gap) > 0.0, 1e-12, np.inf) + 0.0 * gap
 
-    asked = scene(
-        finger(block(8, 3, sag=0.4)), Display(), Press(indentation=0.2, steps=2), law=Broken(), voltage=100.0
-    )
+    body, press = finger(block(8, 3, sag=0.4)), ev.Press(indentation=0.2, steps=2)
+    asked = scene(body, ev.Display(), press, law=Broken(), voltage=100.0)
     try:
         message = str(log.stop(asked))
-    except InputError as error:
+    except ev.InputError as error:
         log.refused, message = True, str(error)
     return "finite" in message, message

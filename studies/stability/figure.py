@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ..common import COLOURS, new_figure
+from ..plots import COLOURS, Axes, Figure, new_figure
 from .case import Found
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 #: outcome -> marker, colour, label
 MARKS = {
@@ -72,8 +66,8 @@ def _column(axes: list[Axes], column: list[Found], rows: int) -> None:
     for ax in (axes[0], axes[3]):
         ax.set(xlim=(0.0, 1.0), xticks=[])
         ax.spines["bottom"].set_visible(False)
-    _scale(axes[1], 1.0, [0, 1, 3, 10, 30, 100], "iterations per step")
-    _scale(axes[2], 1.0, [0, 1, 3, 10, 30, 100], "cuts")
+    _scale(axes[1], "iterations per step")
+    _scale(axes[2], "cuts")
     axes[3].set_xlabel("CPU s", fontsize=8)
 
 
@@ -84,8 +78,9 @@ def _heading(ax: Axes, group: list[Found], y: float) -> None:
     ax.text(0.0, y, title, fontsize=8, fontweight="bold", color=colour, va="center")
 
 
-def _scale(ax: Axes, linear: float, ticks: list[int], label: str) -> None:
-    ax.set_xscale("symlog", linthresh=linear)
+def _scale(ax: Axes, label: str) -> None:
+    ticks = [0, 1, 3, 10, 30, 100]
+    ax.set_xscale("symlog", linthresh=1.0)
     ax.set_xlim(0.0, 1.3 * max(ticks[-1], ax.dataLim.x1 if np.isfinite(ax.dataLim.x1) else 0.0))
     ax.set_xticks(ticks, [str(tick) for tick in ticks])
     ax.grid(axis="x", color="#DDDDDD", linewidth=0.5)
@@ -106,13 +101,11 @@ def _row(axes: list[Axes], one: Found, y: float) -> None:
 def _legend(figure: Figure, found: list[Found]) -> None:
     from matplotlib.lines import Line2D
 
-    seen = [name for name in MARKS if any(one.outcome == name for one in found)]
+    seen = [mark for name, mark in MARKS.items() if any(one.outcome == name for one in found)]
     handles = [
-        Line2D([], [], marker=MARKS[name][0], color=MARKS[name][1], linestyle="", label=MARKS[name][2])
-        for name in seen
+        Line2D([], [], marker=marker, color=colour, linestyle="", label=label)
+        for marker, colour, label in seen
     ]
-    good = sum(one.good for one in found)
-    figure.legend(
-        handles=handles, loc="outside upper center", ncols=len(seen), fontsize=7.5, frameon=False,
-        title=f"{good} of {len(found)} cases end as they should",
-    )  # fmt: skip
+    title = f"{sum(one.good for one in found)} of {len(found)} cases end as they should"
+    place = {"loc": "outside upper center", "ncols": len(seen), "frameon": False}
+    figure.legend(handles=handles, fontsize=7.5, title=title, **place)

@@ -27,9 +27,7 @@ BENCHMARK: Mapping[str, tuple[float, float]] = {"tissue": (0.05, 0.48), "skin": 
 
 
 def scene(body: Any, surface: Any, *motion: Motion, **options: Any) -> Scene:
-    """A scene that keeps the fields of its last step; further options of `Scene` (law, voltage,
-    ...).
-    """
+    """A scene that keeps the fields of its last step; further options of `Scene`."""
     return Scene(body, surface, motion=motion, output=ONCE, **options)
 
 
@@ -39,9 +37,7 @@ def pad(ridges: bool = False, **parameters: Any) -> FingerPad:
 
 
 def grid(x: Floats, y: Floats) -> Mesh:
-    """Quads on points x, y of shape (rows, columns), both growing; `pad` the first row, `bone` the
-    last.
-    """
+    """Quads on growing x, y of shape (rows, columns); `pad` the first row, `bone` the last."""
     rows, columns = x.shape
     node = np.arange(rows * columns).reshape(rows, columns)
     corners = [node[:-1, :-1], node[:-1, 1:], node[1:, 1:], node[1:, :-1]]
@@ -94,9 +90,7 @@ def scaled(mesh: Mesh, factor: float) -> Mesh:
 
 
 def joined(first: Mesh, second: Mesh, away: Floats) -> Mesh:
-    """Two meshes in one, the second one moved by `away` (mm): separate parts, or double nodes
-    where they meet.
-    """
+    """Two meshes in one, the second moved by `away` (mm): separate parts, or double nodes."""
     n = len(first.points)
     sets: dict[str, Ints] = {
         name: np.concatenate([nodes, n + second.node_sets[name]]) for name, nodes in first.node_sets.items()
@@ -116,9 +110,7 @@ def finger(mesh: Mesh, E: float = 0.1, nu: float = 0.4, viscosity: float = 0.0) 
 
 
 def benchmark(level: int = 0, **materials: tuple[float, float]) -> MeshedFinger:
-    """Half a finger between two ellipses, tissue and skin; E (MPa) and nu of a region can be
-    replaced.
-    """
+    """Half a finger between two ellipses; E (MPa) and nu of a region can be replaced."""
     return layered(benchmark_mesh(level), **{**BENCHMARK, **materials})
 
 

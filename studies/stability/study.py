@@ -7,16 +7,14 @@ wrong; not converged; error. Beside json, csv and picture the table is written a
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from evfem.common.storage import write_text
-
-from ..common import Series, Study, make_folder
-from ..parallel import side_by_side
+from ..common import Series, Study, markdown, side_by_side
 from . import contact, electric, same, tissue
-from .case import PASSED, Case, Found, judge
+from .case import Case, Found, judge
 from .figure import draw
 
 GROUPS = tuple(group for module in (tissue, electric, contact, same) for group in module.GROUPS)
@@ -50,19 +48,11 @@ def main(quick: bool = False, out: Path | None = None) -> dict[str, Any]:
     chosen = [key for key, case in CASES.items() if case.quick or not quick]
     found = side_by_side(judge_by_key, chosen, 1 if quick else 2)
     said = {one.key: {"expected": one.expected, "outcome": one.outcome, "found": one.said} for one in found}
-    lines = table(found)
+    rest = ASSUMPTIONS | {"cases": said, "groups": by_group(found)}
     study = Study(
-        "stability",
-        numbers(found),
-        {},
-        ASSUMPTIONS | {"cases": said, "groups": by_group(found), "table": lines},
-        series(found),
-        lambda: draw(found),
+        "stability", numbers(found), {}, rest, series(found), lambda: draw(found), tables=tables(found)
     )
-    result = study.finish(out, quick)
-    if out is not None:
-        write_text(make_folder(out) / "stability.md", page(found))
-    return result
+    return study.finish(out, quick)
 
 
 def judge_by_key(key: str) -> Found:
@@ -86,14 +76,8 @@ def numbers(found: list[Found]) -> dict[str, float]:
 
 def by_group(found: list[Found]) -> dict[str, tuple[int, int]]:
     """Group -> cases with the expected outcome, and all of them."""
-    names = list(dict.fromkeys(one.group for one in found))
-    return {
-        name: (
-            sum(one.good for one in found if one.group == name),
-            sum(one.group == name for one in found),
-        )
-        for name in names
-    }
+    good, every = Counter(one.group for one in found if one.good), Counter(one.group for one in found)
+    return {name: (good[name], count) for name, count in every.items()}
 
 
 def series(found: list[Found]) -> list[Series]:
@@ -103,24 +87,14 @@ def series(found: list[Found]) -> list[Series]:
     return [Series(name, names, [float(getattr(one, name)) for one in found], units[name]) for name in units]
 
 
-def table(found: list[Found]) -> list[str]:
-    """The cases as lines of a Markdown table."""
-    lines = [f"| {' | '.join(HEAD)} |", "|---" * len(HEAD) + "|"]
+def tables(found: list[Found]) -> dict[str, list[str]]:
+    """Counts by group, and the cases, those that failed with what was expected."""
+    groups = [[name, str(good), str(count)] for name, (good, count) in by_group(found).items()]
+    rows = []
     for one in found:
+        said = one.said if one.good else f"{one.said}; expected: {one.expected}"
         cells = [one.group, one.name, one.outcome if one.good else f"**{one.outcome}**"]
         cells += [str(n) for n in (one.steps, one.substeps, one.cuts, one.iterations)]
         cells += [f"{one.cpu_s:.1f}", f"{one.force_error:.0e}", f"{one.energy_error:.0e}"]
-        lines.append(f"| {' | '.join([*cells, one.said.replace('|', '/')])} |")
-    return lines
-
-
-def page(found: list[Found]) -> str:
-    """Counts by group, the table, and the expectation of every case that failed."""
-    lines = ["# Stability", "", "| group | as expected | cases |", "|---|---|---|"]
-    lines += [f"| {name} | {good} | {n} |" for name, (good, n) in by_group(found).items()]
-    lines += ["", *table(found), ""]
-    bad = [one for one in found if one.outcome not in PASSED]
-    lines += [
-        f"- {one.group}, {one.name}: expected: {one.expected}; {one.outcome}: {one.said}" for one in bad
-    ]
-    return "\n".join(lines) + "\n"
+        rows.append([*cells, said.replace("|", "/")])
+    return {"Groups": markdown(("group", "as expected", "cases"), groups), "Cases": markdown(HEAD, rows)}

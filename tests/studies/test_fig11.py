@@ -1,27 +1,17 @@
 """Fig. 11 in its quick version, and the shortcuts it takes: what replaces a run by a cheaper one."""
 
-import importlib
-import importlib.util
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from evfem.studies import pressing
 
 from evfem.scene.motion import Press, VoltageRamp
 from evfem.simulation.run import simulate
 
-studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-fig11, pressing = (importlib.import_module(f"{studies.__name__}.{name}") for name in ("fig11", "pressing"))
 PAD = pressing.Pad(resolution="coarse")
 
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def quick(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("fig11")
-    return fig11.main(quick=True, out=folder), folder
 
 
 def curve(folder, name):
@@ -29,17 +19,9 @@ def curve(folder, name):
     return np.array([float(y) for series, _, y, _ in lines[1:] if series == name])
 
 
-def test_quick_study_leaves_numbers_curves_and_picture(quick):
-    result, folder = quick
-    assert sorted(p.name for p in folder.iterdir()) == ["fig11.csv", "fig11.json", "fig11.png"]
-    assert json.loads((folder / "fig11.json").read_text()) == json.loads(json.dumps(result))
-    assert set(result["paper"]) <= set(result["numbers"])
-    assert all(type(value) is float and np.isfinite(value) for value in result["numbers"].values())
-
-
-def test_air_matters_more_with_ridges_and_less_under_load(quick):
+def test_air_matters_more_with_ridges_and_less_under_load(study):
     # design notes, smooth pad whatever the mesh: 1.08, 0.30 and 0.195 at 0.01, 0.05 and 0.1 N/mm
-    result, folder = quick
+    result, folder = study("fig11")
     smooth = curve(folder, "base without_ridges relative contribution")
     assert smooth == pytest.approx([1.08, 0.30, 0.195], rel=0.08)
     ridged = curve(folder, "base with_ridges relative contribution")
@@ -53,9 +35,9 @@ def test_air_matters_more_with_ridges_and_less_under_load(quick):
         assert fitted == pytest.approx(ratio, rel=0.15)
 
 
-def test_plate_of_panel_b_by_hand(quick):
+def test_plate_of_panel_b_by_hand(study):
     # eps_0 U^2 / 2 / (0.38/1650 + 0.09/3.35) / 0.47 mm^2 times 107.626 mm^2 at 1 N, over 10 mm
-    line = curve(quick[1], "(7) gross area")
+    line = curve(study("fig11")[1], "(7) gross area")
     pressure = 8.8541878e-12 * 1e6 / 2.0 / (0.38 / 1650.0 + 0.09 / 3.35) / 0.47
     assert line[-1] == pytest.approx(10.7626 * pressure, rel=1e-6)
 
@@ -79,12 +61,3 @@ def test_runs_with_the_load_held_give_what_the_cheaper_runs_give():
     touching = np.count_nonzero(np.diff(without.touching[-1].astype(int)) == 1)
     lost = nodal[-1] - without.contact_only(1000.0, "kaczmarek")[-1]
     assert abs(lost) < touching * 0.0417 * nodal[-1] / without.widths()[0][-1]
-
-
-def test_with_friction_every_load_gets_its_voltage_from_its_own_state():
-    case = pressing.Case(PAD, (0.03, 0.05), voltage=1000.0, friction=0.3)
-    branched = pressing.run(case)
-    motion = [Press(force=0.03, steps=1), Press(force=0.05, steps=1)]
-    scene = case.scene(*motion, VoltageRamp(1000.0, steps=1, hold="force"), voltage=0.0)
-    assert branched.force[1] == pytest.approx(simulate(scene).electrostatic_force[-1], rel=1e-6)
-    assert branched.force[0] < branched.force[1]

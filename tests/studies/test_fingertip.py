@@ -1,11 +1,10 @@
-"""The study of the whole finger pad."""
+"""The studies of the whole finger pad, and of whorl, loop and arch."""
 
 import numpy as np
 import pytest
 from evfem.studies import fingertip
 
 import evfem as ev
-from evfem import studies
 from evfem.electrostatics.laws import Layers
 from evfem.surface.skin import make_skin
 
@@ -30,12 +29,11 @@ def test_a_smooth_rigid_pad_has_the_force_of_its_ellipsoid():
 
 
 @pytest.mark.slow
-def test_areas_and_widths_and_what_would_bring_them_to_adams(tmp_path):
+def test_areas_and_widths_and_what_would_bring_them_to_adams(numbers_of):
     """The quick study: Adams' area is twice the pad's at 0.5 N, half the moduli give 1.4, and a
     cross-section needs a wider pad under more load; ridges and laws order the hovering forces.
     """
-    numbers = studies.run("fingertip", quick=True, out=tmp_path)["numbers"]
-    assert (tmp_path / "fingertip.png").stat().st_size > 10_000
+    numbers = numbers_of("fingertip")
     wanted = numbers["variant.wanted_over_unchanged"]
     assert 1.0 / numbers["verdict.smooth.gross_over_adams.0.5N"] == pytest.approx(wanted)
     assert 1.2 < numbers["variant.all moduli x 0.5.area_over_unchanged"] < wanted < 2.4
@@ -45,3 +43,16 @@ def test_areas_and_widths_and_what_would_bring_them_to_adams(tmp_path):
             smooth, ridged = (numbers[f"{kind}.{law}.median_mN.{case}"] for kind in ("smooth", "ridged"))
             assert 0.9 * smooth < ridged < smooth
             assert 0.92 < numbers[f"verdict.smooth.{law}.over_closed_form.{case}"] < 1.0
+
+
+@pytest.mark.slow
+def test_parallel_ridges_yield_across_and_slide_in_the_end_with_the_coefficient(numbers_of):
+    """The quick study: two directions of one pattern, beside a smooth pad."""
+    numbers = numbers_of("fingerprint")
+    x, z = (numbers[f"along.{way}.stiffness_N_per_mm"] for way in "xz")
+    smooth_x, smooth_z = (numbers[f"smooth.{way}.stiffness_N_per_mm"] for way in "xz")
+    assert x < smooth_x
+    assert z / x > 1.02 * smooth_z / smooth_x
+    for way in "xz":
+        assert 0.8 < numbers[f"along.{way}.friction_at_the_end_over_full_slip"] < 1.0 + 1e-6
+    assert 0.6 < numbers["verdict.along.attraction_over_smooth"] < 1.0

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 from evfem.studies import fringe
 
-from evfem import studies
 
-
-@pytest.fixture(scope="module")
-def numbers(tmp_path_factory):
-    out = tmp_path_factory.mktemp("fringe")
-    found = studies.run("fringe", quick=True, out=out)["numbers"]
-    assert (out / "fringe.png").stat().st_size > 10_000
-    return found
+@pytest.fixture
+def numbers(numbers_of):
+    return numbers_of("fringe")
 
 
 @pytest.mark.slow

@@ -1,6 +1,4 @@
-"""The notebooks, run as scripts in a folder of their own: what they find, and what they leave
-behind.
-"""
+"""The notebooks, run as scripts in a folder of their own: what they find, and what they leave behind."""
 
 import json
 import re
@@ -10,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from evfem import data
+from evfem.studies.measured import participant_forces
 
 pytestmark = pytest.mark.solver
 
@@ -77,17 +74,11 @@ def test_the_designed_signal_does_what_was_wished(ran):
 
 
 def test_the_compared_participants_are_those_of_fig_5(ran):
-    """The closed forms of three fingers by hand, and what ridges and deformation may change."""
+    """Fig. 5's closed forms (HVLD), and what ridges and deformation may change."""
     found, folder = ran("compare_participants")
-    table, chosen = data.load("table1"), found["chosen"]
-    t = (np.arange(800) + 0.5) / 800 * np.pi / 2
-    for i in chosen:
-        a, b, c = (table[key][i] for key in "abc")
-        gap = 0.25 + b / 2 * (2 - np.cos(t)[:, None] - np.cos(t))
-        weight = a * c * np.cos(np.pi / 6) * np.cos(t)[:, None] * np.cos(t) * (np.pi / 1600) ** 2
-        pull = 8.8541878128e-12 * 2000.0**2 / 2 / ((gap + 0.38 / 1650 + 0.09 / 3.35) * (gap + 0.47))
-        assert found["closed"]["kaczmarek"][i] == pytest.approx(1e3 * np.sum(weight * pull), rel=1e-5)
+    chosen, forces = found["chosen"], participant_forces()
     for name in ("kaczmarek", "strong_troxel"):
+        assert found["closed"][name] == pytest.approx(forces[name, "HVLD"], rel=1e-9)
         change = found["computed"][name] / found["closed"][name][chosen] - 1.0
         assert -0.07 < change.min() <= change.max() < 0.0
     assert not list(folder.iterdir())

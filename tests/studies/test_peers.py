@@ -1,41 +1,25 @@
 """evfem beside its peers: the quick comparison with and without them, and how runs become numbers."""
 
-import ast
-import importlib
-import importlib.util
-import json
-import os
 import sys
-import types
-from pathlib import Path
 
 import numpy as np
 import pytest
+from evfem.studies.peers import apart, hosts, problem, shown
+from evfem.studies.peers import evaluation as numbers
+from evfem.studies.peers import study as peers
 
-studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-peers, numbers, hosts, shown, problem, apart, race = (
-    importlib.import_module(f"{studies.__name__}.peers.{name}")
-    for name in ("study", "evaluation", "hosts", "shown", "problem", "apart", "race")
-)
+from evfem import studies
+
 PRESENT = [name for name in numbers.PEERS if hosts.host(name)]
 FORCES = ("Fn_at_0.5", "Fn_at_1.0", "Fn_at_1.5")
 
 
-def run(package, element, scene="A", level=0, cpu=1.0, factor=1.0):
-    """A run that took `cpu` seconds and found the reference's forces times `factor`."""
-    normal = np.full(45 if scene == "B" else 15, 1.0)
-    tangential = np.zeros_like(normal)
-    reference = problem.REFERENCE[scene]
-    for place, depth in ((4, 0.5), (9, 1.0), (14, 1.5)):
-        normal[place] = factor * reference[f"Fn_at_{depth}"]
-    if scene == "B":
-        tangential[15:] = factor * reference["Ft_mean_2_to_3"]
-        for place, distance in ((15, 0.1), (19, 0.5), (44, 3.0)):
-            tangential[place] = factor * reference[f"Ft_after_{distance}"]
-        normal[44] = factor * reference["Fn_after_3.0"]
-    history = np.column_stack([normal, tangential, 0 * normal]).tolist()
-    cost = dict.fromkeys(numbers.MEASURED, cpu) | {"iterations": 10, "factorisations": 5}
-    return numbers.Run(package, element, scene, level, cost | {"history": history})
+def run(package, element, cpu=1.0, factor=1.0, level=0, way=problem.GIVEN):
+    """A run of scene A that took `cpu` seconds and found the reference's forces times `factor`."""
+    depths = 1.5 * np.arange(1, way.press + 1) / way.press
+    forces = [factor * problem.REFERENCE["A"].get(f"Fn_at_{depth:.1f}", 1.0) for depth in depths]
+    cost = dict.fromkeys(numbers.MEASURED, cpu) | {"history": [[force, 0.0, 0.0] for force in forces]}
+    return numbers.Run(package, element, "A", level, cost, way)
 
 
 @pytest.mark.slow
@@ -54,10 +38,7 @@ def test_quick_comparison_without_peers(monkeypatch, tmp_path, capsys):
     assert abs(found["A.L0.evfem_q2p1.error_percent.Fn_at_1.5"]) < 0.3
     # 15 steps of an exact contact
     assert 15 <= found["A.L0.evfem_q1.iterations"] <= 120
-    files = sorted(path.name for path in tmp_path.iterdir())
-    assert files == ["peers.csv", "peers.json", "peers.md", "peers.png"]
-    assert json.loads((tmp_path / "peers.json").read_text()) == json.loads(json.dumps(result))
-    assert "Missing: felupe." in (tmp_path / "peers.md").read_text()
+    assert "## Runs" in (tmp_path / "peers.md").read_text()
     assert (tmp_path / "peers.png").read_bytes().startswith(b"\x89PNG")
 
 
@@ -69,7 +50,7 @@ def test_quick_comparison_with_what_is_installed(tmp_path):
     assert said["missing"] == [name for name in numbers.PEERS if name not in PRESENT]
     assert said["failed"] == {}
     assert all(type(value) is float and np.isfinite(value) for value in found.values())
-    assert len(said["table"]) == 4 + 2 * len(PRESENT)
+    assert len(said["tables"]["Runs"]) == 4 + 2 * len(PRESENT)
     for name in PRESENT:
         # one mesh, one energy, exact contact and a stiff penalty: 0.54 N/mm on about 20 nodes, 1000 N/mm per
         # mm, so that 3e-5 mm of 1.5 mm are lost, and the force grows with the power 1.9 of the indentation
@@ -93,51 +74,6 @@ def test_friction_and_attraction_are_the_same_problem_for_all(scene, tmp_path):
         peer = hosts.run_once(name, "q1", scene, 0, tmp_path)
         assert problem.quantities(scene, peer["history"]) == pytest.approx(own, rel=5e-4)
         assert peer["iterations"] <= 5 * len(problem.path(scene))  # C with a wrong sign in its tangent: 81
-
-
-@pytest.mark.parametrize("name", numbers.PEERS)
-def test_a_package_that_is_not_there_is_named(name, monkeypatch, tmp_path):
-    monkeypatch.setattr(hosts, "host", lambda name: None)
-    assert f"{name} is not installed" in hosts.run_once(name, "q1", "A", 0, tmp_path)["failed"]
-
-
-def imports(path):
-    """Top-level names of what a file imports."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom):
-            assert node.level == 0, "a script has no package"
-            yield node.module.split(".")[0]
-        elif isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-
-
-@pytest.mark.parametrize("name", ["apart", "with_fenicsx", "with_getfem"])
-def test_a_script_needs_its_package_and_numpy_only(name):
-    allowed = {"with_fenicsx": {"dolfinx", "ufl", "petsc4py", "mpi4py"}, "with_getfem": {"getfem"}}.get(
-        name, set()
-    )
-    found = set(imports(Path(hosts.__file__).with_name(f"{name}.py")))
-    assert found - set(sys.stdlib_module_names) <= allowed | {"numpy", "apart"}
-
-
-def test_the_first_interpreter_that_has_a_package_is_its_host(monkeypatch, tmp_path):
-    # a stand-in that says it has everything; only packages with a script of their own may live elsewhere
-    other = tmp_path / "python3"
-    other.write_text("#!/bin/sh\nexit 0\n")
-    other.chmod(0o755)
-    monkeypatch.setattr(hosts, "SYSTEM", str(tmp_path / "none"))
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert list(hosts.interpreters()) == [sys.executable, str(other)]
-    packages = {
-        "here": hosts.Package(("json",), "", "x.py"),
-        "there": hosts.Package(("no_such_module",), "", "x.py"),
-        "nowhere": hosts.Package(("no_such_module",), ""),
-    }
-    monkeypatch.setattr(hosts, "PACKAGES", packages)
-    found = [hosts.host.__wrapped__(name) for name in packages]
-    assert found == [sys.executable, str(other), None]
-    assert hosts.environment(str(other))["PYTHONPATH"] == ""
-    assert hosts.environment(sys.executable)["PYTHONPATH"].split(os.pathsep)[-1] in sys.path
 
 
 def test_the_problem_as_a_file(tmp_path):
@@ -176,27 +112,11 @@ def test_penalty_contact_by_hand():
     assert not contact.turning.any()
 
 
-def test_iterations_go_on_until_the_residual_is_small_and_no_node_turns():
-    contact, moved = apart.PenaltyContact(np.zeros(1), 0.0, 0.3), []
-    contact.relaxed = np.array([2.0])
-    residuals, turning = iter([1e-2, 1e-9, 1e-9]), iter([[False], [True], [False]])
-
-    def residual():
-        contact.turning = np.array(next(turning))
-        return next(residuals)
-
-    assert apart.newton(residual, moved.append, contact, 1e-8) == 3
-    assert moved == [True, False, False]  # the first one moves the bone
-    assert contact.reference == 2.0  # kept
-    with pytest.raises(RuntimeError, match=r"no equilibrium after 40 iterations, residual 1.0e\+00"):
-        apart.newton(lambda: 1.0, moved.append, contact, 1e-8)
-
-
 def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
     def run_once(package, element, scene, level, compiled, way):
         if element == "q2":
             return {"failed": "NewtonConvergenceError: no"}
-        return dict(run(package, element, scene, level).measured)
+        return dict(run(package, element).measured)
 
     monkeypatch.setattr(peers, "run_once", run_once)
     who = [one for one in numbers.CONTENDERS if one[0] in ("evfem", "felupe")]
@@ -204,24 +124,7 @@ def test_a_failing_run_is_reported_and_the_others_go_on(monkeypatch):
     assert failed == {"A.L0.felupe_q2": "NewtonConvergenceError: no"}
     assert [one.key for one in runs] == ["A.L0.evfem_q1", "A.L0.felupe_q1", "A.L0.evfem_q2p1"]
     line = "| A | L0 | felupe | q2 | not done: NewtonConvergenceError: no | - | - | - | - | - | - |"
-    assert shown.table(runs, failed)[-1] == line
-
-
-def test_warm_up_goes_on_until_nothing_is_compiled(monkeypatch):
-    order, seconds = [], iter([2.0, 0.5, 0.01, 1.0, 0.01])
-
-    def run_once(package, element, scene, level, compiled, way=None):
-        order.append((package, scene))
-        forms = {"form_cpu_s": next(seconds)} if package == "fenicsx" else {}
-        return dict(run(package, element).measured) | forms
-
-    monkeypatch.setattr(peers, "run_once", run_once)
-    cold = peers.warm_up("BA", 0, [("evfem", "q1"), ("fenicsx", "q1")], Path("unused"))
-    assert order == [("evfem", "B"), *[("fenicsx", "B")] * 3, *[("fenicsx", "A")] * 2]
-    assert cold == {
-        "B.L0.fenicsx_q1": {"cold_cpu_s": 1.0, "form_cpu_s": 2.0},
-        "A.L0.fenicsx_q1": {"cold_cpu_s": 1.0, "form_cpu_s": 1.0},
-    }
+    assert shown.tables(runs, failed, {})["Runs"][-1] == line
 
 
 def test_the_last_words_of_a_process_that_fails():
@@ -233,7 +136,7 @@ def test_packages_take_turns_and_the_fastest_round_counts(monkeypatch):
 
     def run_once(*who):
         order.append(who[0])
-        return dict(run(*who[:4]).measured) | {"cpu_s": next(seconds)}
+        return dict(run(*who[:2]).measured) | {"cpu_s": next(seconds)}
 
     monkeypatch.setattr(peers, "run_once", run_once)
     runs, _ = peers.compete({0: ("A", 3)}, numbers.CONTENDERS[:2])
@@ -242,18 +145,6 @@ def test_packages_take_turns_and_the_fastest_round_counts(monkeypatch):
         (2.0, 4.0),
         (7.0, 9.0),
     ]
-
-
-def test_a_slow_package_stays_away_from_fine_levels(monkeypatch):
-    order = []
-
-    def run_once(*who):
-        order.append((who[0], who[3]))
-        return dict(run(*who[:4]).measured)
-
-    monkeypatch.setattr(peers, "run_once", run_once)
-    peers.compete({1: ("A", 1), 2: ("A", 1)}, [("evfem", "q1"), ("getfem", "q1")])
-    assert order == [("evfem", 1), ("getfem", 1), ("evfem", 2)]
 
 
 def test_errors_and_ratios_by_hand():
@@ -282,9 +173,10 @@ def test_errors_and_ratios_by_hand():
     names = [one.name for one in numbers.series(runs)]
     assert names == ["A evfem q1", "A felupe q1", "A getfem q1", "A evfem q2p1", "A felupe q2"]
     # eleven values, of which the last is 0.1564 instead of 0.1473
-    slide = run("evfem", "q1", "B").forces
-    assert slide["Ft_mean_2_to_3"] == pytest.approx((10 * 0.1473 + 0.1564) / 11.0, rel=1e-12)
-    assert slide["Fn_after_3.0"] == 0.5214
+    slide = [[1.0, 0.1473, 0.0]] * 44 + [[0.5214, 0.1564, 0.0]]
+    found = problem.quantities("B", slide)
+    assert found["Ft_mean_2_to_3"] == pytest.approx((10 * 0.1473 + 0.1564) / 11.0, rel=1e-12)
+    assert found["Fn_after_3.0"] == 0.5214
 
 
 def test_cost_of_an_error_between_levels():
@@ -296,42 +188,10 @@ def test_cost_of_an_error_between_levels():
     assert numbers.cost_of(0.4, []) is None
 
 
-def test_path_of_the_bone():
-    press, slide = problem.path("A"), problem.path("B")
-    assert press.shape == (15, 2)
-    assert np.allclose(press[[0, -1]], [[0.0, 0.1], [0.0, 1.5]])
-    assert np.allclose(slide[[15, -1]], [[0.1, 1.5], [3.0, 1.5]])
-
-
-def test_memory_is_that_of_this_process():
-    before = apart.resident_MB()
-    block = np.ones(40_000_000)  # 320 MB
-    assert block.nbytes / 2**20 > 300
-    assert apart.resident_MB() >= max(before, 300.0)
-
-
-def test_all_leaves_peers_out(monkeypatch, capsys):
-    cli = importlib.import_module("evfem.cli")
-    called = []
-    fake = types.SimpleNamespace(
-        NAMES=studies.NAMES, APART=studies.APART, run=lambda name, *_: called.append(name)
-    )
-    monkeypatch.setattr(cli, "studies", lambda: fake)
-    assert cli.main(["study", "all"]) == 0
-    assert "peers" in studies.NAMES
-    assert called == [name for name in studies.NAMES if name not in ("peers", "campaign")]
-
-
 def raced(package, element, way, costs, errors):
-    """Runs of scene A on the levels 0, 1, ...: CPU seconds, and how far off the forces are (%)."""
-    depths = 1.5 * np.arange(1, way.press + 1) / way.press
-    reference = [problem.REFERENCE["A"].get(f"Fn_at_{depth:.1f}", 1.0) for depth in depths]
-    runs = []
-    for level, (cost, error) in enumerate(zip(costs, errors, strict=True)):
-        history = [[(1.0 + 0.01 * error) * force, 0.0, 0.0] for force in reference]
-        found = dict.fromkeys(numbers.MEASURED, cost) | {"history": history}
-        runs.append(numbers.Run(package, element, "A", level, found, way))
-    return runs
+    """Runs on the levels 0, 1, ...: CPU seconds, and how far off the forces are (%)."""
+    found = enumerate(zip(costs, errors, strict=True))
+    return [run(package, element, cpu, 1.0 + 0.01 * error, level, way) for level, (cpu, error) in found]
 
 
 def test_in_the_race_each_has_its_best_number_of_steps():
@@ -345,7 +205,7 @@ def test_in_the_race_each_has_its_best_number_of_steps():
         *raced("getfem", "q2", given, (3.0, 9.0), (2.0, 1.0)),
         *raced("getfem", "q2", few, (5.0,), (0.1,)),
     ]
-    found = race.numbers(runs)
+    found = numbers.race(runs)
     assert found["race.A.15+30_steps.evfem.cpu_s"] == pytest.approx(2.0)
     assert "race.A.15+30_steps.getfem.cpu_s" not in found
     assert found["race.A.best.evfem.cpu_s"] == pytest.approx(0.5)

@@ -1,34 +1,18 @@
-"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass
-unseen.
-"""
-
-import importlib
-import importlib.util
-import json
+"""The study of stability: its quick cases end as they should, and a judge that lets nothing pass unseen."""
 
 import numpy as np
 import pytest
+from evfem.studies.stability import case, figure, scenes
+from evfem.studies.stability import study as stability
 
 from evfem.errors import InputError
 from evfem.scene.motion import Press, Slide
 from evfem.surface.surfaces import Flat, Sinusoid
 
-studies = importlib.import_module("evfem.studies" if importlib.util.find_spec("evfem.studies") else "studies")
-stability, case, scenes, figure = (
-    importlib.import_module(f"{studies.__name__}.stability.{name}")
-    for name in ("study", "case", "scenes", "figure")
-)
-
-
-@pytest.fixture(scope="module")
-def quick(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("stability")
-    return studies.run("stability", quick=True, out=folder), folder
-
 
 @pytest.mark.slow
-def test_every_quick_case_ends_as_it_should(quick):
-    result, _ = quick
+def test_every_quick_case_ends_as_it_should(study):
+    result, _ = study("stability")
     bad = {
         key: one for key, one in result["assumptions"]["cases"].items() if one["outcome"] not in case.PASSED
     }
@@ -37,24 +21,11 @@ def test_every_quick_case_ends_as_it_should(quick):
 
 
 @pytest.mark.slow
-def test_forces_balance_in_every_step_of_the_quick_cases(quick):
-    numbers = quick[0]["numbers"]
+def test_forces_balance_in_every_step_of_the_quick_cases(numbers_of):
+    numbers = numbers_of("stability")
     errors = {key: value for key, value in numbers.items() if key.endswith("force_error")}
     assert len(errors) >= 15
     assert max(errors.values()) < 1e-6  # of forces down to 1e-6 N/mm
-
-
-@pytest.mark.slow
-def test_study_leaves_table_numbers_and_picture(quick):
-    result, folder = quick
-    assert sorted(p.name for p in folder.iterdir()) == [
-        f"stability.{end}" for end in ("csv", "json", "md", "png")
-    ]
-    assert json.loads((folder / "stability.json").read_text()) == json.loads(json.dumps(result))
-    page = (folder / "stability.md").read_text()
-    assert all(line in page for line in result["assumptions"]["table"])
-    assert all(line.count(",") == 3 for line in (folder / "stability.csv").read_text().splitlines())
-    assert (folder / "stability.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_every_group_of_the_study_has_a_quick_case():
@@ -66,33 +37,29 @@ def judged(function):
     return case.judge(case.Case("a group", "a case", "an expectation", function))
 
 
-def impossible(log):
-    """Half a millimetre in one part, at a tolerance that cannot be met."""
-    body, steep = scenes.finger(scenes.block()), Sinusoid(terms=[[5.0, 400.0, 0.0]], friction=2.0)
-    return log.simulate(scenes.scene(body, steep, Press(indentation=1.9, steps=1), Slide(50.0, steps=1)))
+def steep():
+    """Half a millimetre in one part over walls that no step can follow."""
+    body, walls = scenes.finger(scenes.block()), Sinusoid(terms=[[5.0, 400.0, 0.0]], friction=2.0)
+    return scenes.scene(body, walls, Press(indentation=1.9, steps=1), Slide(50.0, steps=1))
 
 
-def refuse(log):
-    return "refused" in log.refusal(lambda: refuse_it()), "said"
+def raising(error):
+    def function(*_):
+        raise error
 
-
-def refuse_it():
-    raise InputError("key", "refused", "other things")
-
-
-def broken(log):
-    raise ZeroDivisionError("by zero")
+    return function
 
 
 def test_outcomes_of_a_judge():
     assert judged(lambda log: (True, "as expected")).outcome == "passed"
     assert judged(lambda log: (False, "not as expected")).outcome == "wrong"
-    assert judged(refuse).outcome == "refused"
+    refused = raising(InputError("key", "refused", "other things"))
+    assert judged(lambda log: ("refused" in log.refusal(refused), "said")).outcome == "refused"
     assert judged(lambda log: (True, log.refusal(lambda: None))).outcome == "wrong"
-    found = judged(impossible)
+    found = judged(lambda log: log.simulate(steep()))
     assert (found.outcome, found.good) == ("not converged", False)
     assert "did not converge" in found.said
-    found = judged(broken)
+    found = judged(raising(ZeroDivisionError("by zero")))
     assert (found.outcome, found.said) == ("error", "ZeroDivisionError: by zero")
 
 
@@ -100,11 +67,7 @@ def test_a_stop_that_is_expected_passes_and_keeps_its_costs():
     def stops(log):
         with pytest.raises(AssertionError, match="finished"):
             log.stop(scenes.scene(scenes.finger(scenes.block()), Flat(friction=0.0), Press(indentation=0.1)))
-        return True, str(log.stop(log_scene()))
-
-    def log_scene():
-        body, steep = scenes.finger(scenes.block()), Sinusoid(terms=[[5.0, 400.0, 0.0]], friction=2.0)
-        return scenes.scene(body, steep, Press(indentation=1.9, steps=1), Slide(50.0, steps=1))
+        return True, str(log.stop(steep()))
 
     found = judged(stops)
     assert found.outcome == "stopped"
@@ -122,6 +85,15 @@ def test_balances_see_a_force_and_an_energy_that_are_missing():
     assert case.out_of_balance(result).max() == pytest.approx(1e-3, rel=0.01)
     result.friction_dissipation[-1] = 0.0
     assert case.lost_energy(result) > 0.01
+
+
+def test_scenes_are_alike_that_end_in_the_same_row():
+    """Without friction in two steps or one; a tenth deeper is another end."""
+    body, flat = scenes.finger(scenes.block(sag=0.4)), Flat(friction=0.0)
+    ways = ((0.4, 1), (0.4, 2), (0.44, 1))
+    once, twice, deeper = (scenes.scene(body, flat, Press(indentation=d, steps=n)) for d, n in ways)
+    assert case.alike(case.Log(), (once, twice), "normal_force stored_energy", 1e-6)[0]
+    assert not case.alike(case.Log(), (once, deeper), "normal_force", 0.05)[0]
 
 
 def test_other_images_of_a_mesh_are_the_same_body():
@@ -143,13 +115,10 @@ def area_of(mesh):
     return 0.5 * np.sum(x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y, axis=1)
 
 
-@pytest.mark.slow
-def test_picture_splits_groups_between_columns_and_marks_what_failed(quick):
+def test_picture_splits_groups_between_columns_and_marks_what_failed():
     def found(group, n, outcome="passed"):
-        return [
-            case.Found(f"{group}.{i}", group, f"{i}", "", outcome, "", 1.0, 4, 4, 0, 9, 0.0, 0.0)
-            for i in range(n)
-        ]
+        about = {"group": group, "expected": "", "outcome": outcome, "said": "", "cpu_s": 1.0}
+        return [case.Found(4, 4, 0, 9, key=f"{group}.{i}", name=f"{i}", **about) for i in range(n)]
 
     everything = found("one", 20) + found("two", 18, "wrong") + found("three", 5, "refused")
     columns = figure._columns(everything)
