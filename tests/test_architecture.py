@@ -79,8 +79,7 @@ ROOMS = {
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
-        "colours labels figures fields ground outline finger footprint curves beside pressing spectra sweeps "
-        "fits tractions meshes movie",
+        "labels figures ground fields finger footprint curves sweeps meshes movie",
     ),
     "studio": ({"numpy"}, "state page runs server"),
 }
@@ -115,7 +114,6 @@ MOST_FILES, MOST_LINES = 12, 3600
 LARGER = {
     "contact": (13, MOST_LINES),
     "electrostatics": (17, 3650),
-    "plotting": (17, MOST_LINES),
     "solver": (18, 3700),
     "textures": (16, MOST_LINES),
     "tissue": (15, MOST_LINES),

@@ -16,12 +16,10 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.faces import PLACES, shape_functions
-from evfem.plotting.colours import TISSUE
-from evfem.plotting.fields import Scale, Window, frame_of, scale_of, values_of, within
-from evfem.plotting.figures import add_colorbar, axes_or_new
+from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, scale_of, values_of, within
+from evfem.plotting.figures import TISSUE, add_colorbar, axes_or_new
 from evfem.plotting.finger import Near, checked_window, figure_height, label_bar, told
 from evfem.plotting.labels import field_label
-from evfem.plotting.outline import TRACTIONS
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 from evfem.surface.skin import Skin, make_skin
 
