@@ -16,8 +16,11 @@ from typing import NoReturn
 
 import evfem
 from evfem.common import notices
+from evfem.common.checks import keys_of
 from evfem.errors import InputError
 from evfem.templates import TEMPLATES
+from evfem.textures.generate import GENERATORS, Knobs
+from evfem.textures.importers import IMPORTERS
 
 BAD_INPUT = 2
 STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
@@ -187,7 +190,6 @@ def _texture_argument(command: argparse.ArgumentParser) -> None:
 
 
 def _about_texture(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--name", help="what it is called; default: as its file")
     out = command.add_argument(
         "--out",
         type=Path,
@@ -205,45 +207,28 @@ def _numbers(command: argparse.ArgumentParser, options: Mapping[str, tuple[float
 
 
 def _make_options(make: argparse.ArgumentParser) -> None:
-    make.add_argument("kind", choices=("grating", "sinusoids", "self_affine", "spectral"))
+    make.add_argument("kind", choices=tuple(GENERATORS))
     _about_texture(make)
+    make.add_argument("--name", help="what it is called; default: as its file")
     make.add_argument("--licence", default="CC0-1.0", help="what others may do with it; default: CC0-1.0")
-    options = {
-        "frequency": (0.5, "1/MM", "of the first wave, or the lowest"),
-        "amplitude": (0.02, "MM", "of the sine with the same root mean square"),
-        "irregularity": (0.0, "I", "0 to 1"),
-        "second": (0.0, "SHARE", "of the second harmonic of sinusoids"),
-        "phase": (0.0, "RAD", "of the second harmonic"),
-        "hurst": (None, "H", "Hurst exponent of self_affine, instead of the irregularity"),
-        "beta": (None, "BETA", "exponent of the spectrum of spectral, instead of the irregularity"),
-    }
-    _numbers(make, options)
-    make.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn; default: 0")
+    _fields(make, Knobs)
 
 
 def _import_options(command: argparse.ArgumentParser) -> None:
     file = command.add_argument("file", type=Path, metavar="FILE", help=".csv, .wav, an image or a scan")
     _complete(file, FILES)
     _about_texture(command)
-    command.add_argument("--licence", required=True, help="what others may do with it")
-    command.add_argument("--note", help="where it is from, a sentence")
-    command.add_argument("--unit", help="of lengths: mm, um, nm or m; default: mm, or what the file names")
-    command.add_argument(
-        "--quantity", help="what a recording holds: acceleration, velocity, displacement, ..."
-    )
-    command.add_argument("--channel", help="which channel of a WAV, from 1, or column of a csv file")
-    command.add_argument("--level", help="none, mean, line or parabola; default: line")
-    options = {
-        "start": (None, "MM", "where to begin"),
-        "stop": (None, "MM", "where to end"),
-        "smooth": (None, "MM", "cut-off wavelength of a Gaussian profile filter"),
-        "row": (None, "SHARE", "which line of an image or scan, 0 to 1; default: 0.5"),
-        "pixel": (None, "MM", "width of a pixel of an image"),
-        "depth": (None, "MM", "how deep black lies below white in an image"),
-        "speed": (None, "MM/S", "at which something slid while it was recorded"),
-        "longest": (None, "MM", "longest wave of a recording; default: 10"),
-    }
-    _numbers(command, options)
+    _fields(command, *IMPORTERS.values())
+
+
+def _fields(command: argparse.ArgumentParser, *classes: type) -> None:
+    """An option for each annotated field of the classes, None where it is not given."""
+    for key in {key.name: key for one in classes for key in keys_of(one)}.values():
+        default = "" if key.required or key.default is None else f"; default: {key.default}"
+        kind = next((one for one in (float, int) if one in key.types and str not in key.types), str)
+        said = f"{key.meaning}; {key.allowed}{default}".replace("%", "%%")
+        metavar = str(key.rule.get("unit") or key.name).upper()
+        command.add_argument(f"--{key.name}", type=kind, metavar=metavar, help=said)
 
 
 def _touch_options(command: argparse.ArgumentParser) -> None:

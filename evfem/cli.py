@@ -395,7 +395,7 @@ def _signal(given: argparse.Namespace) -> int:
 
 
 def _texture(given: argparse.Namespace) -> int:
-    from evfem.textures.commands import run
+    from evfem.estimate.commands import run
 
     run(given)
     return DONE

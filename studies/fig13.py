@@ -17,11 +17,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.electrostatics.laws import Kaczmarek
+from evfem.estimate.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.export import paraview
 from evfem.plotting import side_by_side
 from evfem.scene.motion import Slide
 from evfem.scene.scene import Output
-from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.simulation.result import Frame, Result
 from evfem.surface.surfaces import Display
 

@@ -14,11 +14,7 @@ from dataclasses import dataclass, field, replace
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
-from evfem.finger.fingerpad import Electrical, FingerPad
-from evfem.finger.layers import TABLE_2
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
-from evfem.simulation.rendering import (
+from evfem.estimate.rendering import (
     ApparentFriction,
     Recording,
     Signal,
@@ -29,6 +25,10 @@ from evfem.simulation.rendering import (
     replay,
     voltage_for,
 )
+from evfem.finger.fingerpad import Electrical, FingerPad
+from evfem.finger.layers import TABLE_2
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Output, Scene, Solver
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import NeoHookean
 

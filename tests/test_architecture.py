@@ -65,7 +65,7 @@ ROOMS = {
     ),
     "simulation": (
         {"numpy", "scipy"},
-        "provenance history result spectrum model doubtful works ledger checkpoint failure run rendering",
+        "provenance history result spectrum model doubtful works ledger checkpoint failure run",
     ),
     "sweeps": (
         {"numpy", "tomli_w", "tqdm", "pyarrow"},
@@ -74,8 +74,11 @@ ROOMS = {
     "calibration": ({"numpy", "scipy", "tomli_w"}, "measured parameters runs confidence result fit"),
     "textures": (
         {"numpy", "scipy", "PIL", "SurfaceTopography"},
-        "texture generate library cleaning importing scans parametric touch pressed sliding correction "
-        "estimators database estimate feeling commands",
+        "texture generate library importing importers",
+    ),
+    "estimate": (
+        {"numpy", "scipy"},
+        "rendering parametric touch pressed sliding correction estimators database estimate feeling commands",
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},
@@ -115,7 +118,6 @@ LARGER = {
     "contact": (13, MOST_LINES),
     "electrostatics": (17, 3650),
     "solver": (18, 3700),
-    "textures": (16, MOST_LINES),
     "tissue": (15, MOST_LINES),
 }
 #: lines by which a folder may be below its own limit before that must follow

@@ -87,8 +87,8 @@ def _work(line: Connection, text: str, exact: bool) -> None:
 
 
 def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:
+    from evfem.estimate.touch import friction_of, touch_scene
     from evfem.simulation.run import simulate
-    from evfem.textures.touch import friction_of, touch_scene
 
     scene = touch_scene(state.texture, state.touch)
     steps = sum(one.steps for one in scene.motion)
@@ -102,9 +102,9 @@ def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:
 
 
 def _send_exact(send: Callable[[dict[str, Any]], None], state: State) -> None:
-    from evfem.simulation.rendering import record
-    from evfem.textures.feeling import exact_voltage
-    from evfem.textures.touch import friction_of, touch_scene
+    from evfem.estimate.feeling import exact_voltage
+    from evfem.estimate.rendering import record
+    from evfem.estimate.touch import friction_of, touch_scene
 
     observer: Observer = _Steps(send)
     reference = record(touch_scene(state.texture, state.touch), (observer,))

@@ -15,11 +15,11 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
-from evfem.textures.feeling import Device, ExactCurve
+from evfem.estimate.feeling import Device, ExactCurve
+from evfem.estimate.touch import FrictionCurve, Touch
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch
 
 #: most rows of a texture, and of a friction curve, that a page sends
 MOST_ROWS = 2000

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError, NotConverged
-from evfem.simulation.rendering import ApparentFriction
+from evfem.estimate.rendering import ApparentFriction
 
 pytestmark = pytest.mark.solver
 

@@ -123,9 +123,9 @@ def test_an_upload_is_read_by_the_importers_under_a_harmless_name():
     assert (found["name"], found["quantity"], len(found["x"])) == ("passwd", "height", 50)
     with pytest.raises(InputError, match="licence"):
         page.uploaded(data, "a.csv", {})
-    with pytest.raises(InputError, match="pixel: given"):
+    with pytest.raises(InputError, match="pixel: missing"):
         page.uploaded(b"\x89PNG", "a.png", {"licence": "CC0-1.0"})
-    with pytest.raises(InputError, match="smooth: given 'x'"):
+    with pytest.raises(InputError, match='smooth: given "x"'):
         page.uploaded(data, "a.csv", {"licence": "CC0-1.0", "smooth": "x"})
 
 

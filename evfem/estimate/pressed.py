@@ -27,6 +27,7 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.signorini import OPEN
+from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
@@ -34,7 +35,6 @@ from evfem.simulation.run import Run
 from evfem.solver.condensation import make_condensation
 from evfem.surface.edge import outline_nodes
 from evfem.surface.surfaces import Flat
-from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 
 FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-1"
 #: what is remembered: loads (N/mm) and friction coefficients

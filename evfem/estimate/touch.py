@@ -15,6 +15,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Within, check_fields, number, yes_or_no
 from evfem.errors import InputError
+from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 from evfem.finger.fingerpad import FingerPad
 from evfem.protocols import Observer
 from evfem.scene.motion import Press, Slide
@@ -22,7 +23,6 @@ from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Profile
-from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 from evfem.textures.texture import Texture
 
 #: steps of each mm and of a whole slide, rows of a friction table, mm of texture beside the finger

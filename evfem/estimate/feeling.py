@@ -27,7 +27,7 @@ from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
-from evfem.simulation.rendering import (
+from evfem.estimate.rendering import (
     NOISE,
     ApparentFriction,
     Comparison,
@@ -37,8 +37,8 @@ from evfem.simulation.rendering import (
     exact,
     voltage_for,
 )
+from evfem.estimate.touch import FrictionCurve, Touch, friction_of
 from evfem.surface.surfaces import Display
-from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
@@ -119,8 +119,8 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
     """What is `felt` (n,) against the wish."""
-    frequency, wanted = _amplitudes(curve.x, curve.friction, speed)
-    _, given = _amplitudes(curve.x, felt, speed)
+    frequency, wanted = amplitudes(curve.x, curve.friction, speed)
+    _, given = amplitudes(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
     return Rendering(
         curve=curve,
@@ -139,7 +139,7 @@ def _relative(found: Floats, wanted: Floats) -> float:
     return float(np.linalg.norm(found - wanted)) / size if size > 1e-12 else float("nan")
 
 
-def _amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
+def amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
     """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window.
 
     scipy.signal.periodogram would be as long, and its import takes half a second.

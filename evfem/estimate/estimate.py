@@ -23,14 +23,14 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.common.pools import blas_limits
 from evfem.errors import InputError
-from evfem.textures.correction import corrected
-from evfem.textures.database import Database, reference_curves, shipped
+from evfem.estimate.correction import corrected
+from evfem.estimate.database import Database, reference_curves, shipped
+from evfem.estimate.parametric import SPEED, Parametric, at
+from evfem.estimate.pressed import shipped_pad
+from evfem.estimate.sliding import slid
+from evfem.estimate.touch import FrictionCurve, Touch, steps_over, surface_of
 from evfem.textures.library import REFERENCES, reference
-from evfem.textures.parametric import SPEED, Parametric, at
-from evfem.textures.pressed import shipped_pad
-from evfem.textures.sliding import slid
 from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch, steps_over, surface_of
 
 #: wavelengths that are tried for a texture that ends, share of its waves' variance that is enough,
 #: mm before and behind the slide over a texture that does not repeat within it

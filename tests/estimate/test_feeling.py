@@ -5,10 +5,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evfem.simulation.rendering import record
-from evfem.textures.feeling import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
+from evfem.estimate.feeling import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
+from evfem.estimate.rendering import record
+from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
 from evfem.textures.library import reference
-from evfem.textures.touch import FrictionCurve, Touch, friction_of, touch_scene
 
 X = np.arange(400) * 0.02  # 8 mm, at 20 mm/s 0.4 s
 TOUCH = Touch(load=0.05)
