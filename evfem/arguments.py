@@ -8,7 +8,7 @@ import argparse
 import importlib
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -16,11 +16,8 @@ from typing import NoReturn
 
 import evfem
 from evfem.common import notices
-from evfem.common.checks import keys_of
 from evfem.errors import InputError
 from evfem.templates import TEMPLATES
-from evfem.textures.generate import GENERATORS, Knobs
-from evfem.textures.importers import IMPORTERS
 
 BAD_INPUT = 2
 STATUS = "exit status: 0 done, 2 bad input, 3 a step did not converge, 4 disk failed, 130 interrupted"
@@ -50,8 +47,8 @@ def _complete(argument: argparse.Action, how: dict[str, str]) -> None:
     argument.complete = how  # type: ignore[attr-defined]
 
 
-def parser() -> argparse.ArgumentParser:
-    """All commands and options."""
+def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
+    """All commands and options; those of textures, which load numpy, where `texture` is among the words."""
     top = _Parser(
         prog="evfem",
         description="A finger pad on an electrovibration display, by finite elements.",
@@ -71,7 +68,9 @@ def parser() -> argparse.ArgumentParser:
         ("studio", "open a page in the browser, from a texture to a voltage", _studio_options),
         ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
     ):
-        options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
+        command = commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}.")
+        if name != "texture" or name in words:
+            options(command)
     return top
 
 
@@ -207,6 +206,8 @@ def _numbers(command: argparse.ArgumentParser, options: Mapping[str, tuple[float
 
 
 def _make_options(make: argparse.ArgumentParser) -> None:
+    from evfem.textures.generate import GENERATORS, Knobs
+
     make.add_argument("kind", choices=tuple(GENERATORS))
     _about_texture(make)
     make.add_argument("--name", help="what it is called; default: as its file")
@@ -215,6 +216,8 @@ def _make_options(make: argparse.ArgumentParser) -> None:
 
 
 def _import_options(command: argparse.ArgumentParser) -> None:
+    from evfem.textures.importers import IMPORTERS
+
     file = command.add_argument("file", type=Path, metavar="FILE", help=".csv, .wav, an image or a scan")
     _complete(file, FILES)
     _about_texture(command)
@@ -223,6 +226,8 @@ def _import_options(command: argparse.ArgumentParser) -> None:
 
 def _fields(command: argparse.ArgumentParser, *classes: type) -> None:
     """An option for each annotated field of the classes, None where it is not given."""
+    from evfem.common.checks import keys_of
+
     for key in {key.name: key for one in classes for key in keys_of(one)}.values():
         default = "" if key.required or key.default is None else f"; default: {key.default}"
         kind = next((one for one in (float, int) if one in key.types and str not in key.types), str)
