@@ -15,13 +15,14 @@ only adds to it, and where the amplifier cannot follow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, among, check_fields, number, one_of
+from evfem.common.checks import Checked, among, between, one_of
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
@@ -47,23 +48,19 @@ AREA, SKIN = 112.0, Layer(0.38, 1650.0)
 
 
 @dataclass(frozen=True)
-class Device:
-    """A display with its amplifier: own `friction`, force `law`, `insulator` (film or touchscreen),
-    largest effective voltage (V) and `slew` (V/s), None: without limit.
+class Device(Checked):
+    """A display with its amplifier.
 
     >>> Device(law="coulomb")
     Traceback (most recent call last):
     evfem.errors.InputError: law: given "coulomb"; allowed: strong_troxel | kaczmarek
     """
 
-    friction: float = field(default=0.25, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
-    law: str = field(default="kaczmarek", metadata=among(FORCE_LAWS))
-    insulator: str = field(default="film", metadata=one_of(*INSULATORS))
-    voltage_max: float | None = field(default=None, metadata=number("V from 1 to 1e5", Within(1.0, 1e5)))
-    slew: float | None = field(default=None, metadata=number("V/s from 1 to 1e9", Within(1.0, 1e9)))
-
-    def __post_init__(self) -> None:
-        check_fields(self)
+    friction: Annotated[float, between(0.01, 3.0), "of the display"] = 0.25
+    law: Annotated[str, among(FORCE_LAWS), "of the attraction"] = "kaczmarek"
+    insulator: Annotated[str, one_of(*INSULATORS), "on the display"] = "film"
+    voltage_max: Annotated[float | None, between(1.0, 1e5, "V"), "largest effective voltage"] = None
+    slew: Annotated[float | None, between(1.0, 1e9, "V/s"), "how fast that can change"] = None
 
     @property
     def encoding(self) -> Encoding:

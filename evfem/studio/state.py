@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
 from evfem.estimate.feeling import Device, ExactCurve
 from evfem.estimate.touch import FrictionCurve, Touch
+from evfem.scene.keys import read
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
@@ -53,8 +54,8 @@ def parse(text: str | bytes) -> State:
     table = _table("state", table, (*KEYS, "model", "exact"))
     return State(
         _texture(table.get("texture", {"reference": "weave"})),
-        _build(Touch, "touch", table.get("touch", {})),
-        _build(Device, "device", table.get("device", {})),
+        read(Touch, table.get("touch", {}), "touch"),
+        read(Device, table.get("device", {}), "device"),
         _model(table.get("model")),
         _exact(table.get("exact")),
     )
@@ -69,10 +70,6 @@ def _table(key: str, given: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
     return given
 
 
-def _build(cls: Any, key: str, given: Any) -> Any:
-    return cls(**_table(key, given, tuple(spec.name for spec in fields(cls))))
-
-
 def _texture(given: Any) -> Texture:
     """A reference texture, one by three knobs, or one by its rows."""
     if isinstance(given, dict) and "reference" in given:
@@ -81,10 +78,7 @@ def _texture(given: Any) -> Texture:
             raise InputError("texture", quoted(name), "the name of a reference texture")
         return reference(name)
     if isinstance(given, dict) and "generator" in given:
-        names = tuple(spec.name for spec in fields(Knobs))
-        knobs = dict(_table("texture", given, ("generator", *names)))
-        kind = knobs.pop("generator")
-        return make(kind, Knobs(**knobs), "dialled")
+        return make(given["generator"], read(Knobs, given, "texture", tag="generator"), "dialled")
     table = _table("texture", given, ROWS)
     missing = [key for key in ("x", "values", "licence") if key not in table]
     if missing:
