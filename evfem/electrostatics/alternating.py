@@ -10,7 +10,7 @@ length :math:`d_j / \varepsilon_j^*(\omega)` (`evfem.electrostatics.dielectrics`
 
 The pressure itself swings around its mean with twice the frequency,
 :math:`p(t) = \bar p\,[1 + \cos(2\omega t + 2 \arg E_g)]`. After a step from no charge the field
-decays with two rates (`evfem.electrostatics.charges`). A square wave +-U, slow enough for the skin
+decays with two rates (`evfem.electrostatics.relaxation`). A square wave +-U, slow enough for the skin
 to be a conductor, leaks through the gap with :math:`\tau = (\varepsilon_0 / \sigma_g)(1 + g
 \varepsilon_i / d_i)`, so that with a = 1 / (2 f tau)
 
@@ -27,9 +27,9 @@ from typing import Any
 import numpy as np
 
 from evfem.common.checks import Values, above, at_least, finite, plain
-from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.dielectrics import dielectric
 from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.relaxation import Relaxing, Sandwich
 from evfem.errors import InputError, quoted
 
 _GAP, _SIGMA = "an air gap in mm, not negative", "a conductivity in S/m, not negative"
@@ -103,7 +103,7 @@ def step_pressure(
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     voltage = np.asarray(finite("voltage", voltage, "a voltage in V"))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    layers = Layers(stack.skin + stack.insulator, np.asarray(skin_thickness) + insulator.thickness)
+    layers = Layers(stack.reference, np.asarray(skin_thickness) + insulator.thickness)
     return StrongTroxel().traction(gap, voltage * stack.step_response(gap, time), layers)
 
 
@@ -134,7 +134,8 @@ def _sandwich(
     leak = np.asarray(at_least("gap_conductivity", gap_conductivity, 0.0, _SIGMA))
     thickness = np.asarray(at_least("skin_thickness", thickness, 0.0, "a thickness in mm, not negative"))
     film = Sandwich.of(Layer(0.0, 1.0), _layer(insulator), frequency=None, gap_conductivity=leak)
-    return Sandwich(thickness / eps_r, film.insulator, (sigma / (eps_0 * eps_r), *film.rates[1:]))
+    skin = Relaxing(thickness / eps_r, 1.0, sigma / (eps_0 * eps_r))
+    return Sandwich(skin, film.insulator, film.leak, skin.thickness + film.reference)
 
 
 def square_wave_pressure(
@@ -176,7 +177,7 @@ def corner_frequencies(
     """
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    skin, leak, _ = stack.rates
-    of_gap = leak / (1.0 + gap / stack.insulator)
-    of_skin = skin / (1.0 + stack.skin / (gap + stack.insulator))
+    (skin, leak, _), film = stack.rates, stack.insulator.thickness
+    of_gap = leak / (1.0 + gap / film)
+    of_skin = skin / (1.0 + stack.skin.thickness / (gap + film))
     return plain(np.asarray(of_gap / (2.0 * np.pi))), plain(np.asarray(of_skin / (2.0 * np.pi)))
