@@ -8,7 +8,7 @@ import argparse
 import importlib
 import re
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -199,12 +199,6 @@ def _about_texture(command: argparse.ArgumentParser) -> None:
     _complete(out, FILES)
 
 
-def _numbers(command: argparse.ArgumentParser, options: Mapping[str, tuple[float | None, str, str]]) -> None:
-    for name, (default, unit, help) in options.items():
-        said = help if default is None else f"{help}; default: {default:g}"
-        command.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=said)
-
-
 def _make_options(make: argparse.ArgumentParser) -> None:
     from evfem.textures.generate import GENERATORS, Knobs
 
@@ -224,46 +218,35 @@ def _import_options(command: argparse.ArgumentParser) -> None:
     _fields(command, *IMPORTERS.values())
 
 
-def _fields(command: argparse.ArgumentParser, *classes: type) -> None:
+def _fields(command: argparse.ArgumentParser, *classes: type, **renamed: str) -> None:
     """An option for each annotated field of the classes, None where it is not given."""
     from evfem.common.checks import keys_of
 
     for key in {key.name: key for one in classes for key in keys_of(one)}.values():
+        name = renamed.get(key.name, key.name)
+        if bool in key.types:  # that the finger has ridges is usual
+            command.add_argument("--smooth-finger", action="store_false", dest=name, help="without ridges")
+            continue
         default = "" if key.required or key.default is None else f"; default: {key.default}"
         kind = next((one for one in (float, int) if one in key.types and str not in key.types), str)
         said = f"{key.meaning}; {key.allowed}{default}".replace("%", "%%")
-        metavar = str(key.rule.get("unit") or key.name).upper()
-        command.add_argument(f"--{key.name}", type=kind, metavar=metavar, help=said)
+        metavar = str(key.rule.get("unit") or name).upper()
+        command.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=said)
 
 
 def _touch_options(command: argparse.ArgumentParser) -> None:
+    from evfem.estimate.feeling import Device
+    from evfem.estimate.touch import Touch
+
     _texture_argument(command)
-    command.add_argument("--smooth-finger", action="store_true", help="a finger without ridges")
-    options = {
-        "friction": (0.3, "MU", "coefficient of the texture's material"),
-        "load": (0.05, "N/MM", "on the finger"),
-        "speed": (20.0, "MM/S", "of the slide"),
-        "length": (8.0, "MM", "of the slide"),
-    }
-    _numbers(command, options)
+    _fields(command, Touch)
     out = command.add_argument("--out", type=Path, metavar="FILE", help="csv file for the friction curve")
     signal = command.add_argument(
         "--signal", type=Path, metavar="FILE", help="file for the display's voltage; its ending says as what"
     )
     for path in (out, signal):
         _complete(path, FILES)
-    _device_options(command)
-
-
-def _device_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--law", default="kaczmarek", help="name of a force law; default: kaczmarek")
-    command.add_argument("--insulator", default="film", help="film or touchscreen; default: film")
-    options = {
-        "display": (0.25, "MU", "coefficient of the display"),
-        "voltage-max": (None, "V", "largest effective voltage of the amplifier"),
-        "slew": (None, "V/S", "how fast the effective voltage can change"),
-    }
-    _numbers(command, options)
+    _fields(command, Device, friction="display")
 
 
 def _simulate_options(command: argparse.ArgumentParser) -> None:

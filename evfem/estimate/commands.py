@@ -74,10 +74,11 @@ def _import(given: argparse.Namespace) -> None:
         print(f"- {note}")
 
 
-def _given(given: argparse.Namespace, *classes: type) -> dict[str, Any]:
+def _given(given: argparse.Namespace, *classes: type, **renamed: str) -> dict[str, Any]:
     """The options that were given of those that are fields of the classes."""
-    names = {key.name for one in classes for key in keys_of(one)}
-    return {name: value for name in sorted(names) if (value := getattr(given, name)) is not None}
+    names = dict.fromkeys(key.name for one in classes for key in keys_of(one))
+    values = {name: getattr(given, renamed.get(name, name)) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _written(texture: Texture, out: Path) -> None:
@@ -85,13 +86,13 @@ def _written(texture: Texture, out: Path) -> None:
     print(f"{texture}; in {', '.join(map(str, paths))}", flush=True)
 
 
-def touch_of(given: argparse.Namespace) -> Touch:
-    """The finger's part of the arguments."""
-    return Touch(not given.smooth_finger, given.friction, given.load, given.speed, given.length)
+def _felt(given: argparse.Namespace) -> tuple[Touch, Device]:
+    """The finger and the display."""
+    return Touch(**_given(given, Touch)), Device(**_given(given, Device, friction="display"))
 
 
 def _simulate(given: argparse.Namespace) -> None:
-    texture, touch, device = find(given.name), touch_of(given), device_of(given)
+    texture, (touch, device) = find(given.name), _felt(given)
     _check_outputs(given)
     with status(f"sliding over {texture.name}"):
         if given.exact:
@@ -109,7 +110,7 @@ def _simulate(given: argparse.Namespace) -> None:
 
 
 def _estimate(given: argparse.Namespace) -> None:
-    touch, device = touch_of(given), device_of(given)
+    touch, device = _felt(given)
     _check_outputs(given)
     found = estimate(find(given.name), touch)
     _curve(found.curve, given.out)
@@ -121,11 +122,6 @@ def _estimate(given: argparse.Namespace) -> None:
         tell(f"note: {note}")
     if given.signal is not None:
         _render(found.curve, touch, device, given.signal)
-
-
-def device_of(given: argparse.Namespace) -> Device:
-    """The display's part of the arguments."""
-    return Device(given.display, given.law, given.insulator, given.voltage_max, given.slew)
 
 
 def _check_outputs(given: argparse.Namespace) -> None:

@@ -112,14 +112,23 @@ def scene(texture: Parametric) -> Scene:
     period in `SAMPLES` steps, after a first one over whole periods until everything slips.
     """
     periods = np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength)
+    slides = [(float(periods) * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
+    return sliding(texture.surface(), texture, slides, name="texture")
+
+
+def sliding(
+    surface: Any, finger: Any, slides: list[tuple[float, int]], speed: float = SPEED, **more: Any
+) -> Scene:
+    """The coarse pad, viscous, is pressed to the `load` of a `ridged` or smooth finger and slid at that load:
+    lengths in mm and steps.
+    """
     return Scene(
-        FingerPad(resolution="coarse", ridges=texture.ridged, viscosity=VISCOSITY),
-        texture.surface(),
+        FingerPad(resolution="coarse", ridges=finger.ridged, viscosity=VISCOSITY),
+        surface,
         solver=Solver(dynamics="viscous", threads=1),
         motion=(
-            Press(force=texture.load, steps=4),
-            Slide(float(periods) * texture.wavelength, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
-            Slide(texture.wavelength, steps=SAMPLES, speed=SPEED, hold="force"),
+            Press(force=finger.load, steps=4),
+            *(Slide(length, steps=steps, speed=speed, hold="force") for length, steps in slides),
         ),
-        name="texture",
+        **more,
     )

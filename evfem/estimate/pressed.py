@@ -15,6 +15,7 @@ by from the one before: that the curves differ by less than they do from the mod
 
 from __future__ import annotations
 
+import itertools
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -28,10 +29,7 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.signorini import OPEN
-from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
-from evfem.finger.fingerpad import FingerPad
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
+from evfem.estimate.parametric import SLIP_PER_FORCE, STEPS_BEFORE, Parametric, sliding
 from evfem.simulation.run import Run
 from evfem.solver.condensation import make_condensation
 from evfem.surface.edge import outline_nodes
@@ -133,24 +131,12 @@ def write(path: Path, pads: Mapping[bool, Remembered]) -> None:
     save_arrays(path, arrays)
 
 
-def flat_scene(load: float, friction: float, ridged: bool) -> Scene:
-    """Sliding over a flat surface until the whole contact slips."""
-    slip = SLIP_PER_FORCE * friction * load
-    return Scene(
-        FingerPad(resolution="coarse", ridges=ridged, viscosity=VISCOSITY),
-        Flat(friction=friction),
-        solver=Solver(dynamics="viscous", threads=1),
-        motion=(
-            Press(force=load, steps=4),
-            Slide(slip, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
-        ),
-        name="flat",
-    )
-
-
 def remember(ridged: bool) -> Remembered:
-    """Run the model on a flat surface at `LOADS` and `FRICTIONS`, and keep what is stored of it."""
-    runs = [_slid(flat_scene(load, mu, ridged)) for load in LOADS.tolist() for mu in FRICTIONS.tolist()]
+    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until the whole contact slips, and keep
+    what is stored of it.
+    """
+    cases = itertools.product(LOADS.tolist(), FRICTIONS.tolist())
+    runs = [_slid(Parametric(friction=mu, load=load, ridged=ridged)) for load, mu in cases]
     mesh, pad = runs[0].model.mesh, runs[0].model.pad
     order = np.searchsorted(pad.nodes, outline_nodes(mesh))
     order = order[pad.free[order]]
@@ -168,8 +154,9 @@ def _y_first(vectors: Floats) -> Floats:
     return np.concatenate([vectors[:, :, 1], vectors[:, :, 0]], axis=1)
 
 
-def _slid(scene: Scene) -> Run:
-    run = Run(scene, None)
+def _slid(finger: Parametric) -> Run:
+    slide = SLIP_PER_FORCE * finger.friction * finger.load, STEPS_BEFORE
+    run = Run(sliding(Flat(friction=finger.friction), finger, [slide], name="flat"), None)
     for request in run.requests():
         run.advance(request)
         run.frames.clear()

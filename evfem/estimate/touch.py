@@ -16,11 +16,9 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, between, yes_or_no
 from evfem.errors import InputError
-from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
-from evfem.finger.fingerpad import FingerPad
+from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, sliding
 from evfem.protocols import Observer
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
+from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import Result
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Profile
@@ -65,18 +63,10 @@ def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
     The bone passes x = 0 when the second slide begins.
     """
     before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
-    return Scene(
-        FingerPad(resolution="coarse", ridges=touch.ridged, viscosity=VISCOSITY),
-        surface_of(texture, touch, before),
-        solver=Solver(dynamics="viscous", threads=1),
-        motion=(
-            Press(force=touch.load, steps=4),
-            Slide(before, steps=STEPS_BEFORE, speed=touch.speed, hold="force"),
-            Slide(touch.length, steps=steps_over(touch.length), speed=touch.speed, hold="force"),
-        ),
-        output=Output(every=every) if every else Output(),
-        name=_file_name(texture.name),
-    )
+    slides = [(before, STEPS_BEFORE), (touch.length, steps_over(touch.length))]
+    output = Output(every=every) if every else Output()
+    surface, name = surface_of(texture, touch, before), _file_name(texture.name)
+    return sliding(surface, touch, slides, touch.speed, output=output, name=name)
 
 
 def steps_over(length: float) -> int:
