@@ -56,7 +56,7 @@ class Device(Checked):
     evfem.errors.InputError: law: given "coulomb"; allowed: strong_troxel | kaczmarek
     """
 
-    friction: Annotated[float, between(0.01, 3.0), "of the display"] = 0.25
+    friction: Annotated[float, between(0.01, 3.0), "coefficient of the display"] = 0.25
     law: Annotated[str, among(FORCE_LAWS), "of the attraction"] = "kaczmarek"
     insulator: Annotated[str, one_of(*INSULATORS), "on the display"] = "film"
     voltage_max: Annotated[float | None, between(1.0, 1e5, "V"), "largest effective voltage"] = None

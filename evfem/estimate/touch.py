@@ -38,7 +38,7 @@ class Touch(Checked):
     """
 
     ridged: Annotated[bool, yes_or_no(), "whether the finger has ridges"] = True
-    friction: Annotated[float, between(0.01, 3.0), "of the texture's material, unless it is a friction"] = 0.3
+    friction: Annotated[float, between(0.01, 3.0), "coefficient of the texture's material"] = 0.3
     load: Annotated[float, between(0.001, 1.0, "N/mm"), "on the finger"] = 0.05
     speed: Annotated[float, between(0.1, 1000.0, "mm/s"), "of the slide"] = SPEED
     length: Annotated[float, between(0.5, 50.0, "mm"), "of the slide"] = 8.0

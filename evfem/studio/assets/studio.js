@@ -38,7 +38,7 @@ function state() {
     touch: {ridged: get("ridged").value === "1", friction: number("friction"), load: number("load"),
       speed: number("speed"), length: number("length")},
     device: {friction: number("display"), law: get("law").value, insulator: get("insulator").value,
-      voltage_max: most >= Number(get("voltage_max").max) ? null : most},
+      voltage_max: most >= Number(get("voltage_max").max) ? undefined : most},
   };
 }
 
