@@ -39,6 +39,7 @@ from evfem.estimate.rendering import (
     voltage_for,
 )
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of
+from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
@@ -116,8 +117,8 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
     """What is `felt` (n,) against the wish."""
-    frequency, wanted = amplitudes(curve.x, curve.friction, speed)
-    _, given = amplitudes(curve.x, felt, speed)
+    frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
+    _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
     return Rendering(
         curve=curve,
@@ -136,16 +137,11 @@ def _relative(found: Floats, wanted: Floats) -> float:
     return float(np.linalg.norm(found - wanted)) / size if size > 1e-12 else float("nan")
 
 
-def amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
-    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window.
-
-    scipy.signal.periodogram would be as long, and its import takes half a second.
-    """
-    even = np.linspace(x[0], x[-1], x.size)
-    values = np.interp(even, x, friction)
-    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size)
-    amplitude = 2.0 / x.size * np.abs(np.fft.rfft((values - values.mean()) * window))
-    return np.arange(1.0, amplitude.size) * speed / float(x[-1] - x[0]), amplitude[1:]
+def spectrum_of(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
+    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window."""
+    even = np.interp(np.linspace(x[0], x[-1], x.size), x, friction)
+    amplitude = amplitudes(even, "hann")[1:]
+    return np.arange(1.0, amplitude.size + 1.0) * speed / float(x[-1] - x[0]), amplitude
 
 
 def _band(

@@ -17,7 +17,7 @@ from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
 from evfem.errors import InputError
 from evfem.estimate.estimate import estimate
-from evfem.estimate.feeling import Device, Rendering, amplitudes, playback, render, render_exact
+from evfem.estimate.feeling import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.touch import FrictionCurve, touch_scene
 from evfem.scene.file import dump
 from evfem.scene.keys import read
@@ -79,8 +79,8 @@ def answer(state: State) -> dict[str, Any]:
     voltage = np.asarray(found.signal.profile(x))
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
     wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
-    frequency, wished = amplitudes(x, wish, state.touch.speed)
-    given = amplitudes(x, felt, state.touch.speed)[1]
+    frequency, wished = spectrum_of(x, wish, state.touch.speed)
+    given = spectrum_of(x, felt, state.touch.speed)[1]
     return {
         "quantity": state.texture.quantity,
         "x": _short(x),
