@@ -235,7 +235,7 @@ def _fields(command: argparse.ArgumentParser, *classes: type, **renamed: str) ->
 
 
 def _touch_options(command: argparse.ArgumentParser) -> None:
-    from evfem.estimate.feeling import Device
+    from evfem.estimate.display import Device
     from evfem.estimate.touch import Touch
 
     _texture_argument(command)

@@ -78,7 +78,7 @@ ROOMS = {
     ),
     "estimate": (
         {"numpy", "scipy"},
-        "rendering parametric touch pressed sliding correction estimators database estimate feeling commands",
+        "rendering parametric touch pressed sliding correction estimators database estimate display commands",
     ),
     "plotting": (
         {"numpy", "scipy", "matplotlib", "PIL"},

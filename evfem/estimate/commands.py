@@ -16,8 +16,8 @@ from evfem.common.tables import csv_text
 from evfem.electrostatics.signalfile import write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
+from evfem.estimate.display import Device, exact_voltage, playback, render
 from evfem.estimate.estimate import estimate, known_error
-from evfem.estimate.feeling import Device, exact_voltage, playback, render
 from evfem.estimate.rendering import record
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of, simulate_texture, touch_scene
 from evfem.scene.keys import at, read

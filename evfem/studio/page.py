@@ -16,8 +16,8 @@ from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
 from evfem.errors import InputError
+from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.estimate import estimate
-from evfem.estimate.feeling import Device, Rendering, playback, render, render_exact, spectrum_of
 from evfem.estimate.touch import FrictionCurve, touch_scene
 from evfem.scene.file import dump
 from evfem.scene.keys import read

@@ -89,7 +89,7 @@ def _work(line: Connection, text: str, exact: bool) -> None:
 
 def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, Any]]:
     """The friction curve, then the exact voltage or the pictures."""
-    from evfem.estimate.feeling import exact_voltage
+    from evfem.estimate.display import exact_voltage
     from evfem.estimate.rendering import record
     from evfem.estimate.touch import friction_of, touch_scene
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
-from evfem.estimate.feeling import Device, ExactCurve
+from evfem.estimate.display import Device, ExactCurve
 from evfem.estimate.touch import FrictionCurve, Touch
 from evfem.scene.keys import read
 from evfem.textures.generate import Knobs, make

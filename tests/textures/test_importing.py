@@ -4,6 +4,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -303,7 +304,7 @@ def test_without_the_extra_a_scan_is_refused_with_what_to_install(tmp_path, monk
 
 def test_an_importer_of_ones_own_is_found_by_its_ending_and_has_its_options(tmp_path, capsys):
     """One class: the command line and the page have its options."""
-    try:
+    with patch.dict(IMPORTERS):
 
         @dataclass(frozen=True, kw_only=True)
         class Stairs(Heights, kind="stairs"):
@@ -324,5 +325,3 @@ def test_an_importer_of_ones_own_is_found_by_its_ending_and_has_its_options(tmp_
         assert cli.main([*words, "--riser", "0.1"]) == 0
         assert read(tmp_path / "a.json").values.max() == pytest.approx(0.3)
         assert b"Riser (mm): height of a step" in page.with_choices(b"<!-- importers -->")
-    finally:
-        IMPORTERS.pop("stairs", None)

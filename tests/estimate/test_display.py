@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evfem.estimate.feeling import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
+from evfem.estimate.display import BANDS, Device, ExactCurve, exact_voltage, playback, render, render_exact
 from evfem.estimate.rendering import record
 from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
 from evfem.textures.library import reference
