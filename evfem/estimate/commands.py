@@ -19,7 +19,7 @@ from evfem.errors import InputError, quoted
 from evfem.estimate.display import Device, exact_voltage, playback, render
 from evfem.estimate.estimate import estimate, known_error
 from evfem.estimate.rendering import record
-from evfem.estimate.touch import FrictionCurve, Touch, friction_of, simulate_texture, touch_scene
+from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
 from evfem.scene.keys import at, read
 from evfem.textures.generate import Knobs, make
 from evfem.textures.importers import IMPORTERS, importer_of
@@ -95,16 +95,13 @@ def _simulate(given: argparse.Namespace) -> None:
     texture, (touch, device) = find(given.name), _felt(given)
     _check_outputs(given)
     with status(f"sliding over {texture.name}"):
-        if given.exact:
-            found = exact_voltage(record(touch_scene(texture, touch)), device)
-            curve = friction_of(found.reference.result)
-        else:
-            curve = simulate_texture(texture, touch)
+        reference = record(touch_scene(texture, touch))
+        exact, comparison = exact_voltage(reference, device) if given.exact else (None, None)
+    curve = friction_of(reference.result)
     _curve(curve, given.out)
-    if given.exact:
-        print(f"exact: {found.comparison}")
-        profile = VoltageProfile(found.curve.x, found.curve.voltage)
-        _signal(profile, touch, device, given.signal)
+    if exact is not None:
+        print(f"exact: {comparison}")
+        _signal(VoltageProfile(exact.x, exact.voltage), touch, device, given.signal)
     elif given.signal is not None:
         _render(curve, touch, device, given.signal)
 

@@ -187,26 +187,13 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     return _compared(curve, signal, felt, touch.speed)
 
 
-@dataclass(frozen=True, eq=False)
-class Exact:
-    """The coupled model's own voltage for a texture: both recordings, and how they compare."""
-
-    reference: Recording
-    display: Recording
-    comparison: Comparison
-
-    @property
-    def curve(self) -> ExactCurve:
-        """Voltage and friction over the position of the second slide, x = 0 where the texture begins."""
-        felt, result = friction_of(self.display.result), self.display.result
-        return ExactCurve(felt.x, result.voltage[result.motion_index == 2], felt.friction)
-
-
-def exact_voltage(reference: Recording, device: Device) -> Exact:
+def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
     """The display's voltage that gives the same friction force as a recorded slide of `touch_scene`
-    over a texture, step by step (`rendering.exact`). Takes another run of the model.
+    over a texture, step by step (`rendering.exact`), from where the texture begins, and how the forces
+    compare. Takes another run of the model.
     """
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    rendered = exact(reference, display, FORCE_LAWS[device.law](), largest)
-    return Exact(reference, rendered, compare(reference.result, rendered.result))
+    result = exact(reference, display, FORCE_LAWS[device.law](), largest).result
+    felt, voltage = friction_of(result), result.voltage[result.motion_index == 2]
+    return ExactCurve(felt.x, voltage, felt.friction), compare(reference.result, result)

@@ -7,7 +7,6 @@ rigid surface; a friction profile lies on a level one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -17,10 +16,8 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import Checked, between, yes_or_no
 from evfem.errors import InputError
 from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, sliding
-from evfem.protocols import Observer
 from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import Result
-from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Profile
 from evfem.textures.texture import Texture
 
@@ -97,8 +94,3 @@ def friction_of(result: Result) -> FrictionCurve:
         raise InputError("result", "no second slide", "the result of a scene of touch_scene")
     x = result.position[last] - result.position[~last][-1]
     return FrictionCurve(x, result.applied_tangential_force[last] / result.applied_force[last], "model")
-
-
-def simulate_texture(texture: Texture, touch: Touch, observers: Sequence[Observer] = ()) -> FrictionCurve:
-    """Slide over the texture by the full model."""
-    return friction_of(simulate(touch_scene(texture, touch), observers=observers))

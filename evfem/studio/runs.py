@@ -99,7 +99,7 @@ def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, 
     curve = friction_of(reference.result)
     yield {"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}}
     if exact:
-        found = exact_voltage(reference, state.device).curve
+        found = exact_voltage(reference, state.device)[0]
         columns = {
             "x": found.x.round(6),
             "voltage": found.voltage.round(4),
