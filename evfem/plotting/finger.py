@@ -69,13 +69,17 @@ def deformed(
     """
     check_field(field)
     check_plane(result.mesh)
-    view = View(result, frame_of(result, frame), field)
+    return picture(View(result, frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
+
+
+def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax: Axes | None) -> Axes:
+    """A view (`View`, or that of a skin) with its title and colour bar."""
     window = view.window(near)
-    scale = scale_of(field, view.shown(window), vmin, vmax)
+    scale = scale_of(view.scaled_as, view.shown(window), *limits)
     ax = axes_or_new(ax, figure_height(window))
-    mapped = view.draw(ax, window, scale, smooth)
-    ax.set_title(told(result, view.frame), fontsize="medium")
-    label_bar(add_colorbar(mapped, ax, field_label(field), scale.extend), field)
+    mapped = view.draw(ax, window, scale)
+    ax.set_title(told(view.result, view.frame), fontsize="medium")
+    label_bar(add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
     return ax
 
 
@@ -130,11 +134,12 @@ def _height(window: Window) -> float:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A frame of a result, and the field that it is coloured by."""
+    """A frame of a result, and the field that it is coloured by, `smooth` or cell by cell."""
 
     result: Result
     frame: Frame
     field: str
+    smooth: bool = True
 
     @property
     def points(self) -> Floats:
@@ -163,14 +168,14 @@ class View:
         """The values inside a window."""
         return shown_values(self.result.mesh, self.frame, self.field, window)
 
-    def draw(self, ax: Axes, window: Window, scale: Scale, smooth: bool = True) -> Any:
+    def draw(self, ax: Axes, window: Window, scale: Scale) -> Any:
         """Draw the view into axes, and return what a colour bar needs."""
         mesh, points = self.result.mesh, self.points
         height = height_of(self.result, self.frame)
         if self.field in POINT_FIELDS:
             mapped = draw_outline(ax, mesh, self.frame, self.field, scale)
         else:
-            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, smooth)
+            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, self.smooth)
         _draw_borders(ax, mesh, points)
         _name_bone(ax, mesh, points, window)
         _draw_surface(ax, height, window)
