@@ -1,16 +1,18 @@
-"""Writes what stands in the documentation about keys and columns from the package itself:
-`python docs/tables.py` after a change of either. A test compares.
+"""Writes what stands in the documentation about keys, columns and importers from the
+package itself: `python docs/tables.py` after a change of one. A test compares.
 """
 
 import re
 import textwrap
 from pathlib import Path
 
+from evfem.common.checks import Key, keys_of
 from evfem.scene import schema as scenes
 from evfem.scene.schema import Entry, Section
 from evfem.simulation.history import MEANINGS
 from evfem.simulation.result import COLUMNS, UNITS
 from evfem.sweeps import schema as sweeps
+from evfem.textures.importers import IMPORTERS
 
 DOCS = Path(__file__).parent
 WIDTH = 99
@@ -23,6 +25,7 @@ Each key with type, unit, default and what is allowed, as the reader of the file
 `evfem schema` prints the same as a JSON schema, with which an editor completes and checks keys
 ([how](../commandline.md#keys-in-an-editor)); `evfem init` writes a scene to begin with.
 """
+OPTIONS = re.compile("(<!-- importers -->)\n.*?(<!-- end -->)", re.S)
 TABLE = re.compile(r"(?<=^## Columns of the history\n\n)(.*?\n\n)\|.*?\n\n", re.M | re.S)
 
 
@@ -74,11 +77,30 @@ def columns(text: str) -> str:
     return TABLE.sub(lambda found: found[1] + "\n".join(lines) + "\n\n", text)
 
 
+def importers(text: str) -> str:
+    """The page on textures with the options of all kinds of files."""
+    keys = {key.name: key for one in IMPORTERS.values() for key in keys_of(one)}
+    lines = []
+    for name in keys:
+        kinds = [kind for kind, one in IMPORTERS.items() if name in {key.name for key in keys_of(one)}]
+        whose = ", ".join(kinds) if len(kinds) < len(IMPORTERS) else "all"
+        lines.append(filled(f"- `--{name}` ({whose}): {_told(keys[name])}."))
+    return OPTIONS.sub(lambda found: found[1] + "\n\n" + "\n".join(lines) + "\n\n" + found[2], text)
+
+
+def _told(key: Key) -> str:
+    unit = f" in {key.rule['unit']}" if key.rule.get("unit") else ""
+    default = "; needed" if key.required else f"; default {key.default}" if key.default is not None else ""
+    return f"{key.meaning}{unit}; {key.allowed}{default}".replace("|", "or")
+
+
 def main() -> None:
-    """Write both pages."""
+    """Write the pages."""
     (DOCS / "reference" / "keys.md").write_text(page(), encoding="utf-8")
     notation = DOCS / "notation.md"
     notation.write_text(columns(notation.read_text(encoding="utf-8")), encoding="utf-8")
+    textures = DOCS / "howto" / "texture.md"
+    textures.write_text(importers(textures.read_text(encoding="utf-8")), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -68,7 +68,7 @@ _NAMES = {
     "sweeps.samples": ("Normal", "Samples", "Uniform"),
     "tensor": ("ddot", "det", "dot", "inv", "mul", "positive_part", "trace", "transpose"),
     "textures.texture": ("Texture",),
-    "textures.touch": ("Touch",),
+    "estimate.touch": ("Touch",),
     "tissue.forms": ("form", "grad"),
     "tissue.laws": ("LinearElastic", "NeoHookean", "Ogden", "Yeoh"),
 }
@@ -84,7 +84,7 @@ _MODULES = {
     "plotting": "plotting",
     "protocols": "protocols",
     "reference": "reference",
-    "rendering": "simulation.rendering",
+    "rendering": "estimate.rendering",
     "result": "simulation.result",
     "scenefile": "scene.file",
     "signals": "electrostatics.signals",

@@ -45,6 +45,8 @@ from evfem.errors import InputError as InputError
 from evfem.errors import NotConverged as NotConverged
 from evfem.errors import StopRun as StopRun
 from evfem.errors import StorageError as StorageError
+from evfem.estimate import rendering as rendering
+from evfem.estimate.touch import Touch as Touch
 from evfem.finger.fingerpad import Electrical as Electrical
 from evfem.finger.fingerpad import FingerPad as FingerPad
 from evfem.finger.fingerpad import MeshedFinger as MeshedFinger
@@ -67,7 +69,6 @@ from evfem.scene.scene import Scene as Scene
 from evfem.scene.scene import default_scene as default_scene
 from evfem.scene.terms import Boundary as Boundary
 from evfem.scene.terms import Region as Region
-from evfem.simulation import rendering as rendering
 from evfem.simulation import result as result
 from evfem.simulation.checkpoint import Checkpoint as Checkpoint
 from evfem.simulation.result import Frame as Frame
@@ -104,7 +105,6 @@ from evfem.tensor import positive_part as positive_part
 from evfem.tensor import trace as trace
 from evfem.tensor import transpose as transpose
 from evfem.textures.texture import Texture as Texture
-from evfem.textures.touch import Touch as Touch
 from evfem.tissue import laws as _laws
 from evfem.tissue.forms import form as form
 from evfem.tissue.forms import grad as grad

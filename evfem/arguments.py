@@ -8,7 +8,7 @@ import argparse
 import importlib
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection
 from difflib import get_close_matches
 from pathlib import Path
 from types import ModuleType
@@ -50,8 +50,8 @@ def _complete(argument: argparse.Action, how: dict[str, str]) -> None:
     argument.complete = how  # type: ignore[attr-defined]
 
 
-def parser() -> argparse.ArgumentParser:
-    """All commands and options."""
+def parser(words: Collection[str] = ("texture",)) -> argparse.ArgumentParser:
+    """All commands and options; those of textures, which load numpy, where `texture` is among the words."""
     top = _Parser(
         prog="evfem",
         description="A finger pad on an electrovibration display, by finite elements.",
@@ -72,7 +72,9 @@ def parser() -> argparse.ArgumentParser:
         ("studio", "open a page in the browser, from a texture to a voltage", _studio_options),
         ("schema", "print the keys of scenes or sweeps as a JSON schema for editors", _schema_options),
     ):
-        options(commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}."))
+        command = commands.add_parser(name, help=does, description=f"{does[0].upper()}{does[1:]}.")
+        if name != "texture" or name in words:
+            options(command)
     return top
 
 
@@ -191,7 +193,6 @@ def _texture_argument(command: argparse.ArgumentParser) -> None:
 
 
 def _about_texture(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--name", help="what it is called; default: as its file")
     out = command.add_argument(
         "--out",
         type=Path,
@@ -202,82 +203,54 @@ def _about_texture(command: argparse.ArgumentParser) -> None:
     _complete(out, FILES)
 
 
-def _numbers(command: argparse.ArgumentParser, options: Mapping[str, tuple[float | None, str, str]]) -> None:
-    for name, (default, unit, help) in options.items():
-        said = help if default is None else f"{help}; default: {default:g}"
-        command.add_argument(f"--{name}", type=float, default=default, metavar=unit, help=said)
-
-
 def _make_options(make: argparse.ArgumentParser) -> None:
-    make.add_argument("kind", choices=("grating", "sinusoids", "self_affine", "spectral"))
+    from evfem.textures.generate import GENERATORS, Knobs
+
+    make.add_argument("kind", choices=tuple(GENERATORS))
     _about_texture(make)
+    make.add_argument("--name", help="what it is called; default: as its file")
     make.add_argument("--licence", default="CC0-1.0", help="what others may do with it; default: CC0-1.0")
-    options = {
-        "frequency": (0.5, "1/MM", "of the first wave, or the lowest"),
-        "amplitude": (0.02, "MM", "of the sine with the same root mean square"),
-        "irregularity": (0.0, "I", "0 to 1"),
-        "second": (0.0, "SHARE", "of the second harmonic of sinusoids"),
-        "phase": (0.0, "RAD", "of the second harmonic"),
-        "hurst": (None, "H", "Hurst exponent of self_affine, instead of the irregularity"),
-        "beta": (None, "BETA", "exponent of the spectrum of spectral, instead of the irregularity"),
-    }
-    _numbers(make, options)
-    make.add_argument("--seed", type=int, default=0, metavar="N", help="of what is drawn; default: 0")
+    _fields(make, Knobs)
 
 
 def _import_options(command: argparse.ArgumentParser) -> None:
+    from evfem.textures.importers import IMPORTERS
+
     file = command.add_argument("file", type=Path, metavar="FILE", help=".csv, .wav, an image or a scan")
     _complete(file, FILES)
     _about_texture(command)
-    command.add_argument("--licence", required=True, help="what others may do with it")
-    command.add_argument("--note", help="where it is from, a sentence")
-    command.add_argument("--unit", help="of lengths: mm, um, nm or m; default: mm, or what the file names")
-    command.add_argument(
-        "--quantity", help="what a recording holds: acceleration, velocity, displacement, ..."
-    )
-    command.add_argument("--channel", help="which channel of a WAV, from 1, or column of a csv file")
-    command.add_argument("--level", help="none, mean, line or parabola; default: line")
-    options = {
-        "start": (None, "MM", "where to begin"),
-        "stop": (None, "MM", "where to end"),
-        "smooth": (None, "MM", "cut-off wavelength of a Gaussian profile filter"),
-        "row": (None, "SHARE", "which line of an image or scan, 0 to 1; default: 0.5"),
-        "pixel": (None, "MM", "width of a pixel of an image"),
-        "depth": (None, "MM", "how deep black lies below white in an image"),
-        "speed": (None, "MM/S", "at which something slid while it was recorded"),
-        "longest": (None, "MM", "longest wave of a recording; default: 10"),
-    }
-    _numbers(command, options)
+    _fields(command, *IMPORTERS.values())
+
+
+def _fields(command: argparse.ArgumentParser, *classes: type, **renamed: str) -> None:
+    """An option for each annotated field of the classes, None where it is not given."""
+    from evfem.common.checks import keys_of
+
+    for key in {key.name: key for one in classes for key in keys_of(one)}.values():
+        name = renamed.get(key.name, key.name)
+        if bool in key.types:  # that the finger has ridges is usual
+            command.add_argument("--smooth-finger", action="store_false", dest=name, help="without ridges")
+            continue
+        default = "" if key.required or key.default is None else f"; default: {key.default}"
+        kind = next((one for one in (float, int) if one in key.types and str not in key.types), str)
+        said = f"{key.meaning}; {key.allowed}{default}".replace("%", "%%")
+        metavar = str(key.rule.get("unit") or name).upper()
+        command.add_argument(f"--{name.replace('_', '-')}", type=kind, metavar=metavar, help=said)
 
 
 def _touch_options(command: argparse.ArgumentParser) -> None:
+    from evfem.estimate.display import Device
+    from evfem.estimate.touch import Touch
+
     _texture_argument(command)
-    command.add_argument("--smooth-finger", action="store_true", help="a finger without ridges")
-    options = {
-        "friction": (0.3, "MU", "coefficient of the texture's material"),
-        "load": (0.05, "N/MM", "on the finger"),
-        "speed": (20.0, "MM/S", "of the slide"),
-        "length": (8.0, "MM", "of the slide"),
-    }
-    _numbers(command, options)
+    _fields(command, Touch)
     out = command.add_argument("--out", type=Path, metavar="FILE", help="csv file for the friction curve")
     signal = command.add_argument(
         "--signal", type=Path, metavar="FILE", help="file for the display's voltage; its ending says as what"
     )
     for path in (out, signal):
         _complete(path, FILES)
-    _device_options(command)
-
-
-def _device_options(command: argparse.ArgumentParser) -> None:
-    command.add_argument("--law", default="kaczmarek", help="name of a force law; default: kaczmarek")
-    command.add_argument("--insulator", default="film", help="film or touchscreen; default: film")
-    options = {
-        "display": (0.25, "MU", "coefficient of the display"),
-        "voltage-max": (None, "V", "largest effective voltage of the amplifier"),
-        "slew": (None, "V/S", "how fast the effective voltage can change"),
-    }
-    _numbers(command, options)
+    _fields(command, Device, friction="display")
 
 
 def _simulate_options(command: argparse.ArgumentParser) -> None:

@@ -41,7 +41,7 @@ FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
-        given = parser().parse_args(arguments)
+        given = parser(sys.argv if arguments is None else arguments).parse_args(arguments)
     except SystemExit as done:
         return int(done.code or 0)
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
@@ -404,7 +404,7 @@ def _signal(given: argparse.Namespace) -> int:
 
 
 def _texture(given: argparse.Namespace) -> int:
-    from evfem.textures.commands import run
+    from evfem.estimate.commands import run
 
     run(given)
     return DONE

@@ -17,9 +17,9 @@ import numpy as np
 
 import evfem as ev
 from evfem.common.arrays import Floats
+from evfem.estimate.rendering import Recording, apparent_friction, record, replay, voltage_for
 from evfem.export import paraview
 from evfem.plotting import side_by_side
-from evfem.simulation.rendering import Recording, apparent_friction, record, replay, voltage_for
 
 from . import rendered
 from .common import Series, Study, make_folder

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import evfem as ev
 from evfem.common.arrays import Floats
 from evfem.electrostatics.encoding import AreaLaw, Encoding
-from evfem.simulation import rendering
+from evfem.estimate import rendering
 
 #: where friction rises, from what to what, how far the finger slides (mm)
 JUMP, BEFORE, AFTER, PATH = 5.0, 0.5, 0.6, 10.0

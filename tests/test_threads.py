@@ -48,7 +48,7 @@ WAYS = {
     "fit": "data = ev.MeasuredCurve('indentation', 'applied_force', [0.005, 0.01], [0.1, 0.2])\n"
     "ev.fit(scene, data, {'finger.materials.hypodermis.E': (0.02, 0.06)}, workers=1)",
     "estimate": "from evfem.textures.library import reference\n"
-    "from evfem.textures.estimate import estimate\n"
+    "from evfem.estimate.estimate import estimate\n"
     "estimate(reference('weave'), ev.Touch(length=2.0))",
     "studio": "from evfem.studio import page\nfrom evfem.studio.state import parse\npage.answer(parse('{}'))",
 }

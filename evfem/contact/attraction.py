@@ -32,9 +32,8 @@ import scipy.sparse as sparse
 
 from evfem.common.arrays import Floats
 from evfem.contact.charging import Charged, Charging
-from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import GAP_STEP, traction_derivative
-from evfem.electrostatics.roughness import separation_derivative
+from evfem.electrostatics.roughness import Cored, separation_derivative
 from evfem.surface.pad import Pad, surface_state
 from evfem.surface.skin import Skin
 from evfem.tensor import derivative, mul, positive_part
@@ -152,7 +151,7 @@ class Attraction:
         return np.stack([sideways + weight * frame.slope.reshape(weight.shape), -weight], axis=-1)
 
     def restored(self, voltage: float) -> tuple[Floats, Floats] | None:
-        """What a core of the law (`evfem.electrostatics.core`) withholds of the attraction of closed nodes,
+        """What a core of the law (`roughness.Cored`) withholds of the attraction of closed nodes,
         and what it leaves of it, (P,) in MPa each; None without a core.
         """
         if not isinstance(self.law, Cored) or voltage == 0.0:

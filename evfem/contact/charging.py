@@ -1,9 +1,8 @@
 """Charges of the pad nodes under a voltage that is resolved in time: internal variables of the
 attraction.
 
-Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.charges`) on its
-tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them
-(`evfem.electrostatics.relaxation`).
+Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
+tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them.
 A step goes in two parts: the pad moves with the charges and the voltage that it had, the charge of
 each node r A staying what it is while A changes; then, in its new place, charge flows for the
 seconds of the step while the voltage goes straight to its new value. So the charges at the end are
@@ -25,9 +24,8 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.relaxation import RelaxingSandwich
+from evfem.electrostatics.relaxation import Sandwich
 from evfem.tensor import STEP
 
 #: pieces of a step, each so many times as long as the one before, from one relaxation of the fastest
@@ -62,7 +60,7 @@ class Flow:
 class Charging:
     """The charges of a step that begins at `begin` and takes `seconds`."""
 
-    def __init__(self, stack: Sandwich | RelaxingSandwich, nodes: int) -> None:
+    def __init__(self, stack: Sandwich, nodes: int) -> None:
         self.stack = stack
         self.nodes = nodes
         none = np.zeros(nodes)

@@ -1,4 +1,5 @@
-r"""Closed forms of a plate under alternating, stepped and square voltage, with layers that conduct.
+r"""Closed forms of a plate under alternating, stepped and square voltage, with layers that conduct,
+and the harmonics of a voltage that repeats.
 
 Under a sine of the effective voltage U and the angular frequency w, every layer j has the complex
 length :math:`d_j / \varepsilon_j^*(\omega)` (`evfem.electrostatics.dielectrics`), and with the gap's
@@ -10,7 +11,7 @@ length :math:`d_j / \varepsilon_j^*(\omega)` (`evfem.electrostatics.dielectrics`
 
 The pressure itself swings around its mean with twice the frequency,
 :math:`p(t) = \bar p\,[1 + \cos(2\omega t + 2 \arg E_g)]`. After a step from no charge the field
-decays with two rates (`evfem.electrostatics.charges`). A square wave +-U, slow enough for the skin
+decays with two rates (`evfem.electrostatics.relaxation`). A square wave +-U, slow enough for the skin
 to be a conductor, leaks through the gap with :math:`\tau = (\varepsilon_0 / \sigma_g)(1 + g
 \varepsilon_i / d_i)`, so that with a = 1 / (2 f tau)
 
@@ -26,10 +27,11 @@ from typing import Any
 
 import numpy as np
 
+from evfem.common.arrays import Floats
 from evfem.common.checks import Values, above, at_least, finite, plain
-from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.dielectrics import dielectric
 from evfem.electrostatics.laws import Layer, Layers, StrongTroxel, eps_0
+from evfem.electrostatics.relaxation import Relaxing, Sandwich
 from evfem.errors import InputError, quoted
 
 _GAP, _SIGMA = "an air gap in mm, not negative", "a conductivity in S/m, not negative"
@@ -103,7 +105,7 @@ def step_pressure(
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     voltage = np.asarray(finite("voltage", voltage, "a voltage in V"))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    layers = Layers(stack.skin + stack.insulator, np.asarray(skin_thickness) + insulator.thickness)
+    layers = Layers(stack.reference, np.asarray(skin_thickness) + insulator.thickness)
     return StrongTroxel().traction(gap, voltage * stack.step_response(gap, time), layers)
 
 
@@ -134,7 +136,8 @@ def _sandwich(
     leak = np.asarray(at_least("gap_conductivity", gap_conductivity, 0.0, _SIGMA))
     thickness = np.asarray(at_least("skin_thickness", thickness, 0.0, "a thickness in mm, not negative"))
     film = Sandwich.of(Layer(0.0, 1.0), _layer(insulator), frequency=None, gap_conductivity=leak)
-    return Sandwich(thickness / eps_r, film.insulator, (sigma / (eps_0 * eps_r), *film.rates[1:]))
+    skin = Relaxing(thickness / eps_r, 1.0, sigma / (eps_0 * eps_r))
+    return Sandwich(skin, film.insulator, film.leak, skin.thickness + film.reference)
 
 
 def square_wave_pressure(
@@ -176,7 +179,46 @@ def corner_frequencies(
     """
     gap = np.asarray(at_least("gap", gap, 0.0, _GAP))
     stack = _sandwich(skin_eps_r, skin_conductivity, skin_thickness, insulator, gap_conductivity)
-    skin, leak, _ = stack.rates
-    of_gap = leak / (1.0 + gap / stack.insulator)
-    of_skin = skin / (1.0 + stack.skin / (gap + stack.insulator))
+    (skin, leak, _), film = stack.rates, stack.insulator.thickness
+    of_gap = leak / (1.0 + gap / film)
+    of_skin = skin / (1.0 + stack.skin.thickness / (gap + film))
     return plain(np.asarray(of_gap / (2.0 * np.pi))), plain(np.asarray(of_skin / (2.0 * np.pi)))
+
+
+#: odd harmonics of a square wave that count one by one, groups of those above, and the highest one
+SINGLE, GROUPS, HIGHEST = 16, 32, 1_000_001
+#: orders of samples that repeat: at least so many, and so many times the samples of a period
+SMOOTH, PERIODS = 4096, 8
+
+
+def square_harmonics() -> tuple[Floats, Floats]:
+    """Orders and weights of the harmonics of a square wave, the sum of the weights being 1.
+
+    >>> order, weight = square_harmonics()
+    >>> order[:3].tolist(), weight[:2].round(4).tolist(), round(float(weight.sum()), 12)
+    ([1.0, 3.0, 5.0], [0.8106, 0.0901], 1.0)
+    """
+    order = np.arange(1.0, HIGHEST, 2.0)
+    weight = 8.0 / (np.pi * order) ** 2
+    weight[-1] += 1.0 - weight.sum()
+    return grouped(order, weight)
+
+
+def grouped(order: Floats, weight: Floats) -> tuple[Floats, Floats]:
+    """The first `SINGLE` of these orders as they are, those above in at most `GROUPS` groups: orders
+    that grow, from 1 on, and weights, of the same total.
+    """
+    if order.size <= SINGLE:
+        return order, weight
+    ends = np.unique(np.geomspace(SINGLE, order.size, GROUPS + 1).astype(int))[:-1]
+    begins = np.concatenate([np.arange(SINGLE), ends])
+    sums = np.add.reduceat(weight, begins)
+    mean = np.exp(np.add.reduceat(weight * np.log(order), begins) / np.where(sums > 0.0, sums, 1.0))
+    return np.concatenate([order[:SINGLE], mean[SINGLE:]]), sums
+
+
+def shares(order: Floats, square: Floats) -> tuple[float, Floats, Floats]:
+    """Effective voltage (V) of squared ones (V^2) of some orders, and the orders with their shares of it."""
+    total = float(square.sum())
+    kept = square > 0.0
+    return float(np.sqrt(total)), order[kept], square[kept] / (total if total > 0.0 else 1.0)

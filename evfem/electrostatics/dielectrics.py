@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -29,7 +30,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values, Within, above, at_least, plain, real, set_frozen
 from evfem.common.tables import numbers, read_columns
-from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.laws import Layer, eps_0
 from evfem.errors import InputError, quoted
 
 HEADER = ["frequency", "eps_r", "conductivity"]
@@ -42,6 +43,9 @@ PER_DECADE, POLES, BEYOND = (
     (1, 2, 3, 4, 6, 8, 10, 12, 14, 16, 20, 24, 32, 40),
     (0.0, 0.25, 0.5, 0.75, 1.0),
 )
+#: frequencies (Hz) over which a dielectric becomes a sum of Debye poles, widened to `WIDER` times either
+#: side of the voltage's; largest relative error
+BAND, WIDER, FITTED = (1.0, 1e5), 10.0, 2e-3
 #: the smallest number in a table, instead of 0 under a logarithm
 LEAST = 1e-300
 
@@ -248,3 +252,68 @@ def dielectric(skin: Any) -> Any:
         allowed = " | ".join([*SKINS, "a file .csv with the header " + ",".join(HEADER)])
         raise InputError("skin", quoted(skin), allowed)
     return skin
+
+
+def constants(layer: Layer, frequency: Values | None) -> tuple[Values, Values]:
+    """Relative permittivity and conductivity (S/m) of a layer at a frequency (Hz); without one
+    those of a layer that does not depend on it.
+    """
+    of: Any = layer.eps_r
+    if not callable(getattr(of, "permittivity", None)):
+        return of, 0.0
+    if frequency is not None:
+        return np.real(of.permittivity(frequency)), of.conductivity_at(frequency)
+    if getattr(of, "poles", None) == ():
+        return of.eps_inf, of.conductivity
+    raise InputError(
+        "eps_r", quoted(of), "a dielectric without poles, or a frequency in Hz at which to take it"
+    )
+
+
+def seen_at(layer: Layer, frequency: float | None) -> tuple[Values, Values]:
+    """Relative permittivity and conductivity (S/m) of a layer at a `frequency` (Hz), those of direct
+    current without one.
+
+    >>> seen_at(Layer(0.3, Dielectric(4.0, [(100.0, 1e-3, 0.0)], 2e-4)), None)
+    (104.0, 0.0002)
+    """
+    if frequency is not None or not relaxes(layer):
+        return constants(layer, frequency)
+    steady = debye_layer(layer, None)
+    of: Any = steady.eps_r
+    return of.eps_inf + float(np.sum([pole[0] for pole in of.poles])), of.conductivity
+
+
+def relaxes(layer: Layer) -> bool:
+    """Whether the permittivity of a layer depends on the frequency by more than its conductivity."""
+    return callable(getattr(layer.eps_r, "permittivity", None)) and getattr(layer.eps_r, "poles", None) != ()
+
+
+def debye_layer(layer: Layer, frequency: float | None) -> Layer:
+    """The layer with a sum of Debye poles for its dielectric: its own, or fitted over `BAND` around
+    the `frequency` (Hz). Raises InputError for a dielectric that has none.
+
+    >>> len(debye_layer(Layer(0.3, SKINS["gabriel_dry"]), 75.0).eps_r.poles)
+    3
+    """
+    of: Any = layer.eps_r
+    if not relaxes(layer) or _is_debye(of):
+        return layer
+    if not callable(getattr(of, "debye", None)):
+        allowed = "a Dielectric or a DielectricTable where the voltage is resolved in time"
+        raise InputError("eps_r", quoted(of), allowed)
+    low, high = BAND
+    if frequency is not None:
+        low, high = min(low, frequency / WIDER), max(high, frequency * WIDER)
+    return Layer(layer.thickness, _remembered(of, low, high))
+
+
+def _is_debye(of: Any) -> bool:
+    """Whether all poles are Debye's."""
+    return isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
+
+
+@lru_cache(maxsize=32)
+def _remembered(of: Any, low: float, high: float) -> Dielectric:
+    found: Dielectric = of.debye(low, high, FITTED)
+    return found

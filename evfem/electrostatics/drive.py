@@ -14,7 +14,7 @@ frequency a gap that leaks over an insulator that does not has no field, and con
 gap that does not leak has the whole voltage that conductors leave it.
 
 Resolved in time, the voltage of the moment charges the skin, the gap leaks
-(`evfem.electrostatics.charges`), and the attraction swings with it.
+(`evfem.electrostatics.relaxation`), and the attraction swings with it.
 """
 
 from __future__ import annotations
@@ -36,9 +36,8 @@ from evfem.common.checks import (
     set_frozen,
     yes_or_no,
 )
-from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric
+from evfem.electrostatics.dielectrics import SKINS, Permittivity, dielectric, seen_at
 from evfem.electrostatics.laws import Layer, Layers, traction_derivative
-from evfem.electrostatics.relaxation import seen_at
 from evfem.electrostatics.timesignals import FREQUENCY, WAVEFORMS
 from evfem.protocols import ForceLaw, TimeSignal
 

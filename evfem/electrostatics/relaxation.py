@@ -1,18 +1,35 @@
-r"""Skin, gap and insulator in series whose dielectrics relax: Debye poles beside the conductivities.
+r"""Charge between skin, gap and insulator: three layers in series that conduct and relax.
 
-A layer of the permittivity :math:`\varepsilon_\infty + \sum_k \Delta_k / (1 + i\omega\tau_k)` and the
-conductivity sigma has a polarisation for each of its poles (over eps_0, as a field p_k)
+Layers k = 1 (stratum corneum), 2 (gap), 3 (insulator) with thickness d, permittivity
+:math:`\varepsilon_\infty + \sum_k \Delta_k / (1 + i\omega\tau_k)` (Debye poles) and conductivity
+:math:`\sigma = \varepsilon_0 \kappa` have charges x_1, x_2 over eps_0 on the two faces of the gap, and a
+polarisation p_k (over eps_0, a field) for each pole:
 
-.. math:: D = \varepsilon_\infty E + \sum_k p_k, \qquad \tau_k \dot p_k = \Delta_k E - p_k,
-
-beside the charges x_1, x_2 over eps_0 on the two faces of the gap (`evfem.electrostatics.charges`),
-with :math:`\kappa = \sigma/\varepsilon_0`
-
-.. math:: D_1 = D_2 - x_1, \quad D_3 = D_2 + x_2, \qquad
+.. math:: D = \varepsilon_\infty E + \sum_k p_k, \qquad \tau_k \dot p_k = \Delta_k E - p_k, \qquad
+          D_1 = D_2 - x_1, \quad D_3 = D_2 + x_2, \\
           \dot x_1 = \kappa_1 E_1 - \kappa_2 E_2, \quad \dot x_2 = \kappa_2 E_2 - \kappa_3 E_3, \qquad
           \sum_j d_j E_j = U(t) .
 
-For a fixed gap this is linear, with real, negative rates. Laplace's transform makes it algebra: with
+For a fixed gap this is linear, with real, negative rates. **Without poles** (Maxwell and Wagner), with
+:math:`s_k = d_k / \varepsilon_k`, S their sum and the rates :math:`\kappa_k` for
+:math:`\kappa_k/\varepsilon_k`,
+
+.. math:: \dot x = A x + b U, \quad
+   A = \frac1S \begin{pmatrix}
+       -\kappa_1 (s_2 + s_3) - \kappa_2 s_1 & -(\kappa_1 - \kappa_2) s_3 \\
+       (\kappa_2 - \kappa_3) s_1 & -\kappa_2 s_3 - \kappa_3 (s_1 + s_2) \end{pmatrix}, \quad
+   b = \frac1S \begin{pmatrix} \kappa_1 - \kappa_2 \\ \kappa_2 - \kappa_3 \end{pmatrix} .
+
+Under a voltage that goes straight from U_0 to U_1 in the time h the exponential integrator is exact,
+
+.. math:: x(h) = e^{Ah} x_0 + h\,\varphi_1(Ah)\,b\,U_0 + h\,\varphi_2(Ah)\,b\,(U_1 - U_0),
+
+with :math:`\varphi_1(z) = (e^z - 1)/z`, :math:`\varphi_2(z) = (\varphi_1(z) - 1)/z`, and functions
+of A by their divided difference on the two rates. The field in the gap is that of a stack without
+charges under the **effective voltage** :math:`V = U + s_1 x_1 - s_3 x_2`, so that with given charges every
+force law stays what it is.
+
+**With poles** Laplace's transform makes it algebra: with
 the admittance :math:`Y_j(s) = \varepsilon_{\infty j} + \kappa_j/s + \sum_k \Delta_k/(1 + s\tau_k)`,
 :math:`z_j = d_j/Y_j`, and what the state at the beginning, index 0, leaves behind,
 :math:`h_j = \sum_k p_k^0\tau_k/(1 + s\tau_k)`,
@@ -35,30 +52,47 @@ its end. Energy and loss per area over eps_0 are
 
 A force law sees the layers with their permittivity at the voltage's frequency (static without one) and
 the voltage that makes the same field in the gap. A dielectric that is no sum of Debye poles is fitted
-by one (`Dielectric.debye`) over `BAND`. Lengths in mm, charges and polarisations over eps_0 in V/mm,
+by one (`debye_layer`). Lengths in mm, charges and polarisations over eps_0 in V/mm,
 rates in 1/s. Arguments broadcast; gaps may have a small imaginary part (for derivatives).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.checks import Values
-from evfem.electrostatics.charges import Sandwich, constants
-from evfem.electrostatics.dielectrics import Dielectric
+from evfem.electrostatics.dielectrics import Dielectric, constants, debye_layer, relaxes, seen_at
 from evfem.electrostatics.laws import Layer, eps_0
-from evfem.errors import InputError, quoted
 
-#: frequencies (Hz) over which a dielectric becomes a sum of Debye poles, widened to `WIDER` times either
-#: side of the voltage's; largest relative error
-BAND, WIDER, FITTED = (1.0, 1e5), 10.0, 2e-3
+#: magnitude of z below which phi_2 is summed as a series, and its terms
+SMALL, TERMS = 0.2, 12
 #: points of Talbot's contour, and Weideman's constants
 POINTS, SCALE, TURN, SHIFT, RISE = 26, 0.5017, 0.6407, 0.6122, 0.2645
+
+
+def _phi(z: Any) -> tuple[Any, Any, Any]:
+    """exp(z), phi_1(z), phi_2(z) to rounding, for z with a real part up to 0."""
+    small = np.abs(z) < SMALL
+    safe, near = np.where(small, 1.0, z), np.where(small, z, 0.0)
+    term = series = 0.5 * np.ones_like(near)
+    for k in range(3, 3 + TERMS):
+        term = term * near / k
+        series = series + term
+    second = np.where(small, series, (np.expm1(safe) / safe - 1.0) / safe)
+    return np.exp(z), 1.0 + z * second, second
+
+
+def _difference(f: tuple[Any, Any], rates: tuple[Any, Any]) -> Any:
+    """Divided difference of a function over two rates; A is a multiple of one where they are one,
+    and it does not count.
+    """
+    apart = rates[0] - rates[1]
+    same = apart == 0.0
+    return np.where(same, 0.0, (f[0] - f[1]) / np.where(same, 1.0, apart))
 
 
 def _contour() -> tuple[Any, Any]:
@@ -78,29 +112,24 @@ class Relaxing:
 
     thickness: Values
     eps_inf: Values
-    kappa: float
-    strength: Floats
-    tau: Floats
+    kappa: Values
+    strength: Floats = field(default_factory=lambda: np.zeros(0))
+    tau: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
     def of(cls, layer: Layer) -> Relaxing:
         """From a layer with a number, or a `Dielectric` whose poles are Debye's."""
         eps: Any = layer.eps_r
         if not isinstance(eps, Dielectric):
-            return cls(layer.thickness, eps, 0.0, np.zeros(0), np.zeros(0))
+            return cls(layer.thickness, eps, 0.0)
         strength, tau = np.array([pole[:2] for pole in eps.poles]).reshape(-1, 2).T
         return cls(layer.thickness, eps.eps_inf, eps.conductivity / eps_0, strength, tau)
-
-    @property
-    def static(self) -> Values:
-        """Permittivity of a field that does not change."""
-        return self.eps_inf + float(np.sum(self.strength))
 
     @property
     def fastest(self) -> float:
         """A rate (1/s) that none of its own exceeds."""
         lowest = float(np.min(self.eps_inf))
-        return self.kappa / lowest + float(np.sum((1.0 + self.strength / lowest) / self.tau))
+        return float(np.max(self.kappa)) / lowest + float(np.sum((1.0 + self.strength / lowest) / self.tau))
 
     def poles(self, like: Any) -> tuple[Any, Any]:
         """Strengths and times with axes for arrays of the shape of `like`."""
@@ -137,19 +166,34 @@ class Relaxing:
 
 
 @dataclass(frozen=True)
-class RelaxingSandwich:
-    """What a `Sandwich` is to layers of constants, with dielectrics that relax: `skin`, `insulator`,
-    the gap's conductivity over eps_0 `leak` (1/s), the reduced thickness (mm) of both that force
-    laws see, `reference`, and the gap's permittivity.
+class Sandwich:
+    """Layers in series as the charges see them: `skin`, `insulator`, the gap's conductivity over eps_0
+    `leak` (1/s), the reduced thickness (mm) of both that force laws see, `reference`, and the gap's
+    permittivity. Numbers, or without poles arrays over nodes.
 
     The state (M, ...) has the two charges, then the polarisations of skin and insulator.
     """
 
     skin: Relaxing
     insulator: Relaxing
-    leak: float
+    leak: Values
     reference: Values
     gap_eps_r: float = 1.0
+
+    @classmethod
+    def of(
+        cls, skin: Layer, insulator: Layer, *, frequency: Values | None, gap_conductivity: Values,
+        gap_eps_r: float = 1.0,
+    ) -> Sandwich:  # fmt: skip
+        """Without poles, from two solid layers: dielectrics among them by permittivity and conductivity at
+        `frequency` (Hz), or without one if they depend on it by their conductivity alone.
+        """
+        (eps_1, sigma_1), (eps_3, sigma_3) = (constants(layer, frequency) for layer in (skin, insulator))
+        # a layer as its displacement sees it: reduced thickness, permittivity 1, relaxation rate
+        first = Relaxing(skin.thickness / eps_1, 1.0, sigma_1 / (eps_0 * eps_1))
+        third = Relaxing(insulator.thickness / eps_3, 1.0, sigma_3 / (eps_0 * eps_3))
+        leak, reference = gap_conductivity / eps_0, first.thickness + third.thickness
+        return cls(first, third, leak, reference, gap_eps_r)
 
     @property
     def states(self) -> int:
@@ -159,19 +203,29 @@ class RelaxingSandwich:
     @property
     def fastest(self) -> float:
         """A rate (1/s) that no charge and no polarisation exceeds."""
-        return self.skin.fastest + self.leak / self.gap_eps_r + self.insulator.fastest
+        return self.skin.fastest + float(np.max(self.leak)) / self.gap_eps_r + self.insulator.fastest
 
     def effective(self, gap: Any, voltage: Values, charges: Any) -> Any:
-        """Voltage (V) that makes the same field in the gap of layers without charges."""
+        """Voltage (V) that makes the same field in the gap of layers without charges, whatever the `gap`."""
+        if self.states == 2:
+            return self._driving(voltage, charges)
         return self.fields(gap, voltage, charges)[1] * (gap / self.gap_eps_r + self.reference)
 
     def fields(self, gap: Any, voltage: Values, charges: Any) -> tuple[Any, Any, Any]:
         """Displacements over eps_0 (V/mm) in skin, gap and insulator."""
-        first, third = (np.sum(part, axis=0) for part in self._polarisations(charges))
-        skin, film = (one.thickness / one.eps_inf for one in (self.skin, self.insulator))
-        driven = voltage + skin * (charges[0] + first) - film * (charges[1] - third)
-        middle = driven / (skin + gap / self.gap_eps_r + film)
+        middle = self._driving(voltage, charges) / sum(self._reduced(gap))
         return middle - charges[0], middle, middle + charges[1]
+
+    def _driving(self, voltage: Values, charges: Any) -> Any:
+        """Voltage (V) over the reduced thicknesses of all layers."""
+        first, third = (np.sum(part, axis=0) for part in self._polarisations(charges))
+        skin, _, film = self._reduced(0.0)
+        return voltage + skin * (charges[0] + first) - film * (charges[1] - third)
+
+    def _reduced(self, gap: Any) -> tuple[Any, Any, Any]:
+        """Thickness over permittivity (mm) at high frequency of skin, gap and insulator."""
+        skin, film = (one.thickness / one.eps_inf for one in (self.skin, self.insulator))
+        return skin, gap / self.gap_eps_r, film
 
     def crossing(self, gap: Any, voltage: Values, charges: Any) -> Any:
         """Current over eps_0 (V/mm/s) that is conducted through the skin."""
@@ -194,6 +248,8 @@ class RelaxingSandwich:
         """State (M, ...) that `charges` become at a fixed `gap` (mm) in so many `seconds`, the
         voltage going straight from `before` to `after` (V).
         """
+        if self.states == 2:
+            return self._exactly(gap, charges, before, after, seconds)
         axes = np.broadcast(gap, before, after, seconds, charges[0]).ndim
         if not np.any(seconds):
             return np.array(charges, dtype=float)
@@ -252,6 +308,67 @@ class RelaxingSandwich:
         first, third = (np.sum(part, axis=0) for part in self._polarisations(charges))
         return (D_1 - first) / self.skin.eps_inf, D_2 / self.gap_eps_r, (D_3 - third) / self.insulator.eps_inf
 
+    @property
+    def rates(self) -> tuple[Values, Values, Values]:
+        """Conductivity over permittivity at high frequency (1/s) of skin, gap and insulator."""
+        skin, film = (one.kappa / one.eps_inf for one in (self.skin, self.insulator))
+        return skin, self.leak / self.gap_eps_r, film
+
+    def _exactly(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
+        """Charges (2, ...) of layers without poles."""
+        (a11, a12, a21, a22), (b1, b2) = self._system(gap)
+        slow, fast = self.eigenvalues(gap)
+        of_slow, of_fast = _phi(slow * seconds), _phi(fast * seconds)
+        drive, ramp = seconds * before, seconds * (np.asarray(after) - before)
+        inputs = ((charges[0], charges[1]), (b1 * drive, b2 * drive), (b1 * ramp, b2 * ramp))
+        result: list[Any] = [0.0, 0.0]
+        for f, g, (x, y) in zip(of_slow, of_fast, inputs, strict=True):
+            slope = _difference((f, g), (slow, fast))
+            result[0] = result[0] + f * x + slope * ((a11 - slow) * x + a12 * y)
+            result[1] = result[1] + f * y + slope * (a21 * x + (a22 - slow) * y)
+        return np.stack(np.broadcast_arrays(*result))
+
+    def step_response(self, gap: Any, time: Values) -> Any:
+        """Without poles the effective voltage at `time` (s) after a step of 1 V from no charge: straight
+        from its start, its first slope and its end, so that it decays to rounding of itself.
+        """
+        k1, k2, k3 = self.rates
+        slow, fast = self.eigenvalues(gap)
+        skin, air, film = self._reduced(gap)
+        total = skin + air + film
+        slope = (skin * (k1 - k2) - film * (k2 - k3)) / total
+        product = self._determinant(gap) * total
+        end = np.where(product > 0.0, k1 * k3 / np.where(product > 0.0, product, 1.0), 0.0) * total
+        decay, faster = np.exp(slow * time), np.exp(fast * time)
+        both = np.where(fast == slow, time * decay, _difference((decay, faster), (slow, fast)))
+        return end + decay * (1.0 - end) + both * (slope - slow * (1.0 - end))
+
+    def eigenvalues(self, gap: Any) -> tuple[Any, Any]:
+        """The slower and the faster of the two rates (1/s, not positive) at a fixed `gap` (mm),
+        without poles.
+        """
+        (a11, a12, a21, a22), _ = self._system(gap)
+        square = (0.5 * (a11 - a22)) ** 2 + a12 * a21
+        root = np.sqrt(np.where(np.real(square) > 0.0, square, 0.0))
+        fast = 0.5 * (a11 + a22) - root
+        # the product of the rates is the determinant: so the slow one is right to rounding
+        still = fast == 0.0
+        return np.where(still, 0.0, self._determinant(gap) / np.where(still, 1.0, fast)), fast
+
+    def _system(self, gap: Any) -> tuple[tuple[Any, Any, Any, Any], tuple[Any, Any]]:
+        """A by rows, and b."""
+        k1, k2, k3 = self.rates
+        s1, s2, s3 = self._reduced(gap)
+        total = s1 + s2 + s3
+        rows = (-k1 * (s2 + s3) - k2 * s1, -(k1 - k2) * s3, (k2 - k3) * s1, -k2 * s3 - k3 * (s1 + s2))
+        return tuple(entry / total for entry in rows), ((k1 - k2) / total, (k2 - k3) / total)
+
+    def _determinant(self, gap: Any) -> Any:
+        """Product of the two rates of A."""
+        k1, k2, k3 = self.rates
+        s1, s2, s3 = self._reduced(gap)
+        return (k1 * k2 * s3 + k1 * k3 * s2 + k2 * k3 * s1) / (s1 + s2 + s3)
+
 
 def _lifted(values: Any, axes: int) -> Any:
     """With so many axes, the further ones in front."""
@@ -260,62 +377,13 @@ def _lifted(values: Any, axes: int) -> Any:
 
 def stack_of(
     skin: Layer, insulator: Layer, *, frequency: float | None, gap_conductivity: float, gap_eps_r: float
-) -> Sandwich | RelaxingSandwich:
-    """The layers of a voltage that is resolved in time, as their charges see them: a `Sandwich` where
-    nothing relaxes. `frequency` (Hz) is the voltage's, None of a direct one.
+) -> Sandwich:
+    """The layers of a voltage that is resolved in time, as their charges see them. `frequency` (Hz) is the
+    voltage's, None of a direct one.
     """
     if not (relaxes(skin) or relaxes(insulator)):
         given = {"gap_conductivity": gap_conductivity, "gap_eps_r": gap_eps_r}
         return Sandwich.of(skin, insulator, frequency=frequency, **given)
     layers = [Relaxing.of(debye_layer(layer, frequency)) for layer in (skin, insulator)]
     reference = sum(layer.thickness / seen_at(layer, frequency)[0] for layer in (skin, insulator))
-    return RelaxingSandwich(layers[0], layers[1], gap_conductivity / eps_0, reference, gap_eps_r)
-
-
-def seen_at(layer: Layer, frequency: float | None) -> tuple[Values, Values]:
-    """Relative permittivity and conductivity (S/m) of a layer at a `frequency` (Hz), those of direct
-    current without one.
-
-    >>> seen_at(Layer(0.3, Dielectric(4.0, [(100.0, 1e-3, 0.0)], 2e-4)), None)
-    (104.0, 0.0002)
-    """
-    if frequency is not None or not relaxes(layer):
-        return constants(layer, frequency)
-    steady = debye_layer(layer, None)
-    return Relaxing.of(steady).static, steady.eps_r.conductivity
-
-
-def relaxes(layer: Layer) -> bool:
-    """Whether the permittivity of a layer depends on the frequency by more than its conductivity."""
-    return callable(getattr(layer.eps_r, "permittivity", None)) and getattr(layer.eps_r, "poles", None) != ()
-
-
-def debye_layer(layer: Layer, frequency: float | None) -> Layer:
-    """The layer with a sum of Debye poles for its dielectric: its own, or fitted over `BAND` around
-    the `frequency` (Hz). Raises InputError for a dielectric that has none.
-
-    >>> from evfem.electrostatics.dielectrics import SKINS
-    >>> len(debye_layer(Layer(0.3, SKINS["gabriel_dry"]), 75.0).eps_r.poles)
-    3
-    """
-    of: Any = layer.eps_r
-    if not relaxes(layer) or _is_debye(of):
-        return layer
-    if not callable(getattr(of, "debye", None)):
-        allowed = "a Dielectric or a DielectricTable where the voltage is resolved in time"
-        raise InputError("eps_r", quoted(of), allowed)
-    low, high = BAND
-    if frequency is not None:
-        low, high = min(low, frequency / WIDER), max(high, frequency * WIDER)
-    return Layer(layer.thickness, _fitted(of, low, high))
-
-
-def _is_debye(of: Any) -> bool:
-    """Whether all poles are Debye's."""
-    return isinstance(of, Dielectric) and all(not any(pole[2:]) and len(pole) == 3 for pole in of.poles)
-
-
-@lru_cache(maxsize=32)
-def _fitted(of: Any, low: float, high: float) -> Dielectric:
-    found: Dielectric = of.debye(low, high, FITTED)
-    return found
+    return Sandwich(layers[0], layers[1], gap_conductivity / eps_0, reference, gap_eps_r)

@@ -41,7 +41,7 @@ from evfem.common.checks import (
 from evfem.common.storage import write_text
 from evfem.common.tables import MOST_ROWS, numbers, read_columns
 from evfem.electrostatics import wav
-from evfem.electrostatics.spectrum import PERIODS, SMOOTH, grouped, shares, square_harmonics
+from evfem.electrostatics.alternating import PERIODS, SMOOTH, grouped, shares, square_harmonics
 from evfem.errors import ABSENT, InputError
 from evfem.protocols import TimeSignal
 

@@ -112,9 +112,8 @@ class Space:
         rule = {"intorder": 2 * order}
         self.basis = skfem.CellBasis(grid, element, **rule)
         self.vertices = self.basis.with_element(skfem.ElementQuad1())
-        self.eps = np.repeat(1.0 + (eps_r - 1.0) * mesh.in_slab, self.basis.X.shape[1]).reshape(
-            -1, self.basis.X.shape[1]
-        )
+        points = self.basis.X.shape[1]
+        self.eps = np.repeat(1.0 + (eps_r - 1.0) * mesh.in_slab, points).reshape(-1, points)
 
     @cached_property
     def stiffness(self) -> Any:
@@ -130,24 +129,16 @@ class Space:
         along, still = self.vertices.interpolate(lift), self.vertices.interpolate(0.0 * lift)
         velocity = (along, still) if direction == 0 else (still, along)
         values = {"phi": self.basis.interpolate(phi), "eps": self.eps}
-        return float(
-            eps_0
-            * skfem.Functional(virtual_work).assemble(
-                self.basis, **values, x_velocity=velocity[0], y_velocity=velocity[1]
-            )
-        )
+        moving = {"x_velocity": velocity[0], "y_velocity": velocity[1]}
+        return float(eps_0 * skfem.Functional(virtual_work).assemble(self.basis, **values, **moving))
 
     def solve(self) -> Floats:
         """Potential that is 0 on the body and 1 on the electrode."""
         phi, fixed, master = self.conditions()
-        free = np.ones(phi.size, dtype=bool)
-        free[fixed] = False
-        free &= master == np.arange(phi.size)
-        number = np.full(phi.size, -1)
-        number[free] = np.arange(free.sum())
-        slave = np.flatnonzero(number[master] >= 0)
+        free = np.setdiff1d(master, fixed)
+        slave = np.flatnonzero(np.isin(master, free))
         T = sparse.csr_matrix(
-            (np.ones(slave.size), (slave, number[master[slave]])), shape=(phi.size, int(free.sum()))
+            (np.ones(slave.size), (slave, np.searchsorted(free, master[slave]))), shape=(phi.size, free.size)
         )
         return np.asarray(phi + T @ solve_spd(T.T @ self.stiffness @ T, -(T.T @ (self.stiffness @ phi))))
 
@@ -171,19 +162,12 @@ class Space:
             electrode |= left | right | np.all(row == rows, axis=0)
             paired = np.zeros(facets.size, dtype=bool)
         phi = np.zeros(self.basis.N)
-        body = self._on(facets[~(electrode | paired)])
-        plate = self._on(facets[electrode])
+        body = self.basis.get_dofs(facets[~(electrode | paired)]).all()
+        plate = self.basis.get_dofs(facets[electrode]).all()
         phi[self.basis.nodal_dofs[0, np.unique(grid.facets[:, facets[electrode]])]] = 1.0
         if self.order == 2:
             phi[plate] = 1.0
         return phi, np.union1d(body, plate), master
-
-    def _on(self, facets: Ints) -> Ints:
-        """Unknowns of facets."""
-        vertices = np.unique(self.basis.mesh.facets[:, facets])
-        return np.concatenate(
-            [self.basis.nodal_dofs[:, vertices].ravel(), self.basis.facet_dofs[:, facets].ravel()]
-        )
 
     def _join(self, master: Ints, left: Ints, right: Ints) -> None:
         """Tell the unknowns of the facets on the right end of a period their twins."""

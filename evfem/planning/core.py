@@ -7,7 +7,7 @@ plane modulus :math:`E^* = E / (1 - \nu^2)` of the cells below them, where
 .. math:: \chi = -p'(g_0)\, h / E^* > \chi_0 = \tfrac{1}{6} .
 
 :math:`\chi_0` is measured: in blocks, fingers and domes no state was trapped at 1/6, the first ones at
-1/5. There a line no steeper than :math:`\chi_0 E^*/h` takes the law's place (`evfem.electrostatics.core`).
+1/5. There a line no steeper than :math:`\chi_0 E^*/h` takes the law's place (`Cored`).
 What is left are the errors of a cohesive zone that a few nodes resolve: the edge of contact is right to
 1.5 node distances, a load at given indentation to 1 %, a pull-off to 3 %.
 """
@@ -19,9 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import traction_derivative
-from evfem.electrostatics.roughness import roughness_of
+from evfem.electrostatics.roughness import Cored, roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import way

@@ -11,11 +11,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from evfem.electrostatics.charges import Sandwich
-from evfem.electrostatics.dielectrics import Dielectric
+from evfem.electrostatics.dielectrics import Dielectric, seen_at
 from evfem.electrostatics.drive import powers
 from evfem.electrostatics.laws import Layer
-from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at
+from evfem.electrostatics.relaxation import Sandwich
 from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
@@ -59,7 +58,8 @@ def _charge(scene: Scene) -> list[str]:
     if gap > 0.0:
         said.append(f"charge: the gap leaks below {gap / (2.0 * np.pi):.3g} Hz")
     if skin > 0.0:
-        corner = skin / (1.0 + float(np.max(stack.skin)) / float(np.max(stack.insulator))) / (2.0 * np.pi)
+        upper, lower = (float(np.max(one.thickness)) for one in (stack.skin, stack.insulator))
+        corner = skin / (1.0 + upper / lower) / (2.0 * np.pi)
         said.append(f"charge: the skin conducts below {corner:.3g} Hz")
     relaxing = _relaxing(seen.sandwich) if scene.drive.resolved else []
     return [*(said or ["charge: nothing conducts"]), *relaxing]
@@ -71,9 +71,9 @@ def _constants(layer: Layer, at: float | None) -> tuple[float, tuple[()], float]
     return float(np.max(eps_r)), (), float(np.max(sigma))
 
 
-def _relaxing(stack: Sandwich | RelaxingSandwich) -> list[str]:
+def _relaxing(stack: Sandwich) -> list[str]:
     """How many poles the dielectrics of a resolved drive have, and how slow."""
-    if not isinstance(stack, RelaxingSandwich):
+    if stack.states == 2:
         return []
     times = np.concatenate([stack.skin.tau, stack.insulator.tau])
     return [f"charge: {times.size} Debye poles relax in {times.min():.2g} to {times.max():.2g} s"]

@@ -1,30 +1,52 @@
-"""Curves of the history: forces, any columns, one or several results.
+"""Curves: columns of the history of one result or several, tractions of a frame, residuals of a fit.
 
-A result is drawn per mm of depth, `result.total` over the whole depth: in N, mm² and mJ.
-
-`over` is the column along the abscissa: any column that grows or falls, by default the one that
-the motions change (`abscissa`).
+A result is drawn per mm of depth, `result.total` over the whole depth: in N, mm² and mJ. `over` is the
+column along the abscissa: any column that grows or falls, by default the one that the motions change
+(`abscissa`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from evfem.calibration.result import FitResult
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
-from evfem.plotting.colours import BLACK, BLUE, CURVES, GREEN, ORANGE, PURPLE, SKY, STYLES, VERMILION
-from evfem.plotting.figures import Panels, axes_or_new, new_panels
-from evfem.plotting.labels import Units, axis_label, column_label, column_text, kind_of, values_of
+from evfem.plotting.fields import frame_of
+from evfem.plotting.figures import (
+    BLACK,
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    Panels,
+    axes_or_new,
+    curves,
+    new_panels,
+    styled,
+)
+from evfem.plotting.finger import check_plane, told
+from evfem.plotting.labels import (
+    Results,
+    axis_label,
+    column_label,
+    column_text,
+    kind_of,
+    named,
+    units_of,
+    values_of,
+)
+from evfem.simulation import spectrum as spectra
 from evfem.simulation.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Results = Result | Mapping[str, Result]
 FORCES = {
     "normal_force": ("normal (contact)", BLUE, "-"),
     "tangential_force": ("tangential (contact)", VERMILION, "-"),
@@ -40,10 +62,18 @@ ENERGIES = {
     "kinetic_energy": ("kinetic", SKY, "-."),
     "snap_dissipation": ("lost in snaps", PURPLE, "-."),
 }
+TRACTIONS = {
+    "contact_pressure": (BLUE, "-"),
+    "shear_traction": (VERMILION, "-"),
+    "electrostatic_traction": (GREEN, "--"),
+}
 ZERO = 1e-9  # what is smaller than the largest by so much is nothing but rounding
 #: width of a letter of a motion's name in inches, and height of its line in points
 LETTER, HIGH = 0.085, 12.0
 OVER = ("step", "position", "position_z", "time", "indentation", "voltage", "applied_force")
+#: so many frequencies are lines from 0, more are a curve; points: a line in front of another is thinner
+FEW, THICK = 100, 4.0
+TWO = 2.0  # standard deviations: the band that residuals of the given sd rarely leave
 
 
 def abscissa(result: Result) -> str:
@@ -77,29 +107,27 @@ def forces(result: Result, over: str | None = None, ax: Axes | None = None) -> A
     ramps; the time if the finger waits, else the step, with the motions marked. A force that is 0
     throughout is left out.
     """
-    return _draw_columns(ax, result, FORCES, "applied_force", over)
+    return _of_one_kind(ax, result, FORCES, "applied_force", over)
 
 
 def energies(result: Result, over: str | None = None, ax: Axes | None = None) -> Axes:
     """Works, stored energy and dissipations (N) over `over`, as in `forces`."""
-    return _draw_columns(ax, result, ENERGIES, "external_work", over)
+    return _of_one_kind(ax, result, ENERGIES, "external_work", over)
 
 
-def _draw_columns(
-    ax: Axes | None, result: Result, lines: Mapping[str, tuple[str, str, str]], always: str, over: str | None
+def _of_one_kind(
+    ax: Axes | None, result: Result, texts: Mapping[str, tuple[str, str, str]], always: str, over: str | None
 ) -> Axes:
-    """Lines of columns of one kind; those that are 0 throughout only if they must `always` be
-    there.
-    """
+    """Lines of columns of one kind; those that are 0 throughout only if they must `always` be there."""
     over = checked_over(over, result)
-    ax = axes_or_new(ax)
-    x, drawn = along(result, over, over), {name: along(result, name, over) for name in lines}
+    x, drawn = along(result, over, over), {name: along(result, name, over) for name in texts}
     least = ZERO * max((float(np.abs(y).max(initial=0.0)) for y in drawn.values()), default=0.0)
-    for name, (label, colour, style) in lines.items():
-        y = drawn[name]
-        if name == always or np.any(np.abs(y) > least):
-            ax.plot(x, y, style, color=colour, label=label, marker=_marker(x))
-    finish(ax, result, over, axis_label(always, result.units))
+    lines = [
+        (x, drawn[name], {"label": label, "color": colour, "linestyle": style})
+        for name, (label, colour, style) in texts.items()
+        if name == always or np.any(np.abs(drawn[name]) > least)
+    ]
+    ax = _marked(curves(ax, lines, "", axis_label(always, result.units)), over, result)
     ax.legend()
     return ax
 
@@ -124,18 +152,12 @@ def along(result: Result, name: str, over: str) -> Any:
     return values[np.append(np.diff(result.time) > 0.0, True)]
 
 
-def finish(ax: Axes, result: Result, over: str, label: str) -> None:
-    """Labels, grid, and over the steps the motions."""
-    if over == "step":
-        _mark_motions(ax, result)
-    ax.set_xlabel(column_label(over, result.units))
-    ax.set_ylabel(label)
-    ax.grid(alpha=0.3)
-
-
-def _marker(x: Any) -> str | None:
-    """Few points are marked, one alone would not be seen."""
-    return "o" if len(x) < 3 else None
+def _marked(ax: Axes, over: str, first: Result, *others: Result) -> Axes:
+    """The axes with their abscissa, and over the steps with the motions, if all have the same."""
+    ax.set_xlabel(column_label(over, first.units))
+    if over == "step" and all(np.array_equal(first.motion, other.motion) for other in others):
+        _mark_motions(ax, first)
+    return ax
 
 
 def _mark_motions(ax: Axes, result: Result) -> None:
@@ -174,29 +196,17 @@ def history(result: Result, columns: Sequence[str], over: str | None = None) -> 
     if isinstance(columns, str) or not columns:
         raise InputError("columns", quoted(columns), "a list of at least one column of the history")
     over = checked_over(over, result)
-    kinds: dict[tuple[str, str], list[str]] = {}
+    kinds: dict[tuple[str, str], dict[str, Any]] = {}
     for name in columns:
-        values_of(result, name)
-        kinds.setdefault(kind_of(name, result.units), []).append(name)
-    panels = new_panels(len(kinds), 1.0 + 1.9 * len(kinds))
-    x = along(result, over, over)
-    for ax, names in zip(panels, kinds.values(), strict=True):
-        for name, colour, style in zip(names, cycle(CURVES), cycle(STYLES), strict=False):
-            ax.plot(
-                x,
-                along(result, name, over),
-                style,
-                color=colour,
-                label=column_text(name, result.units[name]),
-                marker=_marker(x),
-            )
-        label = column_label if len(names) == 1 else axis_label
-        ax.set_ylabel(label(names[0], result.units))
-        ax.grid(alpha=0.3)
-        if len(names) > 1:
-            ax.legend()
-    if over == "step":
-        _mark_motions(panels[0], result)
+        y = along(result, name, over)
+        kinds.setdefault(kind_of(name, result.units), {})[name] = y
+    panels, x = new_panels(len(kinds), 1.0 + 1.9 * len(kinds)), along(result, over, over)
+    for ax, drawn in zip(panels, kinds.values(), strict=True):
+        texts = {column_text(name, result.units[name]): y for name, y in drawn.items()}
+        label = column_label if len(drawn) == 1 else axis_label
+        lines = [(x, y, look) for y, look in styled(texts)]
+        curves(ax, lines, "", label(next(iter(drawn)), result.units))
+    _marked(panels[0], over, result).set_xlabel("")
     panels[-1].set_xlabel(column_label(over, result.units))
     return panels
 
@@ -205,36 +215,164 @@ def compare(
     results: Mapping[str, Result], column: str, over: str | None = None, ax: Axes | None = None
 ) -> Axes:
     """The same column of several results, each by its name, over `over` (see `forces`)."""
-    found = named(results)
-    over = checked_over(over, next(iter(found.values())))
-    for result in found.values():
-        values_of(result, column)
-    ax = axes_or_new(ax)
-    for (name, result), colour, style in styled(found):
-        x = along(result, over, over)
-        ax.plot(x, along(result, column, over), style, color=colour, label=name, marker=_marker(x))
-    units = units_of(found)
-    ax.set(xlabel=column_label(over, units), ylabel=column_label(column, units))
-    ax.grid(alpha=0.3)
+    found, over = _over(results, over)
+    ax = _column(ax, found, column, over, column_label(column, units_of(found)))
     ax.legend()
     return ax
 
 
-def named(results: Results) -> dict[str, Result]:
-    """Results by their names; one alone has none."""
-    found = {"": results} if isinstance(results, Result) else dict(results)
-    if not found:
-        raise InputError("results", "nothing", "a result, or {name: result, ...}")
-    if any(result.units != units_of(found) for result in found.values()):
-        raise InputError("results", "some per mm of depth, some in total", "all of them alike")
-    return found
+def force_indentation(results: Results, ax: Axes | None = None) -> Axes:
+    """Applied force over indentation, of the presses of one result or of several by their names."""
+    found = named(results)
+    lines = [
+        (*_of_presses(result, "indentation", "applied_force"), look | {"marker": "."})
+        for result, look in styled(found)
+    ]
+    units = units_of(found)
+    return curves(ax, lines, column_label("indentation", units), axis_label("applied_force", units))
 
 
-def units_of(found: Mapping[str, Result]) -> Units:
-    """The units that all of these results have."""
-    return next(iter(found.values())).units
+def contact_area(results: Results, ax: Axes | None = None) -> Axes:
+    """Contact width (in total: area) over the applied force of the presses: from edge to edge, and
+    of all that touches.
+    """
+    found, lines = named(results), []
+    for result, look in styled(found):
+        width = "contact_area" if result.mesh.dim == 3 else "contact_width"
+        for column, text, style in ((width, "edge to edge", "-"), (f"real_{width}", "touching", "--")):
+            label = ", ".join(filter(None, (look["label"], text)))
+            own = look | {"label": label, "linestyle": style, "marker": "."}
+            lines.append((*_of_presses(result, "applied_force", column), own))
+    units = units_of(found)
+    return curves(ax, lines, column_label("applied_force", units), axis_label(width, units))
 
 
-def styled(found: Mapping[str, Any]) -> Any:
-    """Name and what stands behind it, colour, style of each curve."""
-    return zip(found.items(), cycle(CURVES), cycle(STYLES), strict=False)
+def friction(results: Results, over: str | None = None, ax: Axes | None = None) -> Axes:
+    """Apparent friction coefficient, tangential over normal force on the bone, over `over`
+    (`forces`).
+
+    Steps without a load on the bone are left out.
+    """
+    found, over = _over(results, over)
+    lines = []
+    for result, look in styled(found):
+        load = along(result, "applied_force", over)
+        rows = load > ZERO * float(np.abs(load).max(initial=0.0))
+        ratio = along(result, "applied_tangential_force", over)[rows] / load[rows]
+        lines.append((along(result, over, over)[rows], ratio, look))
+    ax = curves(ax, lines, "", "apparent friction coefficient")
+    return _marked(ax, over, *found.values())
+
+
+def signal(results: Results, over: str | None = None) -> Panels:
+    """Voltage above, friction force on the bone below, over `over` (see `forces`)."""
+    found, over = _over(results, over)
+    panels = new_panels(2, 4.8)
+    _column(panels[0], found, "voltage", over, "voltage (V)").set_xlabel("")
+    label = f"friction force ({units_of(found)['tangential_force']})"
+    _column(panels[1], found, "applied_tangential_force", over, label)
+    return panels
+
+
+def spectrum(
+    results: Results,
+    column: str = "tangential_force",
+    ax: Axes | None = None,
+    *,
+    start: float | None = None,
+    stop: float | None = None,
+    window: str = "none",
+) -> Axes:
+    """Amplitudes of a column over the frequency (Hz), of one result or of several by their names.
+
+    They are those of `ev.spectrum`, which says what `start`, `stop` and `window` are; the mean, at
+    0 Hz, is left out.
+    """
+    found = named(results)
+    drawn = {
+        name: spectra.spectrum(result, column, start=start, stop=stop, window=window)
+        for name, result in found.items()
+    }
+    ax, lines = axes_or_new(ax), []
+    for number, ((frequency, amplitude), look) in enumerate(styled(drawn)):
+        f, a, look = frequency[1:], amplitude[1:], look | {"linewidth": 1.0}
+        if len(f) <= FEW:
+            ax.vlines(f, 0.0, a, colors=look["color"], linewidth=THICK / (1.0 + number))
+            look |= {"linestyle": "none", "marker": "oxs^v"[number % 5], "markersize": 4}
+        lines.append((f, a, look))
+    return curves(ax, lines, "frequency (Hz)", f"amplitude of {column_label(column, units_of(found))}")
+
+
+def contact_pressure(result: Result, frame: int = -1, ax: Axes | None = None) -> Axes:
+    """Contact pressure, shear and electrostatic traction (MPa) of the pad over its current x (mm).
+
+    Shear and attraction are left out where they are 0 throughout.
+    """
+    check_plane(result.mesh)
+    shown = frame_of(result, frame)
+    pad = np.flatnonzero(np.isfinite(shown.gap))
+    x = result.mesh.points[pad, 0] + shown.displacement[pad, 0]
+    pad, x = pad[np.argsort(x)], np.sort(x)
+    lines = [
+        (x, y, {"label": name.replace("_", " "), "color": colour, "linestyle": style, "linewidth": 1.2})
+        for name, (colour, style) in TRACTIONS.items()
+        if np.any((y := getattr(shown, name)[pad]) != 0.0) or name == "contact_pressure"
+    ]
+    ax = curves(ax, lines, "x (mm)", "traction (MPa)")
+    touching = x[shown.contact_status[pad] > 0]
+    if len(touching):
+        margin = 0.25 * (touching[-1] - touching[0]) + 0.2
+        ax.set_xlim(touching[0] - margin, touching[-1] + margin)
+    ax.set_title(told(result, shown), fontsize="medium")
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.35 * (high - low))  # the legend stands above the peaks of the ridges
+    ax.legend(loc="upper left")
+    return ax
+
+
+def residuals(fit: FitResult, ax: Axes | None = None) -> Axes:
+    """Computed minus measured for each measured value of a fit, in the order of the data.
+
+    In standard deviations where the data have them, with a band of two on either side; else in
+    percent of the root mean square of the measurement. A good fit scatters about zero without a
+    pattern.
+    """
+    from matplotlib.ticker import MaxNLocator
+
+    ax = axes_or_new(ax)
+    in_sd = bool(fit.provenance.get("sd"))
+    values = fit.residuals * (1.0 if in_sd else 100.0)
+    number = np.arange(1, len(values) + 1)
+    kinds = np.array([name.split(" at ")[0].split(",")[0].split(".")[0] for name in fit.names])
+    if in_sd:
+        ax.axhspan(-TWO, TWO, color="0.92", label="two standard deviations")
+    ax.axhline(0.0, color="0.4", linewidth=0.8)
+    lines = []
+    for own, look in styled({column_text(kind): kinds == kind for kind in dict.fromkeys(kinds.tolist())}):
+        ax.vlines(number[own], 0.0, values[own], color=look["color"], linewidth=1.2)
+        lines.append((number[own], values[own], look | {"linestyle": "none", "marker": "o"}))
+    unit = "sd" if in_sd else "% of root mean square"
+    curves(ax, lines, "measured value", f"computed - measured ({unit})").legend()
+    ax.set_xlim(0.4, len(values) + 0.6)
+    ax.xaxis.set_major_locator(MaxNLocator(integer=True))
+    return ax
+
+
+def _over(results: Results, over: str | None) -> tuple[dict[str, Result], str]:
+    """Results by their names, and the abscissa of the first."""
+    found = named(results)
+    return found, checked_over(over, next(iter(found.values())))
+
+
+def _column(ax: Axes | None, found: Mapping[str, Result], column: str, over: str, label: str) -> Axes:
+    """A column of several results."""
+    lines = [(along(one, over, over), along(one, column, over), look) for one, look in styled(found)]
+    return _marked(curves(ax, lines, "", label), over, *found.values())
+
+
+def _of_presses(result: Result, *columns: str) -> list[Any]:
+    """Columns of the steps that press."""
+    rows = np.flatnonzero(result.motion == "press")
+    if not rows.size:
+        raise InputError("results", f"a run of {', '.join(sorted(set(result.motion)))}", "a run with a press")
+    return [values_of(result, column)[rows] for column in columns]

@@ -1,4 +1,8 @@
-"""Figures: where a picture is drawn, and how it shows itself.
+"""Figures: where a picture is drawn, its colours and curves, and how it shows itself.
+
+Colours are told apart with any colour vision, and maps stay in order without colour: lines have the
+colours of Okabe and Ito (2008), fields viridis; a stress or strain with a sign has a map from purple over
+white to orange, with white at zero (ColorBrewer, safe for colour-blind readers).
 
 A figure is made without pyplot, so that nothing stays open and no global state changes. Where
 pyplot has been imported and can show figures, it knows the figure, as it knows one of its own:
@@ -10,13 +14,34 @@ from __future__ import annotations
 
 import io
 import sys
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+BLACK, ORANGE, SKY, GREEN, BLUE, VERMILION, PURPLE, YELLOW = (
+    "#000000",
+    "#E69F00",
+    "#56B4E9",
+    "#009E73",
+    "#0072B2",
+    "#D55E00",
+    "#CC79A7",
+    "#F0E442",
+)
+#: one after the other, for curves that have no colour of their own, with styles that differ in print
+CURVES = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
+STYLES = ("-", "--", "-.", ":")
+REGIONS = (SKY, ORANGE, BLUE, GREEN, VERMILION, PURPLE, YELLOW)
+#: contact statuses 0, 1, 2
+STATUS = {"open": "#B8B8B8", "stick": BLUE, "slip": VERMILION}
+ONE_SIGN, BOTH_SIGNS = "viridis", "PuOr_r"
+#: what is not coloured by a field: tissue, surface, lines between regions
+TISSUE, GROUND, EDGE = "#EFEBE7", "#D0D0D0", "0.25"
 #: backends of pyplot that can only write files; what pyplot then knew would stay open for ever
 FILES_ONLY = {"agg", "cairo", "pdf", "pgf", "ps", "svg", "template"}
 WIDTH, HEIGHT = 7.0, 4.5  # of a figure, in inches
@@ -63,6 +88,29 @@ def new_panels(rows: int, height: float) -> Panels:
     """Panels below each other that share their abscissa, `height` inches in all."""
     axes = new_figure(height).subplots(rows, 1, sharex=True, squeeze=False)
     return Panels(axes[:, 0])
+
+
+def styled(named: Mapping[Any, Any]) -> Iterator[tuple[Any, dict[str, Any]]]:
+    """What stands behind each name, and the look of its curve: label, colour and style."""
+    for (name, what), colour, style in zip(named.items(), cycle(CURVES), cycle(STYLES), strict=False):
+        yield what, {"label": name, "color": colour, "linestyle": style}
+
+
+def curves(
+    ax: Axes | None, lines: Sequence[tuple[Any, Any, Mapping[str, Any]]], xlabel: str, ylabel: str
+) -> Axes:
+    """Lines, each with x, y and its look, on a grid, with a legend where there are several.
+
+    Few points are marked: one alone would not be seen.
+    """
+    ax = axes_or_new(ax)
+    for x, y, look in lines:
+        ax.plot(x, y, **{"marker": "o" if len(x) < 3 else None, **look})
+    ax.set(xlabel=xlabel, ylabel=ylabel)
+    ax.grid(alpha=0.3)
+    if len(lines) > 1:
+        ax.legend()
+    return ax
 
 
 def whole_figure(ax: Axes) -> Figure:

@@ -1,7 +1,8 @@
-"""The deformed finger over its surface, coloured by a field."""
+"""The deformed finger over its surface, coloured by a field; several beside each other on one scale."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -10,12 +11,14 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
-from evfem.plotting.colours import EDGE, GROUND, STATUS
 from evfem.plotting.fields import (
+    TRACTIONS,
     Scale,
     Window,
     areas,
     check_field,
+    draw_arrows,
+    draw_outline,
     frame_of,
     patches,
     rounds,
@@ -24,10 +27,9 @@ from evfem.plotting.fields import (
     values_of,
     within,
 )
-from evfem.plotting.figures import WIDTH, add_colorbar, axes_or_new
+from evfem.plotting.figures import EDGE, GROUND, STATUS, WIDTH, Panels, add_colorbar, axes_or_new, new_figure
 from evfem.plotting.ground import Height, height_of
-from evfem.plotting.labels import field_label
-from evfem.plotting.outline import TRACTIONS, draw_arrows, draw_outline
+from evfem.plotting.labels import field_label, named
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ Near = Literal["contact"] | Window | None
 BELOW, MARGIN = 0.16, 0.03
 #: width of a close-up over that of the contact; its height over its width, for the tissue and the pad
 WIDER, OF_TISSUE, OF_PAD = 1.2, 0.42, 0.3
+ACROSS = 3.3  # inches for each of several fingers beside each other
 
 
 def deformed(
@@ -66,23 +69,77 @@ def deformed(
     """
     check_field(field)
     check_plane(result.mesh)
-    view = View(result, frame_of(result, frame), field)
+    return picture(View(result, frame_of(result, frame), field, smooth), near, (vmin, vmax), ax)
+
+
+def picture(view: Any, near: Near, limits: tuple[float | None, float | None], ax: Axes | None) -> Axes:
+    """A view (`View`, or that of a skin) with its title and colour bar."""
     window = view.window(near)
-    scale = scale_of(field, view.shown(window), vmin, vmax)
+    scale = scale_of(view.scaled_as, view.shown(window), *limits)
     ax = axes_or_new(ax, figure_height(window))
-    mapped = view.draw(ax, window, scale, smooth)
-    ax.set_title(told(result, view.frame), fontsize="medium")
-    label_bar(add_colorbar(mapped, ax, field_label(field), scale.extend), field)
+    mapped = view.draw(ax, window, scale)
+    ax.set_title(told(view.result, view.frame), fontsize="medium")
+    label_bar(add_colorbar(mapped, ax, field_label(view.field), scale.extend), view.field)
     return ax
+
+
+def side_by_side(
+    results: Mapping[str, Result],
+    field: str = "von_mises",
+    frame: int = -1,
+    *,
+    near: Near = "contact",
+    vmin: float | None = None,
+    vmax: float | None = None,
+) -> Panels:
+    """The deformed fingers of several results by their names: whole above, close-ups below.
+
+    All are coloured by one field on one scale, as `deformed` does it; `near=None` leaves out the
+    close-ups. The panels come row by row.
+    """
+    check_field(field)
+    views = {name: View(one, frame_of(one, frame), field) for name, one in named(results).items()}
+    rows = [[view.window(None) for view in views.values()]]
+    if near is not None:
+        rows.append([view.window(near) for view in views.values()])
+    shown = [
+        shown_values(view.result.mesh, view.frame, field, window)
+        for row in rows
+        for view, window in zip(views.values(), row, strict=True)
+    ]
+    scale = scale_of(field, np.concatenate(shown), vmin, vmax)
+    tall = [max(_height(window) for window in row) for row in rows]
+    figure = new_figure(sum(tall) + 0.75 * len(rows), ACROSS * len(views) + 1.0)
+    axes = figure.subplots(len(rows), len(views), squeeze=False, height_ratios=tall)
+    for panels, row in zip(axes, rows, strict=True):
+        for ax, view, window in zip(panels, views.values(), row, strict=True):
+            mapped = view.draw(ax, window, scale)
+            ax.set_title(told(view.result, view.frame), fontsize="x-small")
+    for ax, name in zip(axes[0], views, strict=True):
+        ax.set_title(name, fontsize="medium")
+    for ax in axes[:, 1:].ravel():
+        ax.set_ylabel("")
+    for ax in axes[:-1].ravel():
+        ax.set_xlabel("")
+    bar = figure.colorbar(mapped, ax=axes, label=field_label(field), shrink=0.8, extend=scale.extend)
+    label_bar(bar, field)
+    return Panels(axes.ravel())
+
+
+def _height(window: Window) -> float:
+    """Inches of a window that is as wide as its finger's place."""
+    left, right, bottom, top = window
+    return (ACROSS - 0.7) * (top - bottom) / (right - left)
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A frame of a result, and the field that it is coloured by."""
+    """A frame of a result, and the field that it is coloured by, `smooth` or cell by cell."""
 
     result: Result
     frame: Frame
     field: str
+    smooth: bool = True
 
     @property
     def points(self) -> Floats:
@@ -111,14 +168,14 @@ class View:
         """The values inside a window."""
         return shown_values(self.result.mesh, self.frame, self.field, window)
 
-    def draw(self, ax: Axes, window: Window, scale: Scale, smooth: bool = True) -> Any:
+    def draw(self, ax: Axes, window: Window, scale: Scale) -> Any:
         """Draw the view into axes, and return what a colour bar needs."""
         mesh, points = self.result.mesh, self.points
         height = height_of(self.result, self.frame)
         if self.field in POINT_FIELDS:
             mapped = draw_outline(ax, mesh, self.frame, self.field, scale)
         else:
-            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, smooth)
+            mapped = _draw_tissue(ax, mesh, points, values_of(self.frame, self.field), scale, self.smooth)
         _draw_borders(ax, mesh, points)
         _name_bone(ax, mesh, points, window)
         _draw_surface(ax, height, window)

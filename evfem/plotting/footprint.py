@@ -16,12 +16,9 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.faces import PLACES, shape_functions
-from evfem.plotting.colours import TISSUE
-from evfem.plotting.fields import Scale, Window, frame_of, scale_of, values_of, within
-from evfem.plotting.figures import add_colorbar, axes_or_new
-from evfem.plotting.finger import Near, checked_window, figure_height, label_bar, told
-from evfem.plotting.labels import field_label
-from evfem.plotting.outline import TRACTIONS
+from evfem.plotting.fields import TRACTIONS, Scale, Window, frame_of, values_of, within
+from evfem.plotting.figures import TISSUE
+from evfem.plotting.finger import Near, checked_window, picture
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 from evfem.surface.skin import Skin, make_skin
 
@@ -61,14 +58,7 @@ def footprint(
         raise InputError("field", quoted(field), " | ".join(POINT_FIELDS))
     if result.mesh.dim != 3:
         raise InputError("result", "a plane finger", "a finger in three dimensions; deformed(result) else")
-    view = SkinView(result, frame_of(result, frame), field)
-    window = view.window(near)
-    scale = scale_of(view.scaled_as, view.shown(window), vmin, vmax)
-    ax = axes_or_new(ax, figure_height(window))
-    mapped = view.draw(ax, window, scale)
-    ax.set_title(told(result, view.frame), fontsize="medium")
-    label_bar(add_colorbar(mapped, ax, field_label(field), scale.extend), field)
-    return ax
+    return picture(SkinView(result, frame_of(result, frame), field), near, (vmin, vmax), ax)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,6 +13,7 @@ from evfem.simulation.history import COLUMNS, SPATIAL, UNITS
 from evfem.simulation.result import Result
 
 Units = Mapping[str, str]
+Results = Result | Mapping[str, Result]
 
 #: last word of a column's name -> what it is; columns of one kind share an axis
 KINDS = {
@@ -136,3 +137,18 @@ def values_of(result: Result, name: str) -> Any:
     if name not in names:
         raise InputError("column", quoted(name), " | ".join(names))
     return result[name]
+
+
+def named(results: Results) -> dict[str, Result]:
+    """Results by their names; one alone has none."""
+    found = {"": results} if isinstance(results, Result) else dict(results)
+    if not found:
+        raise InputError("results", "nothing", "a result, or {name: result, ...}")
+    if any(result.units != units_of(found) for result in found.values()):
+        raise InputError("results", "some per mm of depth, some in total", "all of them alike")
+    return found
+
+
+def units_of(found: Mapping[str, Result]) -> Units:
+    """The units that all of these results have."""
+    return next(iter(found.values())).units

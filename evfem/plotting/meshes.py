@@ -11,9 +11,8 @@ import numpy as np
 
 from evfem.common.arrays import Ints
 from evfem.mesh.mesh import Mesh
-from evfem.plotting.colours import REGIONS
 from evfem.plotting.fields import rounds
-from evfem.plotting.figures import axes_or_new, whole_figure
+from evfem.plotting.figures import REGIONS, axes_or_new, whole_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

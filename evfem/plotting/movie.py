@@ -19,10 +19,9 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import count
 from evfem.common.storage import replacing
 from evfem.errors import InputError, StorageError, quoted
-from evfem.plotting.colours import BLACK, BLUE, GREEN, VERMILION
 from evfem.plotting.curves import abscissa, forces
 from evfem.plotting.fields import Scale, Window, check_field, scale_of
-from evfem.plotting.figures import WIDTH, add_colorbar
+from evfem.plotting.figures import BLACK, BLUE, GREEN, VERMILION, WIDTH, add_colorbar
 from evfem.plotting.finger import Near, View, figure_height, label_bar, told
 from evfem.plotting.footprint import SkinView
 from evfem.plotting.labels import field_label

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from evfem.errors import InputError, quoted
-from evfem.plotting.colours import CURVES, ONE_SIGN, STYLES
-from evfem.plotting.figures import add_colorbar, axes_or_new
+from evfem.plotting.figures import ONE_SIGN, add_colorbar, axes_or_new, curves, styled
 from evfem.plotting.labels import key_label
 
 if TYPE_CHECKING:
@@ -30,23 +28,19 @@ def sweep(table: SweepResult, x: str, y: str, by: str | None = None, ax: Axes | 
     abscissa stand in the order of the table.
     """
     rows = _done(table, x, y, *([by] if by else []))
-    ax = axes_or_new(ax)
-    groups = list(dict.fromkeys(row[by] for row in rows)) if by else [None]
-    names = _names(rows, x)
-    for value, colour, style in zip(groups, cycle(CURVES), cycle(STYLES), strict=False):
+    groups = {row[by]: row[by] for row in rows} if by else {None: None}
+    names, lines = _names(rows, x), []
+    for value, look in styled(groups):
         chosen = [row for row in rows if by is None or row[by] == value]
         across = np.array([names.index(row[x]) if names else row[x] for row in chosen])
-        up = np.array([row[y] for row in chosen])
-        order = np.argsort(across, kind="stable")
-        lines = table.provenance.get("samples") is None and len(set(across.tolist())) == len(across)
-        line = style if lines and not names else "none"
-        text = _value(table, by, value)
-        ax.plot(across[order], up[order], linestyle=line, marker="o", color=colour, label=text)
+        up, order = np.array([row[y] for row in chosen]), np.argsort(across, kind="stable")
+        if names or table.provenance.get("samples") is not None or np.unique(across).size < across.size:
+            look["linestyle"] = "none"
+        lines.append((across[order], up[order], look | {"label": _value(table, by, value), "marker": "o"}))
+    ax = curves(ax, lines, key_label(x, table.units), key_label(y, table.units))
     if names:
         ax.set_xticks(range(len(names)), [str(name) for name in names])
         ax.margins(x=0.15)
-    ax.set(xlabel=key_label(x, table.units), ylabel=key_label(y, table.units))
-    ax.grid(alpha=0.3)
     if by is not None:
         ax.legend()
     return ax

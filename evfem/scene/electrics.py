@@ -13,10 +13,10 @@ import numpy as np
 
 from evfem.common.arrays import Ints
 from evfem.common.checks import Values
-from evfem.electrostatics.charges import Sandwich
+from evfem.electrostatics.dielectrics import seen_at
 from evfem.electrostatics.drive import Drive, mean_law, powers, spectrum
 from evfem.electrostatics.laws import Layer, Layers, eps_0
-from evfem.electrostatics.relaxation import RelaxingSandwich, seen_at, stack_of
+from evfem.electrostatics.relaxation import Sandwich, stack_of
 from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
@@ -132,7 +132,7 @@ class Electrics:
         return getattr(self.law, "gap_eps_r", 1.0)
 
     @cached_property
-    def sandwich(self) -> Sandwich | RelaxingSandwich:
+    def sandwich(self) -> Sandwich:
         """The layers of a resolved drive as its charges see them."""
         assert self.drive is not None
         gap = {"gap_conductivity": self.drive.gap_conductivity, "gap_eps_r": self.gap_eps_r}

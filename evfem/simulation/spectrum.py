@@ -73,15 +73,23 @@ def spectrum(
     values = np.asarray(getattr(result, column), dtype=float)[used]
     if not np.isfinite(values).all():
         raise InputError("column", f"{column}, which is not known in all rows", "a column of finite values")
+    amplitude = amplitudes(values, window)
+    return Spectrum(np.arange(amplitude.size) / (values.size * step), amplitude)
+
+
+def amplitudes(values: Floats, window: str) -> Floats:
+    """One-sided amplitudes, from the mean's on, of evenly spaced values (n,).
+
+    scipy.signal.periodogram would be as long, and its import takes half a second.
+    """
     size, mean = values.size, values.mean()
-    # scipy.signal.periodogram would be as long, and its import takes half a second
     if window == "hann":
         values = mean + (values - mean) * (1.0 - np.cos(2.0 * np.pi * (np.arange(size) + 0.5) / size))
     amplitude = np.abs(np.fft.rfft(values)) * 2.0 / size
     amplitude[0] = abs(mean)
     if size % 2 == 0:
         amplitude[-1] *= 0.5
-    return Spectrum(np.arange(amplitude.size) / (size * step), amplitude)
+    return np.asarray(amplitude)
 
 
 def _rows(result: Result, start: float | None, stop: float | None) -> tuple[Any, float]:

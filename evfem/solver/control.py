@@ -41,7 +41,7 @@ from evfem.contact.condensed import (
     StepSolution,
 )
 from evfem.contact.signorini import STICK
-from evfem.electrostatics.measures import Reading, Seen, electrode_charge, smallest_gap
+from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
 from evfem.solver.hand import Grip
 from evfem.solver.state import State, StepFailed
 

@@ -29,7 +29,7 @@ from evfem.common.constants import SMALLEST_FORCE
 from evfem.contact.attraction import TOUCHING, Attraction
 from evfem.contact.signorini import ContactNotSolved, Unstable
 from evfem.contact.stability import Verge
-from evfem.electrostatics.measures import Seen
+from evfem.electrostatics.signals import Seen
 from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface

@@ -44,7 +44,7 @@ from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import FORWARD, ContactNotSolved
 from evfem.contact.stability import SLOPES, Verge, verge
-from evfem.electrostatics.measures import Seen
+from evfem.electrostatics.signals import Seen
 from evfem.solver.anderson import Anderson
 from evfem.solver.control import Target, VoltageProblem
 from evfem.solver.findings import findings

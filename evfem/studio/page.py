@@ -11,28 +11,18 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import keys_of
+from evfem.common.checks import Key, keys_of
 from evfem.common.tables import csv_text
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS
 from evfem.electrostatics.signalfile import write_signal
 from evfem.errors import InputError
+from evfem.estimate.display import Device, Rendering, playback, render, render_exact, spectrum_of
+from evfem.estimate.estimate import estimate
+from evfem.estimate.touch import FrictionCurve, touch_scene
 from evfem.scene.file import dump
+from evfem.scene.keys import read
 from evfem.studio.state import State, rows
-from evfem.textures.cleaning import Cleaning
-from evfem.textures.estimate import estimate
-from evfem.textures.feeling import Device, Rendering, playback, render, render_exact
-from evfem.textures.importing import (
-    LONGEST_WAVE,
-    Source,
-    friction_profile,
-    from_csv,
-    from_image,
-    from_recording,
-    kind_of,
-)
-from evfem.textures.scans import from_scan
-from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, touch_scene
+from evfem.textures.importers import IMPORTERS, friction_profile, importer_of
 
 #: points of a curve that is drawn
 POINTS = 401
@@ -50,18 +40,35 @@ LOST = 0.02
 
 
 def with_choices(content: bytes) -> bytes:
-    """The page with the force laws and insulators to choose from; a law that needs parameters is none."""
+    """The page with what there is to choose from: force laws without parameters, insulators, and the
+    options of importers.
+    """
     laws = {name: name for name, law in FORCE_LAWS.items() if not any(key.required for key in keys_of(law))}
     insulators = {name: f"{name}, {1e3 * one.thickness:g} um" for name, one in INSULATORS.items()}
-    for place, choices in ((b"<!-- laws -->", laws), (b"<!-- insulators -->", insulators)):
-        content = content.replace(place, "".join(map(_option, choices.items())).encode())
+    options = {key.name: key for one in IMPORTERS.values() for key in keys_of(one) if key.name != "name"}
+    for place, parts in (
+        (b"<!-- laws -->", [_option(*one, Device().law) for one in laws.items()]),
+        (b"<!-- insulators -->", [_option(*one, Device().insulator) for one in insulators.items()]),
+        (b"<!-- importers -->", map(_control, options.values())),
+    ):
+        content = content.replace(place, "".join(parts).encode())
     return content
 
 
-def _option(choice: tuple[str, str]) -> str:
-    name, text = map(escape, choice)
-    chosen = " selected" if name in (Device().law, Device().insulator) else ""
-    return f'<option value="{name}"{chosen}>{text}</option>'
+def _option(name: str, text: str, usual: str) -> str:
+    return f'<option value="{escape(name)}"{" selected" * (name == usual)}>{escape(text)}</option>'
+
+
+def _control(key: Key) -> str:
+    """The control of an importer's option; empty where the importer has no usual value."""
+    unit = f" ({key.rule['unit']})" if key.rule.get("unit") else ""
+    label = escape(f"{key.name.capitalize()}{unit}: {key.meaning}")
+    usual = "" if key.required or key.default is None else str(key.default)
+    about = f'id="import-{key.name}" data-import="{key.name}"'
+    if "names" not in key.rule:
+        return f'<label>{label} <input {about} value="{escape(usual)}" maxlength="200"></label>\n'
+    options = "".join(_option(name, name, usual) for name in (*[""] * (not usual), *key.rule["names"]))
+    return f"<label>{label} <select {about}>{options}</select></label>\n"
 
 
 def answer(state: State) -> dict[str, Any]:
@@ -71,21 +78,23 @@ def answer(state: State) -> dict[str, Any]:
     x = np.linspace(0.0, min(state.touch.length, float(curve.x[-1])), POINTS)
     voltage = np.asarray(found.signal.profile(x))
     heights = np.interp(x, *state.texture.over(0.0, float(x[-1])))
-    frequency, wish, felt = _spectra(found, state.touch.speed, x)
+    wish, felt = (np.interp(x, found.curve.x, one) for one in (found.curve.friction, found.felt))
+    frequency, wished = spectrum_of(x, wish, state.touch.speed)
+    given = spectrum_of(x, felt, state.touch.speed)[1]
     return {
         "quantity": state.texture.quantity,
         "x": _short(x),
         "profile": _short(heights * (1e3 if state.texture.quantity == "height" else 1.0)),
-        "friction": _short(np.interp(x, curve.x, curve.friction)),
-        "felt": _short(np.interp(x, curve.x, found.felt)),
+        "friction": _short(wish),
+        "felt": _short(felt),
         "lost": [bool(one) for one in np.interp(x, curve.x, found.lost.astype(float)) > 0.5],
         "band": curve.error,
         "source": curve.source,
         "encoding": "closed form" if state.exact is None else "model",
         "voltage": _short(voltage),
         "frequency": _short(frequency),
-        "wish": _short(wish),
-        "given": _short(felt),
+        "wish": _short(wished),
+        "given": _short(given),
         "numbers": _numbers(found),
         "bands": [[None if value != value else round(value, 6) for value in band] for band in found.bands],
         "notes": [*notes, *_warnings(found)],
@@ -106,17 +115,6 @@ def _rendering(state: State, curve: FrictionCurve) -> Rendering:
     if state.exact is not None:
         return render_exact(curve, state.exact, state.touch, state.device)
     return render(curve, state.touch, state.device)
-
-
-def _spectra(found: Rendering, speed: float, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Frequencies (Hz) and amplitudes of the wish and of what is felt."""
-    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size)
-    both = []
-    for values in (found.curve.friction, found.felt):
-        even = np.interp(x, found.curve.x, values)
-        both.append(2.0 / x.size * np.abs(np.fft.rfft((even - even.mean()) * window)))
-    frequency = np.arange(0.0, both[0].size) * (speed / float(x[-1] - x[0]))
-    return frequency[1:], both[0][1:], both[1][1:]
 
 
 def _numbers(found: Rendering) -> dict[str, float | None]:
@@ -166,49 +164,32 @@ def file(state: State, kind: str) -> bytes:
 
 
 def uploaded(data: bytes, name: str, options: dict[str, str]) -> dict[str, Any]:
-    """The texture in an uploaded file, as the page keeps it; read by the importers.
-
-    `options`: licence, and as they are needed pixel, depth, speed, quantity, longest, channel, row,
-    unit, smooth, mean, rms.
+    """The texture in an uploaded file, as the page keeps it; `options` are those of the importers, and
+    `mean` and `rms` of the friction of a recording.
     """
     safe = "".join(c for c in Path(name).name if c.isalnum() or c in "._- ")[-80:] or "file"
-    source = Source(options.get("licence", ""), Path(safe).stem[:80] or "file")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / safe
         path.write_bytes(data)
-        return rows(_imported(path, source, options))
+        _, importer = importer_of(path)
+        known = {
+            key.name: _number(text) if float in key.types else text
+            for key in keys_of(importer)
+            if (text := options.get(key.name))
+        }
+        texture = read(importer, known | {"name": Path(safe).stem[:80] or "file"}, "")(path)
+    if texture.quantity == "friction_spectrum":
+        mean, rms = (_number(options.get(key) or usual) for key, usual in (("mean", "0.4"), ("rms", "0.02")))
+        texture = friction_profile(texture, mean, rms, length=20.0)
+    return rows(texture)
 
 
-def _imported(path: Path, source: Source, options: dict[str, str]) -> Texture:
-    cleaning = Cleaning(smooth=_number(options, "smooth"))
-    how, row, unit = kind_of(path), _number(options, "row", 0.5), options.get("unit") or None
-    if how == "recording":
-        spectrum = from_recording(
-            path,
-            source,
-            _number(options, "speed") or 0.0,
-            quantity=options.get("quantity") or None,
-            longest=_number(options, "longest", LONGEST_WAVE) or 0.0,
-            channel=options.get("channel") or None,
-        )
-        mean, rms = _number(options, "mean") or 0.4, _number(options, "rms") or 0.02
-        return friction_profile(spectrum, mean, rms, length=20.0)
-    if how == "image":
-        sizes = {key: _number(options, key) or 0.0 for key in ("pixel", "depth")}
-        return from_image(path, source, **sizes, row=row or 0.0, cleaning=cleaning)
-    if how == "csv":
-        return from_csv(path, source, cleaning, unit)
-    return from_scan(path, source, row=row or 0.0, unit=unit, cleaning=cleaning)
-
-
-def _number(options: dict[str, str], key: str, usual: float | None = None) -> float | None:
-    text = options.get(key, "")
-    if not text:
-        return usual
+def _number(text: str) -> Any:
+    """What was written into a control; what is no number is refused by who needs one."""
     try:
         return float(text)
     except ValueError:
-        raise InputError(key, repr(text[:40]), "a number") from None
+        return text
 
 
 def text(value: Any) -> bytes:

@@ -81,38 +81,34 @@ def _work(line: Connection, text: str, exact: bool) -> None:
     """In the process: run, and send what is found."""
     os.environ["MPLBACKEND"] = "agg"
     try:
-        (_send_exact if exact else _sent)(line.send, parse(text))
+        for found in _found(parse(text), exact, _Steps(line.send)):
+            line.send(found)
     except EvfemError as error:
         line.send({"error": str(error)})
 
 
-def _sent(send: Callable[[dict[str, Any]], None], state: State) -> None:
-    from evfem.simulation.run import simulate
-    from evfem.textures.touch import friction_of, touch_scene
+def _found(state: State, exact: bool, observer: Observer) -> Iterator[dict[str, Any]]:
+    """The friction curve, then the exact voltage or the pictures."""
+    from evfem.estimate.display import exact_voltage
+    from evfem.estimate.rendering import record
+    from evfem.estimate.touch import friction_of, touch_scene
 
-    scene = touch_scene(state.texture, state.touch)
-    steps = sum(one.steps for one in scene.motion)
-    scene = touch_scene(state.texture, state.touch, every=max(steps // PICTURES, 1))
-    observer: Observer = _Steps(send)
-    result = simulate(scene, observers=(observer,))
-    curve = friction_of(result)
-    send({"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}})
-    send({"picture": _picture(result)})
-    send({"animation": _animation(result)})
-
-
-def _send_exact(send: Callable[[dict[str, Any]], None], state: State) -> None:
-    from evfem.simulation.rendering import record
-    from evfem.textures.feeling import exact_voltage
-    from evfem.textures.touch import friction_of, touch_scene
-
-    observer: Observer = _Steps(send)
-    reference = record(touch_scene(state.texture, state.touch), (observer,))
+    steps = sum(one.steps for one in touch_scene(state.texture, state.touch).motion)
+    every = 0 if exact else max(steps // PICTURES, 1)
+    reference = record(touch_scene(state.texture, state.touch, every=every), (observer,))
     curve = friction_of(reference.result)
-    send({"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}})
-    found = exact_voltage(reference, state.device).curve
-    columns = {"x": found.x.round(6), "voltage": found.voltage.round(4), "friction": found.friction.round(7)}
-    send({"exact": {name: column.tolist() for name, column in columns.items()}})
+    yield {"curve": {"x": curve.x.round(6).tolist(), "friction": curve.friction.round(7).tolist()}}
+    if exact:
+        found = exact_voltage(reference, state.device)[0]
+        columns = {
+            "x": found.x.round(6),
+            "voltage": found.voltage.round(4),
+            "friction": found.friction.round(7),
+        }
+        yield {"exact": {name: column.tolist() for name, column in columns.items()}}
+    else:
+        yield {"picture": _picture(reference.result)}
+        yield {"animation": _animation(reference.result)}
 
 
 def _picture(result: Any) -> str:

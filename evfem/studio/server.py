@@ -151,15 +151,11 @@ class Handler(BaseHTTPRequestHandler):
         """The request's body; what is too long is not read."""
         length = self.headers.get("Content-Length", "")
         if not length.isdigit() or len(length) > 12:
-            raise self._closing(HTTPStatus.LENGTH_REQUIRED, "the length of a request must be said")
+            raise Refused(HTTPStatus.LENGTH_REQUIRED, "the length of a request must be said")
         if int(length) > most:
             sentence = f"{int(length) / 1e6:.1f} MB are too much; allowed: {most / 1e6:g} MB"
-            raise self._closing(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, sentence)
+            raise Refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, sentence)
         return self.rfile.read(int(length))
-
-    def _closing(self, status: HTTPStatus, sentence: str) -> Refused:
-        self.close_connection = True
-        return Refused(status, sentence)
 
     def _stream(self, state: str, exact: bool) -> None:
         """Lines of JSON as a run says them; the connection's end is the run's end."""

@@ -7,22 +7,25 @@ A texture that was drawn or uploaded travels as its rows.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from evfem.common.arrays import Floats
 from evfem.errors import InputError, quoted
-from evfem.textures.feeling import Device, ExactCurve
+from evfem.estimate.display import Device, ExactCurve
+from evfem.estimate.touch import FrictionCurve, Touch
+from evfem.scene.keys import read
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch
 
 #: most rows of a texture, and of a friction curve, that a page sends
 MOST_ROWS = 2000
+#: largest size of the numbers in a curve
+LARGEST = {"x": 1e4, "voltage": 1e5, "friction": 100.0}
 KEYS = ("texture", "touch", "device")
 ROWS = ("name", "kind", "x", "values", "licence", "quantity", "period", "provenance")
 
@@ -53,10 +56,10 @@ def parse(text: str | bytes) -> State:
     table = _table("state", table, (*KEYS, "model", "exact"))
     return State(
         _texture(table.get("texture", {"reference": "weave"})),
-        _build(Touch, "touch", table.get("touch", {})),
-        _build(Device, "device", table.get("device", {})),
-        _model(table.get("model")),
-        _exact(table.get("exact")),
+        read(Touch, table.get("touch", {}), "touch"),
+        read(Device, table.get("device", {}), "device"),
+        _curve("model", table, ("x", "friction"), partial(FrictionCurve, source="model")),
+        _curve("exact", table, ("x", "voltage", "friction"), ExactCurve),
     )
 
 
@@ -69,10 +72,6 @@ def _table(key: str, given: Any, keys: tuple[str, ...]) -> Mapping[str, Any]:
     return given
 
 
-def _build(cls: Any, key: str, given: Any) -> Any:
-    return cls(**_table(key, given, tuple(spec.name for spec in fields(cls))))
-
-
 def _texture(given: Any) -> Texture:
     """A reference texture, one by three knobs, or one by its rows."""
     if isinstance(given, dict) and "reference" in given:
@@ -81,10 +80,7 @@ def _texture(given: Any) -> Texture:
             raise InputError("texture", quoted(name), "the name of a reference texture")
         return reference(name)
     if isinstance(given, dict) and "generator" in given:
-        names = tuple(spec.name for spec in fields(Knobs))
-        knobs = dict(_table("texture", given, ("generator", *names)))
-        kind = knobs.pop("generator")
-        return make(kind, Knobs(**knobs), "dialled")
+        return make(given["generator"], read(Knobs, given, "texture", tag="generator"), "dialled")
     table = _table("texture", given, ROWS)
     missing = [key for key in ("x", "values", "licence") if key not in table]
     if missing:
@@ -92,14 +88,7 @@ def _texture(given: Any) -> Texture:
     size = len(table["x"]) if isinstance(table["x"], list) else 0
     if not 2 <= size <= MOST_ROWS:
         raise InputError("texture", f"{size} rows", f"2 to {MOST_ROWS} rows")
-    own = {"name": "drawn", "kind": "drawn", **table, "provenance": _notes(table.get("provenance", []))}
-    return Texture(**own)
-
-
-def _notes(given: Any) -> tuple[str, ...]:
-    if not isinstance(given, list):
-        raise InputError("provenance", quoted(given), "a list of sentences")
-    return tuple(given)
+    return Texture(**{"name": "drawn", "kind": "drawn", **table})
 
 
 def rows(texture: Texture) -> dict[str, Any]:
@@ -121,31 +110,20 @@ def rows(texture: Texture) -> dict[str, Any]:
     }
 
 
-def _model(given: Any) -> FrictionCurve | None:
-    if given is None:
+def _curve(key: str, state: Mapping[str, Any], names: tuple[str, ...], kind: Callable[..., Any]) -> Any:
+    """A curve of this kind by its columns of numbers over a rising x, within `LARGEST` of each, if given."""
+    if state.get(key) is None:
         return None
-    x, friction = _columns("model", given, {"x": 1e4, "friction": 100.0})
-    return FrictionCurve(x, friction, "model")
-
-
-def _exact(given: Any) -> ExactCurve | None:
-    if given is None:
-        return None
-    return ExactCurve(*_columns("exact", given, {"x": 1e4, "voltage": 1e5, "friction": 100.0}))
-
-
-def _columns(key: str, given: Any, most: Mapping[str, float]) -> list[Floats]:
-    """Columns of numbers over a rising x, within `most` of each."""
-    table = _table(key, given, tuple(most))
-    columns = [np.asarray(table.get(name, []), dtype=object) for name in most]
+    table = _table(key, state[key], names)
+    columns = [np.asarray(table.get(name, []), dtype=object) for name in names]
     numbers = all(type(value) in (int, float) for one in columns for value in one.ravel())
     if len({one.shape for one in columns}) != 1 or columns[0].ndim != 1 or not numbers:
-        raise InputError(key, "another shape", f"as many numbers in each of {', '.join(most)}")
+        raise InputError(key, "another shape", f"as many numbers in each of {', '.join(names)}")
     if not 16 <= columns[0].size <= MOST_ROWS:
         raise InputError(key, f"{columns[0].size} numbers", f"16 to {MOST_ROWS} in each column")
     found = [one.astype(float) for one in columns]
     if not all(np.isfinite(one).all() for one in found) or not (np.diff(found[0]) > 0.0).all():
         raise InputError(key, "numbers that are not finite or do not rise", "a curve of the model")
-    if any(np.abs(one).max() > limit for one, limit in zip(found, most.values(), strict=True)):
+    if any(np.abs(one).max() > LARGEST[name] for one, name in zip(found, names, strict=True)):
         raise InputError(key, "numbers out of range", "a curve of the model")
-    return found
+    return kind(*found)

@@ -17,12 +17,12 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from evfem.common.checks import Within, check_fields, choice, number
-from evfem.errors import InputError, quoted
+from evfem.common.checks import SEED, Checked, Within, between, choice, number
 from evfem.surface.textures import Grating
 from evfem.tensor import Array
 from evfem.textures.texture import Texture
@@ -31,28 +31,21 @@ from evfem.textures.texture import Texture
 FREE = "CC0-1.0"
 #: periods of the knob's frequency in what repeats, samples of the shortest wave, shortest over longest
 PERIODS, SAMPLES, BAND = 8, 32, 8
+AMPLITUDE = "of the sine with the same root mean square"
 
 
 @dataclass(frozen=True)
-class Knobs:
-    """What the generators share: `frequency` (1/mm), `amplitude` (mm), `irregularity` 0 to 1,
-    `seed`; `second` and `phase` (share and rad) of the second harmonic of `sinusoids`; `hurst` and
-    `beta`, None: by the irregularity.
-    """
+class Knobs(Checked):
+    """What the generators share; `hurst` and `beta`, None: by the irregularity."""
 
-    frequency: float = field(default=0.5, metadata=number("1/mm from 0.05 to 10", Within(0.05, 10.0)))
-    amplitude: float = field(default=0.02, metadata=number("mm above 0, up to 1", Within(0.0, 1.0, True)))
-    irregularity: float = field(default=0.0, metadata=number("a number from 0 to 1", Within(0.0, 1.0)))
-    second: float = field(default=0.0, metadata=number("a share from 0 to 2", Within(0.0, 2.0)))
-    phase: float = field(default=0.0, metadata=number("an angle from -10 to 10 rad", Within(-10.0, 10.0)))
-    hurst: float | None = field(default=None, metadata=number("an exponent from 0 to 1", Within(0.0, 1.0)))
-    beta: float | None = field(default=None, metadata=number("an exponent from 0 to 6", Within(0.0, 6.0)))
-    seed: int = 0
-
-    def __post_init__(self) -> None:
-        check_fields(self)
-        if isinstance(self.seed, bool) or not isinstance(self.seed, int) or not 0 <= self.seed < 2**63:
-            raise InputError("seed", quoted(self.seed), "a whole number, not negative")
+    frequency: Annotated[float, between(0.05, 10.0, "1/mm"), "of the first wave, or the lowest"] = 0.5
+    amplitude: Annotated[float, number("mm above 0, up to 1", Within(0.0, 1.0, True), "mm"), AMPLITUDE] = 0.02
+    irregularity: Annotated[float, between(0.0, 1.0), "from regular to irregular"] = 0.0
+    second: Annotated[float, between(0.0, 2.0), "share of the second harmonic of sinusoids"] = 0.0
+    phase: Annotated[float, between(-10.0, 10.0, "rad"), "of the second harmonic"] = 0.0
+    hurst: Annotated[float | None, between(0.0, 1.0), "Hurst exponent of self_affine"] = None
+    beta: Annotated[float | None, between(0.0, 6.0), "exponent of the spectrum of spectral"] = None
+    seed: Annotated[int, SEED, "of what is drawn"] = 0
 
 
 def make(kind: str, knobs: Knobs, name: str | None = None, licence: str = FREE) -> Texture:
@@ -88,7 +81,7 @@ def _sinusoids(knobs: Knobs) -> tuple[Array, Array]:
     power = np.exp(-0.5 * ((numbers - PERIODS) / width) ** 2)
     amplitude = knobs.amplitude * np.sqrt(power / power.sum())
     spread = knobs.irregularity > 0.0
-    phase = _phases(knobs.seed, numbers.size) if spread else np.zeros(numbers.size)
+    phase = phases(knobs.seed, numbers.size) if spread else np.zeros(numbers.size)
     waves = [(numbers, amplitude, phase)]
     if knobs.second > 0.0:
         waves.append((2 * numbers, knobs.second * amplitude, 2.0 * phase + knobs.phase))
@@ -108,10 +101,10 @@ def _power_law(knobs: Knobs, exponent: float) -> tuple[Array, Array]:
     numbers = np.arange(PERIODS, BAND * PERIODS + 1)
     amplitude = numbers ** (-0.5 * exponent)
     amplitude *= knobs.amplitude / np.sqrt(np.sum(amplitude**2))
-    return _sum([(numbers, amplitude, _phases(knobs.seed, numbers.size))], knobs.frequency)
+    return _sum([(numbers, amplitude, phases(knobs.seed, numbers.size))], knobs.frequency)
 
 
-def _phases(seed: int, size: int) -> Array:
+def phases(seed: int, size: int) -> Array:
     draw = random.Random(seed)  # its numbers are the same in every version of Python
     return np.array([2.0 * np.pi * draw.random() for _ in range(size)])
 

@@ -38,18 +38,8 @@ REFERENCES: dict[str, tuple[str, str, Knobs]] = {
 }
 #: name -> what it is, x (mm) of its rows, friction at each, and the period (mm)
 FRICTIONS: dict[str, tuple[str, tuple[float, ...], tuple[float, ...], float]] = {
-    "friction-steps": (
-        "stripes of two frictions",
-        (0.0, 1.95, 2.05, 3.95),
-        (0.3, 0.3, 0.5, 0.5),
-        4.0,
-    ),
-    "friction-ramps": (
-        "friction that rises and falls",
-        (0.0, 2.0),
-        (0.3, 0.6),
-        4.0,
-    ),
+    "friction-steps": ("stripes of two frictions", (0.0, 1.95, 2.05, 3.95), (0.3, 0.3, 0.5, 0.5), 4.0),
+    "friction-ramps": ("friction that rises and falls", (0.0, 2.0), (0.3, 0.6), 4.0),
 }
 
 

@@ -71,6 +71,8 @@ class Texture:
         choice("quantity", self.quantity, tuple(QUANTITIES))
         x = numbers("x", self.x, "a list of numbers")
         values = numbers(self.quantity, self.values, "a list of numbers")
+        if not isinstance(self.provenance, (list, tuple)):
+            raise InputError("provenance", quoted(self.provenance), "a list of sentences")
         set_frozen(self, x=x, values=values, provenance=tuple(self.provenance))
         if len(self.provenance) > MOST_NOTES:
             raise InputError("provenance", f"{len(self.provenance)} sentences", f"at most {MOST_NOTES}")
@@ -195,8 +197,6 @@ def read(path: str | Path) -> Texture:
     data = table["data"]
     if not isinstance(data, str) or Path(data).name != data or not data.endswith(".csv"):
         raise InputError("data", quoted(data), "the name of a csv file beside the .json")
-    if not isinstance(table["provenance"], list):
-        raise InputError("provenance", quoted(table["provenance"]), "a list of sentences")
     x, values = read_columns(path.with_name(data), header, "data")
     names = ("name", "kind", "licence", "quantity", "period", "provenance")
     found = Texture(x=x, values=values, **{name: table[name] for name in names})

@@ -25,7 +25,7 @@ import numpy as np
 import evfem as ev
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Layers
-from evfem.simulation.rendering import apparent_friction, compare, exact, record, replay, voltage_for
+from evfem.estimate.rendering import apparent_friction, compare, exact, record, replay, voltage_for
 
 # %% [markdown]
 # ## 1. Slide over the real surface

@@ -74,8 +74,8 @@ def main() -> None:
         shoot(driver, "studio.png", 1100, 830)
         shoot(driver, "studio-phone.png", 390, 844, mobile=True)
         driver.execute_script("document.querySelector('input[value=upload]').click()")
-        for name, value in (("smooth", "0.3"), ("depth", "0.05"), ("licence", "CC0-1.0")):
-            driver.execute_script(f"document.getElementById('{name}').value = '{value}'")
+        for name, value in (("smooth", "0.3"), ("pixel", "0.05"), ("depth", "0.05"), ("licence", "CC0-1.0")):
+            driver.execute_script(f"document.getElementById('import-{name}').value = '{value}'")
         driver.find_element("id", "file").send_keys(str(cloth(Path(folder))))
         until(driver, f"document.getElementById('uploaded').textContent.includes('rows') && {settled}")
         shoot(driver, "studio-upload.png", 1100, 900)

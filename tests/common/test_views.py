@@ -13,8 +13,8 @@ from tools.fakes import fake_result
 
 import evfem as ev
 from evfem.common.checks import keys_of
+from evfem.estimate.rendering import ApparentFriction, Comparison
 from evfem.scene import file as scenefile
-from evfem.simulation.rendering import ApparentFriction, Comparison
 from evfem.simulation.result import Result
 
 NAIL = ev.NeoHookean(E=20.0, nu=0.3)

@@ -27,6 +27,7 @@ from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.scene import file as scenefile
 from evfem.simulation.result import COLUMNS
 from evfem.sweeps import file as sweepfile
+from evfem.textures.importing import IMPORTERS
 from evfem.tissue import elements, space
 
 ROOT = Path(__file__).parents[2]
@@ -96,7 +97,7 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
     monkeypatch.setattr(elements, "ELEMENTS", table)
-    with patch.dict(FORCE_LAWS):  # and another a law
+    with patch.dict(FORCE_LAWS), patch.dict(IMPORTERS):  # and another a law and an importer
         run(page, {None}, capsys)
 
 

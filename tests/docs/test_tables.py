@@ -24,6 +24,12 @@ def test_the_columns_are_those_of_the_history():
         assert f"| `{name}` |{unit}| {MEANINGS[name]} |\n" in text
 
 
+def test_the_options_of_importers_are_their_fields():
+    text = (DOCS / "howto" / "texture.md").read_text(encoding="utf-8")
+    assert TABLES["importers"](text) == text
+    assert "- `--pixel` (image): width of a pixel of an image in mm; a width above zero; needed.\n" in text
+
+
 def test_an_entry_says_type_unit_default_range_and_meaning():
     width, _ = [key for one in schema.sections() for key in one.keys if key.name == "ridge_width"]
     assert TABLES["entry"](width) == (

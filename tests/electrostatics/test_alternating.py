@@ -18,8 +18,8 @@ from evfem.electrostatics import (
     step_pressure,
     step_rates,
 )
-from evfem.electrostatics.charges import Sandwich
 from evfem.electrostatics.laws import eps_0
+from evfem.electrostatics.relaxation import Relaxing, Sandwich
 
 CODATA_2018 = 8.8541878128e-12 / eps_0
 FREQUENCIES = np.array([1.0, 10.0, 30.0, 75.0, 250.0, 1e3, 1e4, 1e5])
@@ -153,7 +153,8 @@ def test_step_response_is_that_of_the_charges_by_a_matrix_exponential(gap, sigma
 
 
 def test_charges_under_a_ramp_are_those_of_many_small_steps():
-    stack = Sandwich(0.30 / 1136.0, 0.001 / 3.9, (2e-4 / (eps_0 * 1136.0), 1e-8 / eps_0, 0.0))
+    skin, film = Relaxing(0.30, 1136.0, 2e-4 / eps_0), Relaxing(0.001, 3.9, 0.0)
+    stack = Sandwich(skin, film, 1e-8 / eps_0, 0.30 / 1136.0 + 0.001 / 3.9)
     gap = np.array([0.0, 1e-3, 0.05])
     start = np.array([[1e3, -2e3, 5e2], [1e2, 3e3, -7e2]])
     whole = stack.after(gap, start, 20.0, 100.0, 2e-3)
@@ -183,7 +184,7 @@ def test_time_domain_against_the_phasor():
     for i in range(3):
         start = np.linalg.solve(np.eye(2) - charges[:, 1:, i], charges[:, 0, i])
         periodic = np.array(effective)[:, :, i] @ [1.0, *start]
-        field = periodic / (gap[i] + stack.skin + stack.insulator)
+        field = periodic / (gap[i] + stack.reference)
         mean = alternating_pressure(gap[i], RMS, frequency, skin=skin, skin_thickness=0.30, **LEAKING)
         # a straight part has less of the sine's amplitude than the sine: (w h)^2 / 6 = 4e-7 of the square
         assert np.mean(0.5 * eps_0 * field**2) == pytest.approx(mean, rel=1e-6)

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.electrostatics.core import Cored
 from evfem.electrostatics.laws import Layers
+from evfem.electrostatics.roughness import Cored
 
 SCREEN = Layers.of(ev.Layer(0.38, 1650.0), ev.Layer(0.001, 3.9))
 STEEPEST = 0.1 / 0.91 * 10.0 / 0.05004 / 6.0  # of the skin's modulus over the nodes' distance

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evfem import cli
-from evfem.electrostatics import hjif
+from evfem.electrostatics import signalfile
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signalfile import Playback, write_signal
@@ -159,7 +159,7 @@ def test_the_coefficient_at_full_scale_comes_from_an_encoding():
     display = Encoding(Kaczmarek(), layers, AreaLaw(112.0), friction=0.5)
     top = display.tangential_force(0.5, 2000.0) / 0.5
     profile = VoltageProfile([0.0, 10.0], [0.0, 1776.73])
-    _, _, mu = curve_of(hjif.document(profile, 2000.0, 20.0, (0.5, top)))
+    _, _, mu = curve_of(signalfile.haptics(profile, 2000.0, 20.0, (0.5, top)))
     assert mu[-1] == pytest.approx(0.6, abs=1e-6)  # 1776.73 V feels like 0.6: the example of Encoding
     assert mu[0] == pytest.approx(0.5, rel=1e-9)
 
@@ -176,7 +176,7 @@ def test_any_signal_has_the_published_structure(rows, speed, start):
         return
     profile = VoltageProfile(x, 300.0 * np.array([u for _, u in rows]))
     try:
-        file = hjif.document(profile, 300.0, speed, (0.2, 0.9))
+        file = signalfile.haptics(profile, 300.0, speed, (0.2, 0.9))
     except InputError:
         assert np.ptp(x) / speed > 100.0  # seconds: whole ticks a second were more than 1 % off
         return
@@ -195,12 +195,12 @@ def test_any_signal_has_the_published_structure(rows, speed, start):
 
 
 def test_ticks_are_the_finest_that_fit():
-    assert hjif.ticks(10.0, 20.0) == (-6, 20_000)
-    assert hjif.ticks(10.0, 48.1) == (-5, 4810)  # 48100 micrometres a second are more than 48000
-    assert hjif.ticks(70.0, 20.0) == (-5, 2000)  # 70000 micrometres are more than 16 bits hold
-    assert hjif.ticks(10.0, 12.34567) == (-6, 12_346)
+    assert signalfile.ticks(10.0, 20.0) == (-6, 20_000)
+    assert signalfile.ticks(10.0, 48.1) == (-5, 4810)  # 48100 micrometres a second are more than 48000
+    assert signalfile.ticks(70.0, 20.0) == (-5, 2000)  # 70000 micrometres are more than 16 bits hold
+    assert signalfile.ticks(10.0, 12.34567) == (-6, 12_346)
     with pytest.raises(InputError, match=r"speed: given 0.014 mm/s over 500 mm"):
-        hjif.ticks(500.0, 0.014)
+        signalfile.ticks(500.0, 0.014)
 
 
 def test_the_command_writes_the_same_file(tmp_path):
@@ -215,5 +215,5 @@ def test_the_command_writes_the_same_file(tmp_path):
 def test_the_carrier_stands_in_the_description():
     profile = VoltageProfile([0.0, 10.0], [0.0, 2000.0])
     given = (profile, 2000.0, 20.0, (0.5, 0.6))
-    assert "carrier of 10000.0 Hz" in hjif.document(*given, 10_000.0)["description"]
-    assert "carrier" not in hjif.document(*given)["description"]
+    assert "carrier of 10000.0 Hz" in signalfile.haptics(*given, 10_000.0)["description"]
+    assert "carrier" not in signalfile.haptics(*given)["description"]

@@ -6,7 +6,7 @@ from matplotlib.colors import to_rgb
 from tools.solids import block
 
 from evfem.mesh.mesh import raised
-from evfem.plotting.colours import REGIONS
+from evfem.plotting.figures import REGIONS
 from evfem.plotting.meshes import DIMMEST, EYE, cut_open, regions
 
 SIZE = (2.0, 3.0, 4.0)

@@ -11,7 +11,7 @@ from tools.fakes import fake_result
 from tools.meshes import KINDS
 
 from evfem.plotting import deformed
-from evfem.plotting.colours import STATUS
+from evfem.plotting.figures import STATUS
 
 
 def outline_of(ax):

@@ -9,8 +9,8 @@ import pytest
 import evfem as ev
 from evfem.common.checks import Within, number, plain
 from evfem.electrostatics import timesignals
+from evfem.electrostatics.alternating import grouped
 from evfem.electrostatics.laws import FORCE_LAWS, GapPermittivity, NamedLaw
-from evfem.electrostatics.spectrum import grouped
 from evfem.errors import InputError
 from evfem.scene.file import dump, loads
 from evfem.scene.schema import schema

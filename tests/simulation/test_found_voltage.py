@@ -11,7 +11,7 @@ import pytest
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.electrostatics.measures import Seen, electrode_charge, smallest_gap
+from evfem.electrostatics.signals import Seen, electrode_charge, smallest_gap
 from evfem.mesh.mesh import Mesh
 from evfem.simulation.barrier import rise
 from evfem.simulation.run import Run

@@ -10,7 +10,7 @@ from evfem.studies import common, fig13, rendered
 
 from evfem import studies
 from evfem.errors import InputError, NotConverged
-from evfem.simulation.rendering import ApparentFriction
+from evfem.estimate.rendering import ApparentFriction
 
 pytestmark = pytest.mark.solver
 

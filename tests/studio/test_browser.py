@@ -163,7 +163,7 @@ def test_a_scan_is_loaded_and_slid_over(page, tmp_path):
     lines = 1.5e-5 * np.sin(2.0 * np.pi * x / 2e-3)[:, None] * np.ones(3)
     Topography(lines, physical_sizes=(8e-3, 6e-5), unit="m").to_x3p(str(tmp_path / "scan.x3p"))
     page.choose("upload")
-    page.set("licence", "CC0-1.0")
+    page.set("import-licence", "CC0-1.0")
     page.driver.find_element("id", "file").send_keys(str(tmp_path / "scan.x3p"))
     page.until(lambda: "400 rows" in page.text("uploaded"))
     page.settled()

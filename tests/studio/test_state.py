@@ -27,7 +27,7 @@ DRAWN = {"x": [0.0, 0.5, 1.0, 1.5], "values": [0.0, 0.01, 0.0, -0.01], "licence"
         ({"texture": {"reference": "no"}}, "texture: given"),
         ({"texture": {"reference": ["a"]}}, "texture: given"),
         ({"texture": {"reference": "weave", "x": []}}, 'texture: given "x"'),
-        ({"texture": {"generator": "grating", "depth": 1}}, 'texture: given "depth"'),
+        ({"texture": {"generator": "grating", "depth": 1}}, "texture.depth: given an unknown key"),
         ({"texture": {"generator": "grating", "frequency": 1e9}}, "frequency: given"),
         ({"texture": {}}, "texture: given no x"),
         ({"texture": {**DRAWN, "x": [0.0] * (MOST_ROWS + 1)}}, f"2 to {MOST_ROWS} rows"),
@@ -35,7 +35,7 @@ DRAWN = {"x": [0.0, 0.5, 1.0, 1.5], "values": [0.0, 0.01, 0.0, -0.01], "licence"
         ({"texture": {**DRAWN, "licence": ""}}, "licence: given"),
         ({"texture": {**DRAWN, "provenance": "a"}}, "provenance: given"),
         ({"touch": {"load": "1"}}, "load: given"),
-        ({"touch": {"mass": 1.0}}, 'touch: given "mass"'),
+        ({"touch": {"mass": 1.0}}, "touch.mass: given an unknown key"),
         ({"device": {"law": "ohm"}}, "law: given"),
         ({"model": {"x": [1.0], "friction": [1.0]}}, "model: given"),
         ({"model": {"x": list(range(20)), "friction": ["a"] * 20}}, "model: given"),
@@ -123,9 +123,9 @@ def test_an_upload_is_read_by_the_importers_under_a_harmless_name():
     assert (found["name"], found["quantity"], len(found["x"])) == ("passwd", "height", 50)
     with pytest.raises(InputError, match="licence"):
         page.uploaded(data, "a.csv", {})
-    with pytest.raises(InputError, match="pixel: given"):
+    with pytest.raises(InputError, match="pixel: missing"):
         page.uploaded(b"\x89PNG", "a.png", {"licence": "CC0-1.0"})
-    with pytest.raises(InputError, match="smooth: given 'x'"):
+    with pytest.raises(InputError, match='smooth: given "x"'):
         page.uploaded(data, "a.csv", {"licence": "CC0-1.0", "smooth": "x"})
 
 

@@ -1,17 +1,25 @@
 """Files of others: units, levelling, gaps, spectra, grey values, and what was done said."""
 
 import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+from unittest.mock import patch
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image as Picture
 
+from evfem import cli
+from evfem.common.checks import Within, number
 from evfem.errors import InputError
-from evfem.textures import scans
-from evfem.textures.cleaning import Cleaning
-from evfem.textures.importing import Source, friction_profile, from_csv, from_image, from_recording
+from evfem.studio import page
+from evfem.textures import importers
+from evfem.textures.importers import Image, Recording, Scan, Table, friction_profile, importer_of
+from evfem.textures.importing import IMPORTERS, Heights
+from evfem.textures.texture import read
 
-SOURCE = Source("CC0-1.0", name="mine", note="From my table.")
+SOURCE = {"licence": "CC0-1.0", "name": "mine", "note": "From my table."}
 
 
 def csv(path, header, *columns):
@@ -30,7 +38,7 @@ def wav(path, samples, rate):
 def test_heights_in_micrometres_are_levelled_and_both_is_said(tmp_path):
     x = np.arange(0.0, 4000.0, 10.0)
     wave = 5.0 * np.sin(2.0 * np.pi * x / 1000.0)
-    texture = from_csv(csv(tmp_path / "a.csv", "x,height", x, wave + 0.02 * x + 7.0), SOURCE, unit="um")
+    texture = Table(**SOURCE, unit="um")(csv(tmp_path / "a.csv", "x,height", x, wave + 0.02 * x + 7.0))
     line = np.polynomial.Polynomial.fit(x, wave, 1)(x)
     np.testing.assert_allclose(texture.values, (wave - line) * 1e-3, atol=1e-9)
     assert texture.length == pytest.approx(3.99)
@@ -65,44 +73,45 @@ def test_each_column_has_the_unit_that_the_header_says(tmp_path, name, coding):
     separator = next((one for one in "\t;" if one in first), " " if name == "blanks" else ",")
     lines = [f"{larger * a:.9g}{separator}{larger * 1e3 * b:.9g}" for a, b in zip(x, z, strict=True)]
     (tmp_path / "p.txt").write_text("\n".join(["Stylus, 2 µm", head, *lines]), encoding=coding)
-    for reader in (from_csv, scans.from_scan):
-        texture = reader(tmp_path / "p.txt", SOURCE, cleaning=Cleaning(level="none"))
-        np.testing.assert_allclose(texture.values, z, atol=1e-11)
-        np.testing.assert_allclose(texture.x, x, atol=1e-9)
-        assert "as the header says" in texture.provenance[2]
+    kind, importer = importer_of(tmp_path / "p.txt")
+    assert kind == "csv"
+    texture = importer(**SOURCE, level="none")(tmp_path / "p.txt")
+    np.testing.assert_allclose(texture.values, z, atol=1e-11)
+    np.testing.assert_allclose(texture.x, x, atol=1e-9)
+    assert "as the header says" in texture.provenance[2]
 
 
 def test_a_column_without_a_unit_has_that_of_the_file_and_an_unknown_one_is_refused(tmp_path):
     rows = np.arange(50) * 0.02, np.sin(np.arange(50.0))
     path = csv(tmp_path / "a.csv", "x [mm],height", *rows)
-    texture = from_csv(path, SOURCE, Cleaning(level="none"), unit="um")
+    texture = Table(**SOURCE, level="none", unit="um")(path)
     assert np.abs(texture.values).max() == pytest.approx(1e-3, rel=1e-3)
     assert texture.provenance[2:4] == ("x in mm, as the header says.", "Other lengths were in um.")
     with pytest.raises(InputError, match=r"unit: given height in px; allowed: mm \| um"):
-        from_csv(csv(tmp_path / "b.csv", "x [mm],height [px]", *rows), SOURCE)
+        Table(**SOURCE)(csv(tmp_path / "b.csv", "x [mm],height [px]", *rows))
     with pytest.raises(InputError, match=r"unit: given frequency in Hz; allowed: 1/mm"):
-        from_csv(csv(tmp_path / "c.csv", "frequency [Hz],amplitude", *rows), SOURCE)
+        Table(**SOURCE)(csv(tmp_path / "c.csv", "frequency [Hz],amplitude", *rows))
 
 
 def test_heights_as_steep_as_a_wrong_unit_are_noted(tmp_path):
     x = np.arange(200) * 0.02
     wave = 5e-3 * np.sin(np.pi * x)  # slope 0.011
     for scale, noted in ((1.0, False), (1e3, True)):
-        texture = from_csv(csv(tmp_path / "a.csv", "x,height", x, scale * wave), SOURCE)
+        texture = Table(**SOURCE)(csv(tmp_path / "a.csv", "x,height", x, scale * wave))
         assert any("Rms slope 11.1" in note for note in texture.provenance) == noted
 
 
 def test_decimal_commas_and_gaps(tmp_path):
     (tmp_path / "a.csv").write_text("x;height\n" + "\n".join(f"0,{i}0;0,0{i}" for i in range(1, 9)) + "\n")
-    assert from_csv(tmp_path / "a.csv", SOURCE).provenance[2] == "Commas are decimal points."
+    assert Table(**SOURCE)(tmp_path / "a.csv").provenance[2] == "Commas are decimal points."
     (tmp_path / "b.csv").write_text("x,height\n0,0\n1,nan\n2,\n3,3\n4,4\n5,5\n")
-    texture = from_csv(tmp_path / "b.csv", SOURCE, Cleaning(level="none"))
+    texture = Table(**SOURCE, level="none")(tmp_path / "b.csv")
     assert texture.values.tolist() == pytest.approx([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 
 
 def test_a_parabola_is_taken_off():
     x = np.linspace(0.0, 3.0, 50)
-    _, height, notes = Cleaning(level="parabola")(x, 1.0 + 2.0 * x - 3.0 * x**2)
+    _, height, notes = Heights(**SOURCE, level="parabola").cleaned(x, 1.0 + 2.0 * x - 3.0 * x**2)
     assert np.abs(height).max() < 1e-12
     assert notes == ["Levelled: parabola taken off."]
 
@@ -110,23 +119,23 @@ def test_a_parabola_is_taken_off():
 def test_more_than_half_missing_is_refused():
     height = np.array([1.0, np.nan, np.nan, np.nan, 2.0])
     with pytest.raises(InputError, match="3 of 5 missing"):
-        Cleaning()(np.arange(5.0), height)
+        Heights(**SOURCE).cleaned(np.arange(5.0), height)
 
 
 def test_a_cut_that_leaves_nothing_is_refused():
     with pytest.raises(InputError, match="0 of 5 points"):
-        Cleaning(start=10.0)(np.arange(5.0), np.arange(5.0))
+        Heights(**SOURCE, start=10.0).cleaned(np.arange(5.0), np.arange(5.0))
 
 
 def test_smoothing_halves_a_wave_of_the_cut_off_length():
     x = np.arange(0.0, 40.0, 0.01)
-    _, height, _ = Cleaning(level="none", smooth=2.0)(x, np.sin(np.pi * x))
+    _, height, _ = Heights(**SOURCE, level="none", smooth=2.0).cleaned(x, np.sin(np.pi * x))
     assert np.ptp(height[1000:3000]) == pytest.approx(1.0, rel=5e-3)
 
 
 def test_friction_is_kept_as_it_is(tmp_path):
     path = csv(tmp_path / "f.csv", "x,friction", [0.0, 1.0], [0.3, 0.5])
-    texture = from_csv(path, SOURCE)
+    texture = Table(**SOURCE)(path)
     assert (texture.quantity, texture.values.tolist()) == ("friction", [0.3, 0.5])
 
 
@@ -134,7 +143,7 @@ def test_a_recording_is_a_spectrum_over_the_spatial_frequency(tmp_path):
     time = np.arange(8000) / 4000.0
     samples = 0.4 * np.sin(2 * np.pi * 62.5 * time) + 0.3 * np.sin(2 * np.pi * 125.0 * time)
     path = wav(tmp_path / "r.wav", samples, 4000)
-    texture = from_recording(path, SOURCE, speed=50.0, quantity="displacement")
+    texture = Recording(**SOURCE, speed=50.0, quantity="displacement")(path)
     assert texture.quantity == "friction_spectrum"
     strong = texture.x[texture.values > 0.2]
     assert np.all((np.abs(strong - 1.25) < 0.06) | (np.abs(strong - 2.5) < 0.06))
@@ -147,7 +156,7 @@ def test_an_acceleration_is_divided_by_the_square_of_the_frequency(tmp_path):
     time = np.arange(8192) / 4096.0
     low, high = 2 * np.pi * 64.0, 2 * np.pi * 128.0
     path = csv(tmp_path / "a.csv", "time,acceleration", time, np.sin(low * time) + 4.0 * np.sin(high * time))
-    texture = from_recording(path, SOURCE, speed=64.0)
+    texture = Recording(**SOURCE, speed=64.0)(path)
     power = [np.sum(texture.values[np.abs(texture.x - f) < 0.1] ** 2) for f in (1.0, 2.0)]
     assert power[0] / power[1] == pytest.approx(1.0, rel=0.02)
 
@@ -156,7 +165,7 @@ def test_an_acceleration_is_divided_by_the_square_of_the_frequency(tmp_path):
 def test_a_wave_has_its_length_at_every_rate(tmp_path, rate):
     """A grating of 2 mm under 20 mm/s is 10 Hz, however often it is sampled."""
     samples = 0.5 * np.sin(2 * np.pi * 10.0 * np.arange(rate) / rate)
-    texture = from_recording(wav(tmp_path / "g.wav", samples, rate), SOURCE, 20.0, quantity="height")
+    texture = Recording(**SOURCE, speed=20.0, quantity="height")(wav(tmp_path / "g.wav", samples, rate))
     assert texture.x[np.argmax(texture.values)] == pytest.approx(0.5, rel=1e-3)
 
 
@@ -169,14 +178,14 @@ def hand_held(time):
 def test_an_acceleration_is_the_same_texture_in_a_table_and_in_a_wav_and_without_the_hand(tmp_path):
     time = np.arange(4000) / 1000.0
     samples = hand_held(time)
-    table = from_recording(csv(tmp_path / "a.csv", "time,acceleration", time, samples), SOURCE, 50.0)
+    table = Recording(**SOURCE, speed=50.0)(csv(tmp_path / "a.csv", "time,acceleration", time, samples))
     path = wav(tmp_path / "a.wav", samples, 1000)
-    sound = from_recording(path, SOURCE, 50.0, quantity="acceleration")
+    sound = Recording(**SOURCE, speed=50.0, quantity="acceleration")(path)
     for texture in (table, sound):
         near = np.abs(texture.x - 2.0) < 0.2
         assert np.sum(texture.values[near] ** 2) > 0.99
         assert texture.x[0] >= 0.1
-    longer = from_recording(path, SOURCE, 50.0, quantity="acceleration", longest=20.0)
+    longer = Recording(**SOURCE, speed=50.0, quantity="acceleration", longest=20.0)(path)
     assert longer.x[np.argmax(longer.values)] == pytest.approx(3.0 / 50.0, rel=0.05)
 
 
@@ -184,16 +193,16 @@ def test_what_a_recording_holds_and_which_channel_must_be_said(tmp_path):
     time = np.arange(2000) / 1000.0
     one, other = np.sin(200 * np.pi * time), np.sin(100 * np.pi * time)
     with pytest.raises(InputError, match=r"quantity: given nothing, and r\.wav does not say"):
-        from_recording(wav(tmp_path / "r.wav", one, 1000), SOURCE, 50.0)
+        Recording(**SOURCE, speed=50.0)(wav(tmp_path / "r.wav", one, 1000))
     path = csv(tmp_path / "xy.csv", "time [ms],X,Y", 1e3 * time, one, other)
     with pytest.raises(InputError, match=r"channel: given nothing, of 2; allowed: x \| y \| 1 \| 2"):
-        from_recording(path, SOURCE, 50.0, quantity="velocity")
+        Recording(**SOURCE, speed=50.0, quantity="velocity")(path)
     for channel, wave in (("X", 2.0), (1, 2.0), ("y", 1.0), ("2", 1.0)):
-        texture = from_recording(path, SOURCE, 50.0, quantity="velocity", channel=channel)
+        texture = Recording(**SOURCE, speed=50.0, quantity="velocity", channel=channel)(path)
         assert texture.x[np.argmax(texture.values)] == pytest.approx(wave, rel=5e-3)
     wrong = csv(tmp_path / "a.csv", "time,acceleration", time, one)
     with pytest.raises(InputError, match="quantity: given height, of acceleration"):
-        from_recording(wrong, SOURCE, 50.0, quantity="height")
+        Recording(**SOURCE, speed=50.0, quantity="height")(wrong)
 
 
 def test_a_channel_of_a_wav_is_chosen_by_its_number(tmp_path):
@@ -203,15 +212,15 @@ def test_a_channel_of_a_wav_is_chosen_by_its_number(tmp_path):
     both = np.column_stack([np.sin(200 * np.pi * time), np.sin(100 * np.pi * time)])
     wavfile.write(tmp_path / "s.wav", 2000, both)
     with pytest.raises(InputError, match=r"channel: given nothing, of 2; allowed: 1 \| 2"):
-        from_recording(tmp_path / "s.wav", SOURCE, 50.0, quantity="height")
-    texture = from_recording(tmp_path / "s.wav", SOURCE, 50.0, quantity="height", channel=2)
+        Recording(**SOURCE, speed=50.0, quantity="height")(tmp_path / "s.wav")
+    texture = Recording(**SOURCE, speed=50.0, quantity="height", channel=2)(tmp_path / "s.wav")
     assert texture.x[np.argmax(texture.values)] == pytest.approx(1.0, rel=5e-3)
 
 
 def test_a_spectrum_becomes_friction_of_the_size_that_is_said(tmp_path):
     time = np.arange(8000) / 4000.0
     path = wav(tmp_path / "r.wav", np.sin(400 * time), 4000)
-    texture = from_recording(path, SOURCE, speed=50.0, quantity="friction")
+    texture = Recording(**SOURCE, speed=50.0, quantity="friction")(path)
     friction = friction_profile(texture, mean=0.4, rms=0.05, length=20.0, seed=1)
     assert np.mean(friction.values) == pytest.approx(0.4, abs=0.005)
     assert np.std(friction.values) == pytest.approx(0.05, rel=0.1)
@@ -222,10 +231,8 @@ def test_a_spectrum_becomes_friction_of_the_size_that_is_said(tmp_path):
 def test_grey_values_become_heights_of_the_depth_that_is_said(tmp_path):
     grey = np.zeros((5, 8), np.uint8)
     grey[2] = [0, 255, 0, 255, 0, 255, 51, 255]
-    Image.fromarray(grey).save(tmp_path / "cloth.png")
-    texture = from_image(
-        tmp_path / "cloth.png", SOURCE, pixel=0.1, depth=0.2, cleaning=Cleaning(level="none")
-    )
+    Picture.fromarray(grey).save(tmp_path / "cloth.png")
+    texture = Image(**SOURCE, pixel=0.1, depth=0.2, level="none")(tmp_path / "cloth.png")
     assert texture.values.tolist() == pytest.approx([0.0, 0.2, 0.0, 0.2, 0.0, 0.2, 0.04, 0.2])
     assert texture.x[-1] == pytest.approx(0.7)
     assert any("not measured" in note for note in texture.provenance)
@@ -244,12 +251,12 @@ GREYS = {
 
 
 def raw(path, depth=0.1):
-    return from_image(path, SOURCE, pixel=0.1, depth=depth, cleaning=Cleaning(level="none"))
+    return Image(**SOURCE, pixel=0.1, depth=depth, level="none")(path)
 
 
 @pytest.mark.parametrize("name", GREYS)
 def test_a_picture_has_all_its_greys_whatever_its_bits(tmp_path, name):
-    Image.fromarray(GREYS[name]).save(tmp_path / name)
+    Picture.fromarray(GREYS[name]).save(tmp_path / name)
     texture = raw(tmp_path / name)
     within = 1e-4 if GREYS[name].dtype.itemsize > 1 else 0.003
     np.testing.assert_allclose(texture.values, 0.1 * RAMP[0], atol=0.1 * within)
@@ -257,14 +264,14 @@ def test_a_picture_has_all_its_greys_whatever_its_bits(tmp_path, name):
 
 
 def test_a_faint_picture_of_16_bits_is_a_share_of_white_and_not_of_its_brightest_point(tmp_path):
-    Image.fromarray(np.array([[0, 4095, 0, 4095]], np.uint16)).save(tmp_path / "a.png")
+    Picture.fromarray(np.array([[0, 4095, 0, 4095]], np.uint16)).save(tmp_path / "a.png")
     assert raw(tmp_path / "a.png", 1.0).values.max() == pytest.approx(1.0 / 16.0, rel=1e-3)
 
 
 def test_where_a_picture_is_transparent_there_is_a_gap(tmp_path):
     grey = np.array([[0, 200, 100, 150, 200]], np.uint8)
     seen = np.array([[255, 0, 255, 255, 255]], np.uint8)
-    Image.merge("LA", [Image.fromarray(grey), Image.fromarray(seen)]).save(tmp_path / "a.png")
+    Picture.merge("LA", [Picture.fromarray(grey), Picture.fromarray(seen)]).save(tmp_path / "a.png")
     texture = raw(tmp_path / "a.png", 2.55)
     assert texture.values.tolist() == pytest.approx([0.0, 0.5, 1.0, 1.5, 2.0])
     assert "1 of 5 values missing, filled by straight lines." in texture.provenance
@@ -275,21 +282,46 @@ def test_damaged_files_are_refused(tmp_path, name):
     path = tmp_path / name
     path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\xff\xff")
     readers = {
-        "a.png": lambda: from_image(path, SOURCE, pixel=0.1, depth=0.1),
-        "a.wav": lambda: from_recording(path, SOURCE, speed=10.0, quantity="height"),
-        "a.csv": lambda: from_csv(path, SOURCE),
+        "a.png": lambda: Image(**SOURCE, pixel=0.1, depth=0.1)(path),
+        "a.wav": lambda: Recording(**SOURCE, speed=10.0, quantity="height")(path),
+        "a.csv": lambda: Table(**SOURCE)(path),
     }
     with pytest.raises(InputError, match="file: given"):
         readers[name]()
 
 
 def test_an_image_of_too_many_pixels_is_refused_before_it_is_decoded(tmp_path):
-    Image.new("1", (10_000, 5_000)).save(tmp_path / "large.png")
+    Picture.new("1", (10_000, 5_000)).save(tmp_path / "large.png")
     with pytest.raises(InputError, match="10000 x 5000 pixels"):
-        from_image(tmp_path / "large.png", SOURCE, pixel=0.1, depth=0.1)
+        Image(**SOURCE, pixel=0.1, depth=0.1)(tmp_path / "large.png")
 
 
 def test_without_the_extra_a_scan_is_refused_with_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setattr(scans, "find_spec", lambda name: None)
+    monkeypatch.setattr(importers, "find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"evfem\[scans\]"):
-        scans.from_scan(tmp_path / "a.x3p", SOURCE)
+        Scan(**SOURCE)(tmp_path / "a.x3p")
+
+
+def test_an_importer_of_ones_own_is_found_by_its_ending_and_has_its_options(tmp_path, capsys):
+    """One class: the command line and the page have its options."""
+    with patch.dict(IMPORTERS):
+
+        @dataclass(frozen=True, kw_only=True)
+        class Stairs(Heights, kind="stairs"):
+            """Steps of one height."""
+
+            riser: Annotated[float, number("above zero", Within(0.0, above=True), "mm"), "height of a step"]
+            endings = (".stairs",)
+
+            def __call__(self, path):
+                x = np.arange(8.0)
+                return self.heights(Path(path), "stairs", x, self.riser * np.floor(x / 2.0), [])
+
+        (tmp_path / "a.stairs").write_text("")
+        words = ["texture", "import", str(tmp_path / "a.stairs"), "--licence", "CC0-1.0", "--level", "none"]
+        words += ["--out", str(tmp_path / "a.json")]
+        assert cli.main(words) == 2
+        assert "--riser: missing" in capsys.readouterr().err
+        assert cli.main([*words, "--riser", "0.1"]) == 0
+        assert read(tmp_path / "a.json").values.max() == pytest.approx(0.3)
+        assert b"Riser (mm): height of a step" in page.with_choices(b"<!-- importers -->")

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
-from evfem.textures.cleaning import Cleaning
-from evfem.textures.importing import Source
-from evfem.textures.scans import from_scan
+from evfem.textures.importers import Scan
 
 pytestmark = [pytest.mark.scans, pytest.mark.filterwarnings("ignore::ImportWarning")]
-SOURCE = Source("CC0-1.0")
+SOURCE = {"licence": "CC0-1.0"}
 X = (np.arange(64) + 0.5) * 2.0 / 64
 HEIGHT = 0.01 * np.sin(2.0 * np.pi * X)  # mm
 
@@ -26,7 +24,7 @@ def write_scan(path, unit, scale):
 @pytest.mark.parametrize(("row", "factor"), [(0.0, 1.0), (0.5, 2.0), (1.0, 3.0)])
 def test_a_line_of_a_scan_is_in_millimetres(tmp_path, name, unit, scale, row, factor):
     write_scan(tmp_path / name, unit, scale)
-    texture = from_scan(tmp_path / name, SOURCE, row=row, cleaning=Cleaning(level="none"))
+    texture = Scan(**SOURCE, row=row, level="none")(tmp_path / name)
     np.testing.assert_allclose(texture.values, factor * HEIGHT, atol=1e-8)
     np.testing.assert_allclose(texture.x, X - X[0], atol=1e-9)
     assert f"Line {round(row * 2) + 1} of 3" in texture.provenance[1]
@@ -35,8 +33,8 @@ def test_a_line_of_a_scan_is_in_millimetres(tmp_path, name, unit, scale, row, fa
 def test_a_file_without_a_unit_needs_one(tmp_path):
     np.savetxt(tmp_path / "a.xyz", np.column_stack([X, HEIGHT]))
     with pytest.raises(InputError, match=r"unit: given .*without a unit"):
-        from_scan(tmp_path / "a.xyz", SOURCE)
-    texture = from_scan(tmp_path / "a.xyz", SOURCE, unit="mm", cleaning=Cleaning(level="none"))
+        Scan(**SOURCE)(tmp_path / "a.xyz")
+    texture = Scan(**SOURCE, unit="mm", level="none")(tmp_path / "a.xyz")
     np.testing.assert_allclose(texture.values, HEIGHT, atol=1e-9)
 
 
@@ -44,4 +42,4 @@ def test_a_file_without_a_unit_needs_one(tmp_path):
 def test_a_damaged_file_is_refused(tmp_path, name):
     (tmp_path / name).write_bytes(b"PK\x03\x04 nothing of that kind")
     with pytest.raises(InputError, match="file: given"):
-        from_scan(tmp_path / name, SOURCE)
+        Scan(**SOURCE)(tmp_path / name)

@@ -132,7 +132,7 @@ def test_a_measurement_of_the_same_name_is_not_replaced(tmp_path):
 
 @pytest.mark.parametrize(("key", "out"), [("--out", "wave.csv"), ("--signal", "wave.csv")])
 def test_results_go_to_no_texture_and_are_refused_before_the_slide(tmp_path, capsys, monkeypatch, key, out):
-    monkeypatch.setattr("evfem.textures.commands.simulate_texture", lambda *_: pytest.fail("was run"))
+    monkeypatch.setattr("evfem.estimate.commands.record", lambda *_: pytest.fail("was run"))
     _, rows = write(WAVE, tmp_path / "wave.json")
     before = rows.read_text()
     given = ["texture", "simulate", str(tmp_path / "wave.json"), key, str(tmp_path / out)]

@@ -38,7 +38,7 @@ function state() {
     touch: {ridged: get("ridged").value === "1", friction: number("friction"), load: number("load"),
       speed: number("speed"), length: number("length")},
     device: {friction: number("display"), law: get("law").value, insulator: get("insulator").value,
-      voltage_max: most >= Number(get("voltage_max").max) ? null : most},
+      voltage_max: most >= Number(get("voltage_max").max) ? undefined : most},
   };
 }
 
@@ -210,10 +210,8 @@ async function save(kind) {
 async function send() {
   const file = get("file").files[0];
   if (!file) return;
-  const options = {name: file.name, licence: get("licence").value, unit: get("unit").value, row: get("row").value,
-    pixel: get("pixel").value, depth: get("depth").value, smooth: get("smooth").value,
-    speed: get("recorded").value, mean: get("mean").value, quantity: get("quantity").value,
-    longest: get("longest").value, channel: get("channel").value};
+  const options = {name: file.name, mean: get("mean").value};
+  for (const one of document.querySelectorAll("[data-import]")) options[one.dataset.import] = one.value;
   try {
     upload = await (await post(`upload?${new URLSearchParams(options)}`, file)).json();
     get("uploaded").textContent = `${upload.name}: ${upload.x.length} rows. ${upload.provenance.join(" ")}`;
@@ -323,15 +321,11 @@ async function begin() {
   outputs();
   sketch();
   get("left").addEventListener("input", (event) => {
-    if (["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean",
-    "quantity", "longest", "channel"].includes(event.target.id)) return;
+    if (event.target.closest("[data-from=upload]")) return;
     outputs(); store(); refresh();
   });
   get("left").addEventListener("submit", (event) => event.preventDefault());
-  for (const id of ["file", "licence", "unit", "pixel", "depth", "smooth", "row", "recorded", "mean",
-    "quantity", "longest", "channel"]) {
-    get(id).addEventListener("change", async () => { await send(); store(); });
-  }
+  document.querySelector("[data-from=upload]").addEventListener("change", async () => { await send(); store(); });
   get("canvas").addEventListener("pointerdown", (event) => {
     before = null;
     get("canvas").setPointerCapture(event.pointerId);

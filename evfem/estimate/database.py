@@ -30,20 +30,20 @@ from evfem.common.pools import open_pool
 from evfem.common.storage import alone_in, write_text
 from evfem.common.tables import csv_text, read_columns, read_table
 from evfem.errors import InputError
+from evfem.estimate.correction import corrected, corrections, importance
+from evfem.estimate.estimators import Estimator, best_kernel
+from evfem.estimate.parametric import RANGES, SAMPLES, SPEED, Parametric, at, scene
+from evfem.estimate.pressed import FILE as PADS
+from evfem.estimate.pressed import Remembered, remember, write
+from evfem.estimate.pressed import read as read_pad
+from evfem.estimate.sliding import slid
+from evfem.estimate.touch import Touch, steps_over, touch_scene
 from evfem.scene.file import dump
 from evfem.scene.scene import Scene
 from evfem.simulation.result import Result
 from evfem.sweeps.folder import Answer, SweepFolder
 from evfem.sweeps.run import answered, compute
-from evfem.textures.correction import corrected, corrections, importance
-from evfem.textures.estimators import Estimator, best_kernel
 from evfem.textures.library import REFERENCES, reference
-from evfem.textures.parametric import RANGES, SAMPLES, SPEED, Parametric, at, scene
-from evfem.textures.pressed import FILE as PADS
-from evfem.textures.pressed import Remembered, remember, write
-from evfem.textures.pressed import read as read_pad
-from evfem.textures.sliding import slid
-from evfem.textures.touch import Touch, steps_over, touch_scene
 
 #: points of Sobol's sequence for each finger
 INNER = 192

@@ -15,19 +15,20 @@ only adds to it, and where the amplifier cannot follow.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, among, check_fields, number, one_of
+from evfem.common.checks import Checked, among, between, one_of
 from evfem.electrostatics.drive import Drive
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import FORCE_LAWS, INSULATORS, Layer, Layers
 from evfem.electrostatics.signalfile import Playback
 from evfem.electrostatics.signals import Amplifier, VoltageProfile
-from evfem.simulation.rendering import (
+from evfem.estimate.rendering import (
     NOISE,
     ApparentFriction,
     Comparison,
@@ -37,8 +38,9 @@ from evfem.simulation.rendering import (
     exact,
     voltage_for,
 )
+from evfem.estimate.touch import FrictionCurve, Touch, friction_of
+from evfem.simulation.spectrum import amplitudes
 from evfem.surface.surfaces import Display
-from evfem.textures.touch import FrictionCurve, Touch, friction_of
 
 #: edges of the bands in Hz: slow changes, and what the receptors of the skin are tuned to
 BANDS = (0.0, 5.0, 15.0, 50.0, 150.0, 500.0)
@@ -47,23 +49,19 @@ AREA, SKIN = 112.0, Layer(0.38, 1650.0)
 
 
 @dataclass(frozen=True)
-class Device:
-    """A display with its amplifier: own `friction`, force `law`, `insulator` (film or touchscreen),
-    largest effective voltage (V) and `slew` (V/s), None: without limit.
+class Device(Checked):
+    """A display with its amplifier.
 
     >>> Device(law="coulomb")
     Traceback (most recent call last):
     evfem.errors.InputError: law: given "coulomb"; allowed: strong_troxel | kaczmarek
     """
 
-    friction: float = field(default=0.25, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
-    law: str = field(default="kaczmarek", metadata=among(FORCE_LAWS))
-    insulator: str = field(default="film", metadata=one_of(*INSULATORS))
-    voltage_max: float | None = field(default=None, metadata=number("V from 1 to 1e5", Within(1.0, 1e5)))
-    slew: float | None = field(default=None, metadata=number("V/s from 1 to 1e9", Within(1.0, 1e9)))
-
-    def __post_init__(self) -> None:
-        check_fields(self)
+    friction: Annotated[float, between(0.01, 3.0), "coefficient of the display"] = 0.25
+    law: Annotated[str, among(FORCE_LAWS), "of the attraction"] = "kaczmarek"
+    insulator: Annotated[str, one_of(*INSULATORS), "on the display"] = "film"
+    voltage_max: Annotated[float | None, between(1.0, 1e5, "V"), "largest effective voltage"] = None
+    slew: Annotated[float | None, between(1.0, 1e9, "V/s"), "how fast that can change"] = None
 
     @property
     def encoding(self) -> Encoding:
@@ -119,8 +117,8 @@ def render(curve: FrictionCurve, touch: Touch, device: Device) -> Rendering:
 
 def _compared(curve: FrictionCurve, signal: Signal, felt: Floats, speed: float) -> Rendering:
     """What is `felt` (n,) against the wish."""
-    frequency, wanted = _amplitudes(curve.x, curve.friction, speed)
-    _, given = _amplitudes(curve.x, felt, speed)
+    frequency, wanted = spectrum_of(curve.x, curve.friction, speed)
+    _, given = spectrum_of(curve.x, felt, speed)
     change = curve.friction - curve.friction.mean()
     return Rendering(
         curve=curve,
@@ -139,16 +137,11 @@ def _relative(found: Floats, wanted: Floats) -> float:
     return float(np.linalg.norm(found - wanted)) / size if size > 1e-12 else float("nan")
 
 
-def _amplitudes(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
-    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window.
-
-    scipy.signal.periodogram would be as long, and its import takes half a second.
-    """
-    even = np.linspace(x[0], x[-1], x.size)
-    values = np.interp(even, x, friction)
-    window = 1.0 - np.cos(2.0 * np.pi * (np.arange(x.size) + 0.5) / x.size)
-    amplitude = 2.0 / x.size * np.abs(np.fft.rfft((values - values.mean()) * window))
-    return np.arange(1.0, amplitude.size) * speed / float(x[-1] - x[0]), amplitude[1:]
+def spectrum_of(x: Floats, friction: Floats, speed: float) -> tuple[Floats, Floats]:
+    """Frequencies (Hz) above 0 and amplitudes of a curve, at even spacing, with Hann's window."""
+    even = np.interp(np.linspace(x[0], x[-1], x.size), x, friction)
+    amplitude = amplitudes(even, "hann")[1:]
+    return np.arange(1.0, amplitude.size + 1.0) * speed / float(x[-1] - x[0]), amplitude
 
 
 def _band(
@@ -194,26 +187,13 @@ def render_exact(curve: FrictionCurve, found: ExactCurve, touch: Touch, device: 
     return _compared(curve, signal, felt, touch.speed)
 
 
-@dataclass(frozen=True, eq=False)
-class Exact:
-    """The coupled model's own voltage for a texture: both recordings, and how they compare."""
-
-    reference: Recording
-    display: Recording
-    comparison: Comparison
-
-    @property
-    def curve(self) -> ExactCurve:
-        """Voltage and friction over the position of the second slide, x = 0 where the texture begins."""
-        felt, result = friction_of(self.display.result), self.display.result
-        return ExactCurve(felt.x, result.voltage[result.motion_index == 2], felt.friction)
-
-
-def exact_voltage(reference: Recording, device: Device) -> Exact:
+def exact_voltage(reference: Recording, device: Device) -> tuple[ExactCurve, Comparison]:
     """The display's voltage that gives the same friction force as a recorded slide of `touch_scene`
-    over a texture, step by step (`rendering.exact`). Takes another run of the model.
+    over a texture, step by step (`rendering.exact`), from where the texture begins, and how the forces
+    compare. Takes another run of the model.
     """
     display = Display(INSULATORS[device.insulator], friction=device.friction)
     largest = 10_000.0 if device.voltage_max is None else device.voltage_max
-    rendered = exact(reference, display, FORCE_LAWS[device.law](), largest)
-    return Exact(reference, rendered, compare(reference.result, rendered.result))
+    result = exact(reference, display, FORCE_LAWS[device.law](), largest).result
+    felt, voltage = friction_of(result), result.voltage[result.motion_index == 2]
+    return ExactCurve(felt.x, voltage, felt.friction), compare(reference.result, result)

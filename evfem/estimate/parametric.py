@@ -15,12 +15,13 @@ change of friction is proportional to the slope.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, check_fields, number, yes_or_no
+from evfem.common.checks import Checked, Within, between, number, yes_or_no
 from evfem.finger.fingerpad import FingerPad
 from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
@@ -41,28 +42,26 @@ SAMPLES, STEPS_BEFORE, SPEED, VISCOSITY = 24, 12, 20.0, 1e-3
 SLIP_PER_FORCE = 130.0
 
 
-@dataclass(frozen=True)
-class Parametric:
-    """A texture with parameters, the load (N/mm), and whether the finger is `ridged`.
+def _up_to(high: float, unit: str = "") -> dict[str, Any]:
+    return number(f"above 0, up to {high:g} {unit}".rstrip(), Within(0.0, high, above=True), unit)
 
-    `wavelength` in mm, `slope` of the first sine, shares `in_phase` and `in_quadrature` of the
-    second harmonic, `friction` of the material.
+
+@dataclass(frozen=True)
+class Parametric(Checked):
+    """A texture with parameters, the load, and the finger.
 
     >>> texture = Parametric(wavelength=2.0, slope=0.1, in_phase=0.2)
     >>> f"{texture.amplitude:.4f} mm", texture.beyond()
     ('0.0318 mm', {})
     """
 
-    wavelength: float = field(default=2.0, metadata=number("mm above 0, up to 100", Within(0.0, 100.0, True)))
-    slope: float = field(default=0.1, metadata=number("a slope above 0, up to 10", Within(0.0, 10.0, True)))
-    in_phase: float = field(default=0.0, metadata=number("a share from -10 to 10", Within(-10.0, 10.0)))
-    in_quadrature: float = field(default=0.0, metadata=number("a share from -10 to 10", Within(-10.0, 10.0)))
-    friction: float = field(default=0.3, metadata=number("a number above 0, to 10", Within(0.0, 10.0, True)))
-    load: float = field(default=0.05, metadata=number("N/mm above 0, up to 10", Within(0.0, 10.0, True)))
-    ridged: bool = field(default=True, metadata=yes_or_no())
-
-    def __post_init__(self) -> None:
-        check_fields(self)
+    wavelength: Annotated[float, _up_to(100.0, "mm"), "of a wave"] = 2.0
+    slope: Annotated[float, _up_to(10.0), "of the first sine"] = 0.1
+    in_phase: Annotated[float, between(-10.0, 10.0), "share of the second harmonic"] = 0.0
+    in_quadrature: Annotated[float, between(-10.0, 10.0), "share of the second harmonic"] = 0.0
+    friction: Annotated[float, _up_to(10.0), "of the material"] = 0.3
+    load: Annotated[float, _up_to(10.0, "N/mm"), "on the finger"] = 0.05
+    ridged: Annotated[bool, yes_or_no(), "whether the finger has ridges"] = True
 
     @property
     def amplitude(self) -> float:
@@ -113,14 +112,23 @@ def scene(texture: Parametric) -> Scene:
     period in `SAMPLES` steps, after a first one over whole periods until everything slips.
     """
     periods = np.ceil(SLIP_PER_FORCE * texture.friction * texture.load / texture.wavelength)
+    slides = [(float(periods) * texture.wavelength, STEPS_BEFORE), (texture.wavelength, SAMPLES)]
+    return sliding(texture.surface(), texture, slides, name="texture")
+
+
+def sliding(
+    surface: Any, finger: Any, slides: list[tuple[float, int]], speed: float = SPEED, **more: Any
+) -> Scene:
+    """The coarse pad, viscous, is pressed to the `load` of a `ridged` or smooth finger and slid at that load:
+    lengths in mm and steps.
+    """
     return Scene(
-        FingerPad(resolution="coarse", ridges=texture.ridged, viscosity=VISCOSITY),
-        texture.surface(),
+        FingerPad(resolution="coarse", ridges=finger.ridged, viscosity=VISCOSITY),
+        surface,
         solver=Solver(dynamics="viscous", threads=1),
         motion=(
-            Press(force=texture.load, steps=4),
-            Slide(float(periods) * texture.wavelength, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
-            Slide(texture.wavelength, steps=SAMPLES, speed=SPEED, hold="force"),
+            Press(force=finger.load, steps=4),
+            *(Slide(length, steps=steps, speed=speed, hold="force") for length, steps in slides),
         ),
-        name="texture",
+        **more,
     )

@@ -7,18 +7,18 @@ import pytest
 
 from evfem.common.tables import read_table
 from evfem.errors import InputError
+from evfem.estimate.correction import corrected
+from evfem.estimate.database import CURVES, FILE, compute_database, read, reference_curves, shipped, textures
+from evfem.estimate.estimate import estimate, known_error, reduced
+from evfem.estimate.estimators import Estimator
+from evfem.estimate.parametric import RANGES, SAMPLES, Parametric, at, scene
+from evfem.estimate.pressed import shipped_pad
+from evfem.estimate.touch import Touch, touch_scene
 from evfem.simulation.run import simulate
 from evfem.sweeps.folder import Answer
-from evfem.textures.correction import corrected
-from evfem.textures.database import CURVES, FILE, compute_database, read, reference_curves, shipped, textures
-from evfem.textures.estimate import estimate, known_error, reduced
-from evfem.textures.estimators import Estimator
 from evfem.textures.generate import Knobs, make
 from evfem.textures.library import REFERENCES, reference
-from evfem.textures.parametric import RANGES, SAMPLES, Parametric, at, scene
-from evfem.textures.pressed import shipped_pad
 from evfem.textures.texture import Texture
-from evfem.textures.touch import Touch, touch_scene
 
 WAVE = make("sinusoids", Knobs(0.5, 0.02, second=0.3, phase=0.4))
 
@@ -197,7 +197,7 @@ def test_the_database_is_resumed_and_written_whole(tmp_path, monkeypatch):
         calls.append(text)
         return Answer("done", 0.1, "", {f"mu{i:02d}": 0.3 + 0.01 * i * len(calls) for i in range(128)})
 
-    module = "evfem.textures.database."
+    module = "evfem.estimate.database."
     monkeypatch.setattr(module + "textures", lambda: few)
     monkeypatch.setattr(module + "references", lambda: {("weave", True): touch_scene(WAVE, Touch())})
     monkeypatch.setattr(module + "_evaluate", fake)

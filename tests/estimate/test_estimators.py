@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from evfem.textures.estimators import Estimator, best_kernel
+from evfem.estimate.estimators import Estimator, best_kernel
 
 DRAW = np.random.default_rng(3)
 POINTS = np.concatenate([DRAW.random((40, 3)), np.array(np.meshgrid(*[[0.0, 1.0]] * 3)).reshape(3, -1).T])

@@ -9,12 +9,14 @@ and the friction,
 .. math:: q(f') = \sum_k w_k \left(q_k - \tfrac12 C_k f_k\right) + \bar C\,(f' - \tfrac12 \bar f)
 
 which is exact at what is stored, and in between where the compliance changes linearly with the
-force. The file holds the triangles of C in half precision: that the curves differ by less than they
-do from the model's is tested.
+force. The file holds the triangles of C in half precision, packed by what each bit pattern differs
+by from the one before: that the curves differ by less than they do from the model's is tested.
 """
 
 from __future__ import annotations
 
+import itertools
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -27,16 +29,13 @@ import evfem
 from evfem.common.arrays import Floats, Ints
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.contact.signorini import OPEN
-from evfem.finger.fingerpad import FingerPad
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
+from evfem.estimate.parametric import SLIP_PER_FORCE, STEPS_BEFORE, Parametric, sliding
 from evfem.simulation.run import Run
 from evfem.solver.condensation import make_condensation
 from evfem.surface.edge import outline_nodes
 from evfem.surface.surfaces import Flat
-from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 
-FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-1"
+FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-2"
 #: what is remembered: loads (N/mm) and friction coefficients
 LOADS, FRICTIONS = np.geomspace(0.02, 0.1, 5), np.array([0.1, 0.6])
 #: nodes kept beyond those that touch on the flat surface, on either side
@@ -103,12 +102,14 @@ def shipped_pad(ridged: bool) -> Remembered:
 def read(path: Path, ridged: bool) -> Remembered:
     """The pad of one finger in a file that `write` wrote."""
     arrays = load_arrays(path, "pads", FORMAT)
-    points, moved, force, triangles = (
+    points, moved, force, packed = (
         arrays[f"{name}_{int(ridged)}"] for name in ("points", "moved", "force", "triangle")
     )
     size = moved.shape[1]
     upper = np.triu_indices(size)
     compliance = np.zeros((len(moved), size, size), dtype=np.float32)
+    steps = np.frombuffer(zlib.decompress(packed.tobytes()), np.int16).reshape(len(moved), -1)
+    triangles = np.cumsum(steps, axis=1, dtype=np.int16).view(np.float16)
     compliance[:, upper[0], upper[1]] = triangles
     compliance[:, upper[1], upper[0]] = triangles
     return Remembered(points, moved, force, compliance)
@@ -119,33 +120,23 @@ def write(path: Path, pads: Mapping[bool, Remembered]) -> None:
     arrays = {"format": np.array(FORMAT)}
     for ridged, pad in pads.items():
         upper = np.triu_indices(pad.moved.shape[1])
+        triangles = pad.compliance[:, upper[0], upper[1]].astype(np.float16).view(np.int16)
+        steps = np.diff(triangles, axis=1, prepend=np.int16(0))
         arrays |= {
             f"points_{int(ridged)}": pad.points,
             f"moved_{int(ridged)}": pad.moved,
             f"force_{int(ridged)}": pad.force,
-            f"triangle_{int(ridged)}": pad.compliance[:, upper[0], upper[1]].astype(np.float16),
+            f"triangle_{int(ridged)}": np.frombuffer(zlib.compress(steps.tobytes(), 9), np.uint8),
         }
     save_arrays(path, arrays)
 
 
-def flat_scene(load: float, friction: float, ridged: bool) -> Scene:
-    """Sliding over a flat surface until the whole contact slips."""
-    slip = SLIP_PER_FORCE * friction * load
-    return Scene(
-        FingerPad(resolution="coarse", ridges=ridged, viscosity=VISCOSITY),
-        Flat(friction=friction),
-        solver=Solver(dynamics="viscous", threads=1),
-        motion=(
-            Press(force=load, steps=4),
-            Slide(slip, steps=STEPS_BEFORE, speed=SPEED, hold="force"),
-        ),
-        name="flat",
-    )
-
-
 def remember(ridged: bool) -> Remembered:
-    """Run the model on a flat surface at `LOADS` and `FRICTIONS`, and keep what is stored of it."""
-    runs = [_slid(flat_scene(load, mu, ridged)) for load in LOADS.tolist() for mu in FRICTIONS.tolist()]
+    """Run the model on a flat surface at `LOADS` and `FRICTIONS` until the whole contact slips, and keep
+    what is stored of it.
+    """
+    cases = itertools.product(LOADS.tolist(), FRICTIONS.tolist())
+    runs = [_slid(Parametric(friction=mu, load=load, ridged=ridged)) for load, mu in cases]
     mesh, pad = runs[0].model.mesh, runs[0].model.pad
     order = np.searchsorted(pad.nodes, outline_nodes(mesh))
     order = order[pad.free[order]]
@@ -163,8 +154,9 @@ def _y_first(vectors: Floats) -> Floats:
     return np.concatenate([vectors[:, :, 1], vectors[:, :, 0]], axis=1)
 
 
-def _slid(scene: Scene) -> Run:
-    run = Run(scene, None)
+def _slid(finger: Parametric) -> Run:
+    slide = SLIP_PER_FORCE * finger.friction * finger.load, STEPS_BEFORE
+    run = Run(sliding(Flat(friction=finger.friction), finger, [slide], name="flat"), None)
     for request in run.requests():
         run.advance(request)
         run.frames.clear()

@@ -23,14 +23,14 @@ from evfem.common.arrays import Floats
 from evfem.common.checks import choice
 from evfem.common.pools import blas_limits
 from evfem.errors import InputError
-from evfem.textures.correction import corrected
-from evfem.textures.database import Database, reference_curves, shipped
+from evfem.estimate.correction import corrected
+from evfem.estimate.database import reference_curves, shipped
+from evfem.estimate.parametric import SPEED, Parametric, at
+from evfem.estimate.pressed import shipped_pad
+from evfem.estimate.sliding import slid
+from evfem.estimate.touch import FrictionCurve, Touch, steps_over, surface_of
 from evfem.textures.library import REFERENCES, reference
-from evfem.textures.parametric import SPEED, Parametric, at
-from evfem.textures.pressed import shipped_pad
-from evfem.textures.sliding import slid
 from evfem.textures.texture import Texture
-from evfem.textures.touch import FrictionCurve, Touch, steps_over, surface_of
 
 #: wavelengths that are tried for a texture that ends, share of its waves' variance that is enough,
 #: mm before and behind the slide over a texture that does not repeat within it
@@ -137,7 +137,8 @@ class Estimate:
 def estimate(texture: Texture, touch: Touch) -> Estimate:
     """The apparent friction over `touch.length`."""
     if texture.quantity == "friction":
-        x, values = _sampled(texture, touch)
+        x = np.linspace(0.0, touch.length, int(np.clip(200 * touch.length, 100, 4000)) + 1)
+        values = np.interp(x, *texture.over(0.0, touch.length))
         return Estimate(FrictionCurve(x, values, "as measured"), ())
     found = reduced(texture)
     steep = 2.0 * np.pi * found.amplitude / found.wavelength
@@ -146,7 +147,8 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
     place = np.clip(wanted.point(), 0.0, 1.0)
     near = at(place, touch.ridged)
     database = shipped(touch.ridged)
-    response, error = _asked(database, place)
+    response, near_by = database.estimator(place), database.estimator.near(place)
+    error = float(np.sqrt(near_by @ database.errors**2))
     x, mu, missing = _friction(texture, touch, near, response)
     notes = _notes(wanted, found, touch)
     if near.slope * error > MUCH * np.ptp(mu):
@@ -156,12 +158,6 @@ def estimate(texture: Texture, touch: Touch) -> Estimate:
     if not database.estimator.holds(place):
         notes = (*notes, f"the texture is outside the hull of the database's points: {MODEL}")
     return Estimate(FrictionCurve(x, mu, "estimate", near.slope * error), notes, found)
-
-
-def _asked(database: Database, place: Floats) -> tuple[Floats, float]:
-    """The correction (3,) at a place (6,), and the error of the points near it over the slope."""
-    estimator = database.estimator
-    return estimator(place), float(np.sqrt(estimator.near(place) @ database.errors**2))
 
 
 def _friction(
@@ -199,11 +195,6 @@ def linear_friction(texture: Texture, touch: Touch) -> tuple[Floats, Floats, flo
     pad = shipped_pad(touch.ridged).at(touch.load, touch.friction)
     with blas_limits():  # small dense solves lose more by sharing
         return x, slid(pad, surface_of(texture, touch, 0.0), touch.friction, x, touch.speed), period
-
-
-def _sampled(texture: Texture, touch: Touch) -> tuple[Floats, Floats]:
-    x = np.linspace(0.0, touch.length, int(np.clip(200 * touch.length, 100, 4000)) + 1)
-    return x, np.interp(x, *texture.over(0.0, touch.length))
 
 
 def _notes(wanted: Parametric, found: Reduced, touch: Touch) -> tuple[str, ...]:

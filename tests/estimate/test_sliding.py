@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from evfem.estimate.correction import corrected, corrections, importance
+from evfem.estimate.database import linear_curve, shipped
+from evfem.estimate.pressed import FRICTIONS, LOADS, PressedPad, remember, shipped_pad
+from evfem.estimate.sliding import slid
 from evfem.surface.surfaces import Flat, Sinusoid
-from evfem.textures.correction import corrected, corrections, importance
-from evfem.textures.database import linear_curve, shipped
-from evfem.textures.pressed import FRICTIONS, LOADS, PressedPad, remember, shipped_pad
-from evfem.textures.sliding import slid
 
 POSITIONS = np.arange(1, 41) * 0.05
 

@@ -27,9 +27,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from evfem.common.arrays import Floats
+from evfem.estimate.parametric import VISCOSITY
+from evfem.estimate.pressed import PressedPad
 from evfem.finger.layers import TABLE_2
-from evfem.textures.parametric import VISCOSITY
-from evfem.textures.pressed import PressedPad
 
 #: mm that nodes may still move when a step is solved, and beyond which it is given up; iterations
 AT_REST, LOST, MOST_ITERATIONS = 1e-5, 5.0, 40

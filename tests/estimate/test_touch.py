@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from evfem.errors import InputError
+from evfem.estimate.touch import Touch, friction_of, touch_scene
 from evfem.textures.library import reference
 from evfem.textures.texture import Texture
-from evfem.textures.touch import Touch, friction_of, touch_scene
 
 WAVE = Texture("a b/ö", "drawn", np.arange(0.0, 2.0, 0.05), 0.01 * np.sin(np.pi * np.arange(0.0, 2.0, 0.05)),
                "CC0-1.0", period=2.0)  # fmt: skip

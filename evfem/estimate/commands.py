@@ -5,33 +5,26 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from evfem.common.checks import keys_of
 from evfem.common.notices import status, tell
 from evfem.common.storage import write_text
 from evfem.common.tables import csv_text
 from evfem.electrostatics.signalfile import write_signal
 from evfem.electrostatics.signals import VoltageProfile
 from evfem.errors import InputError, quoted
-from evfem.simulation.rendering import record
-from evfem.textures.cleaning import Cleaning
-from evfem.textures.estimate import estimate, known_error
-from evfem.textures.feeling import Device, exact_voltage, playback, render
+from evfem.estimate.display import Device, exact_voltage, playback, render
+from evfem.estimate.estimate import estimate, known_error
+from evfem.estimate.rendering import record
+from evfem.estimate.touch import FrictionCurve, Touch, friction_of, touch_scene
+from evfem.scene.keys import at, read
 from evfem.textures.generate import Knobs, make
-from evfem.textures.importing import LONGEST_WAVE, Source, from_csv, from_image, from_recording, kind_of
+from evfem.textures.importers import IMPORTERS, importer_of
 from evfem.textures.library import REFERENCES, about, find, names, reference
-from evfem.textures.scans import from_scan
 from evfem.textures.texture import Texture, is_data, write
-from evfem.textures.touch import FrictionCurve, Touch, friction_of, simulate_texture, touch_scene
-
-#: what each way of importing takes beside name, licence and note
-OPTIONS = {
-    "csv": ("unit", "level", "start", "stop", "smooth"),
-    "recording": ("speed", "quantity", "longest", "channel"),
-    "image": ("pixel", "depth", "row", "level", "start", "stop", "smooth"),
-    "scan": ("row", "unit", "level", "start", "stop", "smooth"),
-}
 
 
 def run(given: argparse.Namespace) -> None:
@@ -67,53 +60,25 @@ def _show(given: argparse.Namespace) -> None:
 
 
 def _make(given: argparse.Namespace) -> None:
-    knobs = Knobs(
-        given.frequency,
-        given.amplitude,
-        given.irregularity,
-        given.second,
-        given.phase,
-        given.hurst,
-        given.beta,
-        given.seed,
-    )
+    knobs = Knobs(**_given(given, Knobs))
     _written(make(given.kind, knobs, given.name or given.out.stem, given.licence), given.out)
 
 
 def _import(given: argparse.Namespace) -> None:
-    how = kind_of(given.file)
-    for name in sorted({option for options in OPTIONS.values() for option in options} - set(OPTIONS[how])):
-        if getattr(given, name) is not None:
-            allowed = ", ".join(f"--{option}" for option in OPTIONS[how])
-            raise InputError(f"--{name}", f"for a file that is taken for a {how}", allowed)
-    source = Source(given.licence, given.name, given.note)
-    cleaning = Cleaning(given.start, given.stop, given.level or "line", given.smooth)
-    row = 0.5 if given.row is None else given.row
-    if how == "csv":
-        texture = from_csv(given.file, source, cleaning, given.unit)
-    elif how == "recording":
-        texture = from_recording(
-            given.file,
-            source,
-            _needed("speed", given.speed, "mm/s"),
-            quantity=given.quantity,
-            longest=LONGEST_WAVE if given.longest is None else given.longest,
-            channel=given.channel,
-        )
-    elif how == "image":
-        pixel, depth = (_needed(name, getattr(given, name), "mm") for name in ("pixel", "depth"))
-        texture = from_image(given.file, source, pixel=pixel, depth=depth, row=row, cleaning=cleaning)
-    else:
-        texture = from_scan(given.file, source, row=row, unit=given.unit, cleaning=cleaning)
+    options, (_, importer) = _given(given, *IMPORTERS.values()), importer_of(given.file)
+    names = {*options, *(key.name for key in keys_of(importer))}
+    with at("", {name: f"--{name}" for name in names}):
+        texture = read(importer, options, "")(given.file)
     _written(texture, given.out)
     for note in texture.provenance:
         print(f"- {note}")
 
 
-def _needed(name: str, value: float | None, unit: str) -> float:
-    if value is None:
-        raise InputError(f"--{name}", "nothing", f"a number in {unit}, needed for this file")
-    return value
+def _given(given: argparse.Namespace, *classes: type, **renamed: str) -> dict[str, Any]:
+    """The options that were given of those that are fields of the classes."""
+    names = dict.fromkeys(key.name for one in classes for key in keys_of(one))
+    values = {name: getattr(given, renamed.get(name, name)) for name in names}
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def _written(texture: Texture, out: Path) -> None:
@@ -121,31 +86,28 @@ def _written(texture: Texture, out: Path) -> None:
     print(f"{texture}; in {', '.join(map(str, paths))}", flush=True)
 
 
-def touch_of(given: argparse.Namespace) -> Touch:
-    """The finger's part of the arguments."""
-    return Touch(not given.smooth_finger, given.friction, given.load, given.speed, given.length)
+def _felt(given: argparse.Namespace) -> tuple[Touch, Device]:
+    """The finger and the display."""
+    return Touch(**_given(given, Touch)), Device(**_given(given, Device, friction="display"))
 
 
 def _simulate(given: argparse.Namespace) -> None:
-    texture, touch, device = find(given.name), touch_of(given), device_of(given)
+    texture, (touch, device) = find(given.name), _felt(given)
     _check_outputs(given)
     with status(f"sliding over {texture.name}"):
-        if given.exact:
-            found = exact_voltage(record(touch_scene(texture, touch)), device)
-            curve = friction_of(found.reference.result)
-        else:
-            curve = simulate_texture(texture, touch)
+        reference = record(touch_scene(texture, touch))
+        exact, comparison = exact_voltage(reference, device) if given.exact else (None, None)
+    curve = friction_of(reference.result)
     _curve(curve, given.out)
-    if given.exact:
-        print(f"exact: {found.comparison}")
-        profile = VoltageProfile(found.curve.x, found.curve.voltage)
-        _signal(profile, touch, device, given.signal)
+    if exact is not None:
+        print(f"exact: {comparison}")
+        _signal(VoltageProfile(exact.x, exact.voltage), touch, device, given.signal)
     elif given.signal is not None:
         _render(curve, touch, device, given.signal)
 
 
 def _estimate(given: argparse.Namespace) -> None:
-    touch, device = touch_of(given), device_of(given)
+    touch, device = _felt(given)
     _check_outputs(given)
     found = estimate(find(given.name), touch)
     _curve(found.curve, given.out)
@@ -157,11 +119,6 @@ def _estimate(given: argparse.Namespace) -> None:
         tell(f"note: {note}")
     if given.signal is not None:
         _render(found.curve, touch, device, given.signal)
-
-
-def device_of(given: argparse.Namespace) -> Device:
-    """The display's part of the arguments."""
-    return Device(given.display, given.law, given.insulator, given.voltage_max, given.slew)
 
 
 def _check_outputs(given: argparse.Namespace) -> None:
@@ -210,7 +167,7 @@ def _curve(curve: FrictionCurve, out: Path | None) -> None:
 
 
 def _database(given: argparse.Namespace) -> None:
-    from evfem.textures.database import compute_database
+    from evfem.estimate.database import compute_database
 
     path, counted = compute_database(given.out, workers=given.workers, scheduler=given.scheduler)
     told = ", ".join(f"{number} {what}" for what, number in counted.items())

@@ -11,9 +11,7 @@ from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers, StrongTroxel
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Scene, Solver
-from evfem.simulation.rendering import (
+from evfem.estimate.rendering import (
     ApparentFriction,
     apparent_friction,
     compare,
@@ -23,6 +21,8 @@ from evfem.simulation.rendering import (
     replay,
     voltage_for,
 )
+from evfem.scene.motion import Press, Slide
+from evfem.scene.scene import Scene, Solver
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 PAD = finger(block(16, 3, sag=0.4), viscosity=1e-3)

@@ -7,22 +7,18 @@ rigid surface; a friction profile lies on a level one.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Within, check_fields, number, yes_or_no
+from evfem.common.checks import Checked, between, yes_or_no
 from evfem.errors import InputError
-from evfem.finger.fingerpad import FingerPad
-from evfem.protocols import Observer
-from evfem.scene.motion import Press, Slide
-from evfem.scene.scene import Output, Scene, Solver
+from evfem.estimate.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, sliding
+from evfem.scene.scene import Output, Scene
 from evfem.simulation.result import Result
-from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Profile
-from evfem.textures.parametric import SLIP_PER_FORCE, SPEED, STEPS_BEFORE, VISCOSITY
 from evfem.textures.texture import Texture
 
 #: steps of each mm and of a whole slide, rows of a friction table, mm of texture beside the finger
@@ -30,23 +26,19 @@ STEPS_PER_MM, MOST_STEPS, MOST_TABLE, BESIDE = 16, 400, 9_000, 10.0
 
 
 @dataclass(frozen=True)
-class Touch:
-    """How a finger slides: `ridged` or smooth, `friction` of the texture's material (that of heights;
-    a friction profile has its own), `load` (N/mm), `speed` (mm/s), `length` of the slide (mm).
+class Touch(Checked):
+    """How a finger slides over a texture.
 
     >>> Touch(load=-1.0)
     Traceback (most recent call last):
-    evfem.errors.InputError: load: given -1.0; allowed: N/mm from 0.001 to 1
+    evfem.errors.InputError: load: given -1.0; allowed: 0.001 to 1 N/mm
     """
 
-    ridged: bool = field(default=True, metadata=yes_or_no())
-    friction: float = field(default=0.3, metadata=number("a number from 0.01 to 3", Within(0.01, 3.0)))
-    load: float = field(default=0.05, metadata=number("N/mm from 0.001 to 1", Within(0.001, 1.0)))
-    speed: float = field(default=SPEED, metadata=number("mm/s from 0.1 to 1000", Within(0.1, 1000.0)))
-    length: float = field(default=8.0, metadata=number("mm from 0.5 to 50", Within(0.5, 50.0)))
-
-    def __post_init__(self) -> None:
-        check_fields(self)
+    ridged: Annotated[bool, yes_or_no(), "whether the finger has ridges"] = True
+    friction: Annotated[float, between(0.01, 3.0), "coefficient of the texture's material"] = 0.3
+    load: Annotated[float, between(0.001, 1.0, "N/mm"), "on the finger"] = 0.05
+    speed: Annotated[float, between(0.1, 1000.0, "mm/s"), "of the slide"] = SPEED
+    length: Annotated[float, between(0.5, 50.0, "mm"), "of the slide"] = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,18 +60,10 @@ def touch_scene(texture: Texture, touch: Touch, *, every: int = 0) -> Scene:
     The bone passes x = 0 when the second slide begins.
     """
     before = max(SLIP_PER_FORCE * touch.friction * touch.load, 0.5)
-    return Scene(
-        FingerPad(resolution="coarse", ridges=touch.ridged, viscosity=VISCOSITY),
-        surface_of(texture, touch, before),
-        solver=Solver(dynamics="viscous", threads=1),
-        motion=(
-            Press(force=touch.load, steps=4),
-            Slide(before, steps=STEPS_BEFORE, speed=touch.speed, hold="force"),
-            Slide(touch.length, steps=steps_over(touch.length), speed=touch.speed, hold="force"),
-        ),
-        output=Output(every=every) if every else Output(),
-        name=_file_name(texture.name),
-    )
+    slides = [(before, STEPS_BEFORE), (touch.length, steps_over(touch.length))]
+    output = Output(every=every) if every else Output()
+    surface, name = surface_of(texture, touch, before), _file_name(texture.name)
+    return sliding(surface, touch, slides, touch.speed, output=output, name=name)
 
 
 def steps_over(length: float) -> int:
@@ -110,8 +94,3 @@ def friction_of(result: Result) -> FrictionCurve:
         raise InputError("result", "no second slide", "the result of a scene of touch_scene")
     x = result.position[last] - result.position[~last][-1]
     return FrictionCurve(x, result.applied_tangential_force[last] / result.applied_force[last], "model")
-
-
-def simulate_texture(texture: Texture, touch: Touch, observers: Sequence[Observer] = ()) -> FrictionCurve:
-    """Slide over the texture by the full model."""
-    return friction_of(simulate(touch_scene(texture, touch), observers=observers))

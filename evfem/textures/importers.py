@@ -1,0 +1,361 @@
+"""Kinds of files that become textures: grey images, recordings of vibrations, tables, scans.
+
+A recording has no heights: an accelerometer does not feel them. It becomes the spectrum of the friction
+over the spatial frequency f / speed, the mean over half-overlapping windows of Hann (Welch 1967,
+doi:10.1109/TAU.1967.1161901) as long as `WAVES` of the longest waves, or as the recording. Size and phases
+are not known from such a file: `friction_profile` takes them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats
+from evfem.common.checks import Within, above, instance, number, one_of, real
+from evfem.common.pictures import read_grey
+from evfem.common.tables import Headed, read_headed
+from evfem.electrostatics import wav
+from evfem.errors import InputError, quoted
+from evfem.textures.generate import phases
+from evfem.textures.importing import IMPORTERS, POSITIVE, Heights, Importer
+from evfem.textures.texture import QUANTITIES, Texture
+
+#: units of length -> mm, of time -> s
+LENGTHS = {"mm": 1.0, "um": 1e-3, "µm": 1e-3, "μm": 1e-3, "nm": 1e-6, "cm": 10.0, "m": 1e3}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+#: names of columns that mean the same, and those that are no lengths
+OTHER_NAMES, PURE = {"z": "height", "position": "x", "distance": "x"}, ("friction", "frequency", "amplitude")
+#: endings of texts that may have a header
+TEXTS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".xyz")
+#: what is recorded -> how often it is integrated, and how that is said
+RECORDED = {"acceleration": 2, "velocity": 1, "displacement": 0, "height": 0, "friction": 0}
+INTEGRATED = ("", ", integrated once", ", integrated twice")
+#: how many of the longest waves a window holds; frequencies that are kept, and the highest in 1/mm
+WAVES, MOST_LINES, HIGHEST_FREQUENCY = 10, 400, 20.0
+IMAGES = ("PNG", "JPEG", "TIFF", "BMP")
+#: largest image in pixels; largest scan in bytes and in points
+MOST_PIXELS, MOST_BYTES, MOST_POINTS = 40_000_000, 512_000_000, 50_000_000
+
+Unit = Annotated[str | None, one_of(*LENGTHS), "of lengths for which the file names none; default: mm"]
+Row = Annotated[
+    float, number("a place from 0 to 1", Within(0.0, 1.0)), "which line, from the first to the last"
+]
+
+
+def importer_of(path: Path) -> tuple[str, type[Importer]]:
+    """The kind of a file and its class, by its ending, of a text by its header; else it is a scan."""
+    return next((one for one in IMPORTERS.items() if one[1].takes(path)), ("scan", Scan))
+
+
+def header_of(path: Path) -> list[str]:
+    """Names of the columns of a text, none where it cannot be read: whoever reads it says why."""
+    try:
+        return read_headed(path, "file").names if path.suffix.lower() in TEXTS else []
+    except InputError:
+        return []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Image(Heights, kind="image"):
+    """A line through a grey image, along its width: white lies `depth` above black.
+
+    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest
+    value are then black and white (`evfem.common.pictures`); colours are turned to grey, transparent
+    points are gaps. How deep something is cannot be read off a picture, and the provenance says that
+    `depth` was set.
+    """
+
+    pixel: Annotated[float, number("a width above zero", POSITIVE, "mm"), "width of a pixel of an image"]
+    depth: Annotated[float, number("a height above zero", POSITIVE, "mm"), "how deep black lies below white"]
+    row: Row = 0.5
+
+    endings = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp")
+
+    def __call__(self, path: str | Path) -> Texture:
+        path = Path(path)
+        allowed = f"an image ({', '.join(IMAGES)}) of up to {MOST_PIXELS} pixels, at least 4 wide"
+        grey, numbers = read_grey(path, "file", allowed, MOST_PIXELS, IMAGES)
+        if grey.shape[1] < 4:
+            raise InputError("file", f"{path}, {grey.shape[1]} x {grey.shape[0]} pixels", allowed)
+        line = round(self.row * (grey.shape[0] - 1))
+        height = grey[line] * self.depth
+        notes = [
+            f"Row {line + 1} of {grey.shape[0]}, {self.pixel:g} mm per pixel.",
+            numbers,
+            f"Heights are grey values, white set {self.depth:g} mm above black: they were not measured.",
+        ]
+        return self.heights(path, "image", np.arange(height.size) * self.pixel, height, notes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Table(Heights, kind="csv"):
+    """A text file with columns x and height (or z), x and friction, or frequency and amplitude (1/mm).
+
+    Each length has the unit that its header says, as in `x [mm], z [um]`, or without one `unit`. Heights
+    are cleaned, the others kept as they are.
+    """
+
+    unit: Unit = None
+
+    endings = (".csv",)
+
+    @classmethod
+    def takes(cls, path: Path) -> bool:
+        """By its ending, or a text by its header; one that begins with a time is a recording."""
+        names = header_of(path)
+        return names[:1] != ["time"] and (super().takes(path) or _quantity_of(names) is not None)
+
+    def __call__(self, path: str | Path) -> Texture:
+        path, table = Path(path), read_headed(Path(path), "file")
+        quantity = _quantity_of(table.names)
+        if quantity is None:
+            headers = " | ".join(",".join(header) for header, _ in QUANTITIES.values())
+            raise InputError("file", f"{path}, which starts with {','.join(table.names)[:60]!r}", headers)
+        scales = [_scale(name, own, self.unit) for name, own in _units(table)]
+        first, second = (column * scale for column, scale in zip(table.columns, scales, strict=True))
+        notes = _said(table, self.unit)
+        if quantity != "height":
+            return self.texture(path, "measured", (first, second), notes, quantity)
+        return self.heights(path, "measured", first, second, notes)
+
+
+def _quantity_of(names: list[str]) -> str | None:
+    """What columns of these names are."""
+    usual = [OTHER_NAMES.get(name, name) for name in names]
+    return next((quantity for quantity, (header, _) in QUANTITIES.items() if usual == header), None)
+
+
+def _units(table: Headed) -> list[tuple[str, str | None]]:
+    return list(zip(table.names, table.units, strict=True))
+
+
+def _said(table: Headed, unit: str | None) -> list[str]:
+    """In which units the lengths of a table were."""
+    own = [(name, said) for name, said in _units(table) if said and name not in PURE]
+    told = [f"{', '.join(f'{name} in {said}' for name, said in own)}, as the header says."] if own else []
+    if unit not in (None, "mm") and len(own) < sum(name not in PURE for name in table.names):
+        told.append(f"{'Other lengths' if own else 'Lengths'} were in {unit}.")
+    return [*told, *(["Commas are decimal points."] if table.commas else [])]
+
+
+def _scale(name: str, own: str | None, unit: str | None) -> float:
+    """What makes mm of the numbers of a column, or 1/mm of a frequency."""
+    units = dict.fromkeys(("1/mm", "1", "-", "mm^-1"), 1.0) if name in PURE else LENGTHS
+    found = own or (unit if name not in PURE else None) or next(iter(units))
+    if found not in units:
+        raise InputError("unit", f"{name} in {found}", " | ".join(units))
+    return units[found]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scan(Heights, kind="scan"):
+    """A line along x through a scanned surface, or a scanned profile, in one of the forty formats of
+    SurfaceTopography (extra `scans`); heights of .x3p files are in metres (ISO 25178-72).
+    """
+
+    row: Row = 0.5
+    unit: Unit = None
+
+    endings = (".x3p", ".sur", ".al3d", ".nc", ".opd", ".plux", ".di")
+
+    def __call__(self, path: str | Path) -> Texture:
+        path = Path(path)
+        if find_spec("SurfaceTopography") is None:
+            raise InputError("file", str(path), 'the extra scans: pip install "evfem[scans]"')
+        topography = _topography(path)
+        named = topography.unit or self.unit
+        if named not in LENGTHS:
+            given = f"{path}, {'without a unit' if named is None else f'in {named}'}"
+            raise InputError("unit", given, f"one of {', '.join(LENGTHS)}")
+        scale, note = LENGTHS[named], f"In {named}."
+        heights = np.ma.filled(np.ma.asarray(topography.heights(), dtype=float), np.nan) * scale
+        if topography.dim == 1:
+            x = np.asarray(topography.positions()).ravel() * scale
+        else:
+            x = (np.arange(heights.shape[0]) + 0.5) * (
+                topography.physical_sizes[0] * scale / heights.shape[0]
+            )
+            line = round(self.row * (heights.shape[1] - 1))
+            note = f"Line {line + 1} of {heights.shape[1]} along x, in {named}."
+            heights = heights[:, line]
+        return self.heights(path, "scan", x, heights.ravel(), [note])
+
+
+def _topography(path: Path) -> Any:
+    allowed = "a scan that SurfaceTopography reads, of up to 50,000,000 points"
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError("file", f"{path}, which is too long", allowed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            import SurfaceTopography
+
+            reader = SurfaceTopography.open_topography(str(path))
+            if np.prod(reader.default_channel.nb_grid_pts) > MOST_POINTS:
+                raise InputError("file", f"{path}, with too many points", allowed)
+            return reader.topography()
+    except InputError:
+        raise
+    except Exception as error:  # forty readers, each with errors of its own
+        reason = getattr(error, "strerror", None) or "of an unknown kind or damaged"
+        raise InputError("file", f"{path} ({reason})", allowed) from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording(Importer, kind="recording"):
+    """A WAV, or a text file with a column time and others at an even spacing, recorded while something
+    slid: the spectrum of the friction, rms amplitude 1.
+
+    A column that is called as one of the quantities says itself what was recorded, a WAV never does. An
+    acceleration is divided by the square of the frequency and a velocity by the frequency. `channel` is
+    needed where there are several. Longer waves than `longest` are left out: there an acceleration has
+    mostly the drift of the hand.
+    """
+
+    speed: Annotated[float, number("a speed above zero", POSITIVE, "mm/s"), "of the recorded slide"]
+    quantity: Annotated[str | None, one_of(*RECORDED), "what a recording holds"] = None
+    longest: Annotated[
+        float, number("a wavelength above zero", POSITIVE, "mm"), "longest wave of a recording"
+    ] = 10.0
+    channel: Annotated[
+        int | str | None, instance("a number or a name", int, str), "of a WAV, from 1; or a column"
+    ] = None
+
+    endings = (".wav",)
+
+    @classmethod
+    def takes(cls, path: Path) -> bool:
+        """By its ending, a text by its first column."""
+        return super().takes(path) or header_of(path)[:1] == ["time"]
+
+    def __call__(self, path: str | Path) -> Texture:
+        path, speed, longest = Path(path), self.speed, self.longest
+        rate, samples, column = _samples(path, self.channel)
+        quantity = _recorded(path, self.quantity, column)
+        frequency, amplitude = spectrum_of(samples, rate, int(np.ceil(WAVES * longest * rate / speed)))
+        twice = RECORDED[quantity]
+        amplitude = amplitude / (2.0 * np.pi * frequency) ** twice
+        covered = samples.size / rate * speed
+        short = f"Recorded over {covered:.3g} mm, fewer than three of these waves."
+        notes = [
+            f"{quantity.capitalize()} at {rate:g} Hz, slid at {speed:g} mm/s{INTEGRATED[twice]}.",
+            f"Waves of up to {longest:g} mm.",
+            *([short] if covered < 3 * longest else []),
+            "Rms amplitude set to 1.",
+        ]
+        rows = _lines(frequency / speed, amplitude, longest)
+        return self.texture(path, "recorded", rows, notes, "friction_spectrum")
+
+
+def _samples(path: Path, channel: int | str | None) -> tuple[float, Floats, str]:
+    """Rate (Hz), samples of one channel, and the name of its column, "" of a WAV."""
+    if path.suffix.lower() == ".wav":
+        whole, stored, _ = wav.read(path, "file", "a WAV", several=True)
+        rate, names = float(whole), []
+        columns = list(wav.shares(stored).reshape(len(stored), -1).T)
+    else:
+        table = read_headed(path, "file")
+        if table.names[0] != "time":
+            raise InputError("file", f"{path}, which starts with {table.names[0]!r}", "a column time first")
+        unit = table.units[0] or "s"
+        if unit not in TIMES:
+            raise InputError("time", f"in {unit}", " | ".join(TIMES))
+        rate = _rate(table.columns[0] * TIMES[unit])
+        columns, names = table.columns[1:], table.names[1:]
+    which = _channel(channel, names, len(columns))
+    if not np.isfinite(columns[which]).all():
+        raise InputError("file", f"{path}, with gaps", "a recording without gaps")
+    return rate, columns[which], names[which] if names else ""
+
+
+def _channel(given: int | str | None, names: list[str], count: int) -> int:
+    """Which of the channels, from 0."""
+    called = [*names, *map(str, range(1, count + 1))]
+    if given is None and count == 1:
+        return 0
+    if given is None or str(given).lower() not in called:
+        said = f"nothing, of {count}" if given is None else quoted(str(given))
+        raise InputError("channel", said, " | ".join(called))
+    return called.index(str(given).lower()) % count
+
+
+def _recorded(path: Path, given: str | None, column: str) -> str:
+    """What a recording holds: what was said, unless its column says another."""
+    said = column if column in RECORDED else given
+    if said is None or (given is not None and said != given):
+        wrong = (
+            f"nothing, and {path.name} does not say what it holds" if said is None else f"{given}, of {said}"
+        )
+        raise InputError("quantity", wrong, " | ".join(RECORDED))
+    return said
+
+
+def _rate(time: Floats) -> float:
+    steps = np.diff(time)
+    if time.size < 16 or not (steps > 0.0).all() or np.ptp(steps) > 0.01 * steps.mean():
+        raise InputError("time", f"{time.size} rows", "at least 16 rows at an even spacing in s")
+    return float(1.0 / steps.mean())
+
+
+def spectrum_of(samples: Floats, rate: float, size: int) -> tuple[Floats, Floats]:
+    """Frequencies (Hz, 0 left out) and one-sided amplitudes: the root of the mean power of each
+    line, of windows of `size` samples, or of all if there are fewer.
+
+    >>> time = np.arange(4096) / 1000.0
+    >>> frequency, amplitude = spectrum_of(3.0 * np.sin(2.0 * np.pi * 125.0 * time), 1000.0, 2048)
+    >>> float(frequency[np.argmax(amplitude)]), round(float(np.sqrt(np.sum(amplitude**2))), 3)
+    (125.0, 3.0)
+    """
+    size = min(samples.size, max(size, 8)) // 2 * 2
+    if size < 8 or not np.ptp(samples) > 0.0:
+        raise InputError("file", f"{samples.size} samples", "at least 8 samples that differ")
+    from scipy.signal import welch  # half a second
+
+    frequency, density = welch(samples, rate, nperseg=size)
+    return frequency[1:-1], np.sqrt(2.0 * rate / size * density[1:-1])
+
+
+def _lines(frequency: Floats, amplitude: Floats, longest: float) -> tuple[Floats, Floats]:
+    """At most `MOST_LINES` lines from waves of `longest` (mm) to `HIGHEST_FREQUENCY`, neighbours put
+    together by their power.
+    """
+    lowest = (1.0 - 1e-9) / longest
+    kept = (frequency >= lowest) & (frequency <= HIGHEST_FREQUENCY)
+    if kept.sum() < 2:
+        given = f"hardly a line between {lowest:.3g} and {HIGHEST_FREQUENCY:g} per mm"
+        raise InputError("speed", given, "the speed of the recording, and a longest wave that it has")
+    frequency, power = frequency[kept], amplitude[kept] ** 2
+    width = -(-frequency.size // MOST_LINES)
+    starts = np.arange(0, frequency.size, width)
+    weight = power + 1e-12 * power.max()
+    frequency = np.add.reduceat(frequency * weight, starts) / np.add.reduceat(weight, starts)
+    power = np.add.reduceat(power, starts)
+    return frequency, np.sqrt(power / power.sum())
+
+
+def friction_profile(spectrum: Texture, mean: float, rms: float, length: float, seed: int = 0) -> Texture:
+    """A friction profile with this spectrum: `mean`, root mean square `rms` of what varies, over
+    `length` (mm), with phases drawn from `seed`; it never falls below 0.
+    """
+    if spectrum.quantity != "friction_spectrum":
+        raise InputError("texture", f"{spectrum.name}, {spectrum.quantity}", "a friction spectrum")
+    real("mean", mean, "a friction coefficient from 0 to 10", lambda mu: 0.0 <= mu <= 10.0)
+    real("rms", rms, "a number from 0 to the mean", lambda size: 0.0 <= size <= mean)
+    above("length", length, 0.0, "a length in mm above zero")
+    phase = phases(seed, spectrum.x.size)
+    size = int(min(np.ceil(8.0 * length * spectrum.x[-1]), 20_000)) + 2
+    x = np.linspace(0.0, length, size)
+    waves = np.sin(2.0 * np.pi * np.outer(x, spectrum.x) + phase) @ spectrum.values
+    waves *= np.sqrt(2.0) * rms / np.sqrt(np.sum(spectrum.values**2))
+    note = f"Friction {mean:g} on average, rms {rms:g}, phases from seed {seed}."
+    values = np.clip(mean + waves, 0.0, None)
+    notes = (*spectrum.provenance, note)
+    return Texture(
+        spectrum.name, spectrum.kind, x, values, spectrum.licence, quantity="friction", provenance=notes
+    )
