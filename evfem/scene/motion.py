@@ -6,9 +6,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, Literal, get_args
 
-from evfem.common.checks import Checked, Within, number, one_of, whole
+from evfem.common.checks import Named, Within, number, one_of, whole
 from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
@@ -30,8 +30,6 @@ _DURATION = number("a time in s, larger than 0, up to 1e6", Within(0.0, 1e6, abo
 _ANGLE = number("an angle in degrees from -360 to 360", Within(-360.0, 360.0), "degrees")
 Steps = Annotated[int, whole(), "in how many equal parts"]
 Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it was: the indentation, or the applied force"]
-
-MOTIONS: dict[str, type[Motion]] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,17 +103,10 @@ class Course:
         return abs(self.distance or deeper) / steps / self.speed
 
 
-class Motion(Checked):
-    """A motion with a name in scene files: `class Own(Motion, kind="own")`, a dataclass with `steps` and the
-    `course` that its fields mean, is all that a kind needs, here or in a module that has been imported.
-    """
+class Motion(Named):
+    """A motion: a dataclass with `steps` and the `course` that its fields mean."""
 
-    kind: ClassVar[str]
     steps: int
-
-    def __init_subclass__(cls, kind: str) -> None:
-        cls.kind = kind
-        MOTIONS[kind] = cls
 
     @property
     def course(self) -> Course:
@@ -242,3 +233,6 @@ class Wait(Motion, kind="wait"):
     @property
     def course(self) -> Course:
         return Course(duration=self.duration, hold=self.hold)
+
+
+MOTIONS = Motion.kinds

@@ -25,7 +25,9 @@ import evfem
 from evfem import cli, studies
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.scene import file as scenefile
+from evfem.scene.motion import Motion
 from evfem.simulation.result import COLUMNS
+from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
 from evfem.tissue import elements, space
 
@@ -96,7 +98,7 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
     monkeypatch.setattr(elements, "ELEMENTS", table)
-    with patch.dict(FORCE_LAWS):  # and another a law
+    with patch.dict(FORCE_LAWS), patch.dict(Motion.kinds), patch.dict(NamedFriction.kinds):  # and others more
         run(page, {None}, capsys)
 
 
