@@ -17,8 +17,8 @@ from typing import Any
 from evfem.common.checks import MOST_STEPS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
-from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
-from evfem.finger.fingertip import FINGERS, tip_sizes
+from evfem.finger.fingerpad import FingerPad, MeshedFinger
+from evfem.finger.fingertip import FINGERS
 from evfem.finger.layers import TABLE_2
 from evfem.scene.format import (
     HOMES,
@@ -193,7 +193,7 @@ def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
     mistakes, sizes, found = Mistakes(), dict[str, Any](), None
     with mistakes.of_a_part(), at("finger"):
         if "participant" in table:
-            sizes = (participant_sizes if cls is FingerPad else tip_sizes)(table["participant"])
+            sizes = cls.sizes_of(table["participant"])
     if isinstance(laws := table.get("materials"), Mapping):
         table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
     with mistakes.of_a_part():

@@ -1,7 +1,7 @@
 """The recipes that change files of the package are put into a copy of it, which then runs.
 
-A mark says where a block goes: `into FILE, FILE before WORDS` or `instead of WORDS`, the words being
-once in each file, at the beginning of a line, however they are spaced there.
+A mark says where a block goes: `into FILE before WORDS` or `instead of WORDS`, the words being once in
+the file, at the beginning of a line, however they are spaced there.
 """
 
 import re
@@ -16,7 +16,7 @@ from docs.test_pages import DOCS, blocks
 
 import evfem
 
-PLACE = re.compile(r"not run: into (?P<files>.+?) (?P<how>before|instead of) (?P<words>.+)")
+PLACE = re.compile(r"not run: into (?P<file>\S+) (?P<how>before|instead of) (?P<words>.+)")
 PAGE = "howto/extend.md"
 RECIPES = [(found, text, line) for _, text, mark, line in blocks(PAGE) if (found := PLACE.match(mark or ""))]
 
@@ -103,7 +103,7 @@ from evfem.solver import linearisation
 linearisation.make_condensation = evfem.solver.condensation.SuperLU
 usual = ev.simulate(scene)
 assert usual.provenance["solver"]["backend"] == "SuperLU"
-np.testing.assert_allclose(dense.tangential_force, usual.tangential_force, rtol=1e-9)
+np.testing.assert_allclose(dense.tangential_force, usual.tangential_force, rtol=1e-9, atol=1e-15)
 """
 
 
@@ -114,15 +114,8 @@ def copy(tmp_path_factory):
     package = Path(evfem.__file__).parent
     shutil.copytree(package, folder / "evfem", ignore=shutil.ignore_patterns("__pycache__"))
     for found, text, _ in RECIPES:
-        for file in files(found):
-            put_in(folder / file, found["how"], found["words"], text)
+        put_in(folder / found["file"], found["how"], found["words"], text)
     return folder
-
-
-def files(found):
-    """The files of a mark; further ones lie in the folder of the first."""
-    first, *others = found["files"].split(", ")
-    return [Path(first), *(Path(first).with_name(other) for other in others)]
 
 
 def put_in(file, how, words, text):
@@ -145,7 +138,7 @@ def test_the_table_says_how_many_files_each_change_touches():
     touched = {text.lower().replace(" ", "-"): set() for _, text in headings}
     for found, _, line in RECIPES:
         heading = [text for at, text in headings if at < line][-1]
-        touched[heading.lower().replace(" ", "-")] |= {*files(found)}
+        touched[heading.lower().replace(" ", "-")] |= {found["file"]}
     told = {
         row[1]: int(row[2])
         for row in re.finditer(r"^\| \[.*?\]\(#(.*?)\) \| (\d+) \|$", "\n".join(page), re.M)
