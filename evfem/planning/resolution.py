@@ -127,7 +127,7 @@ def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
     hand = scene.hand
     if hand is not None and hand.damping < 2.0 * math.sqrt(hand.stiffness * hand.mass):
         yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)
-    if scene.solver.dynamics != "inertial":
+    if not scene.solver.inertial:
         return
     law = min(scene.finger.materials.values(), key=lambda one: split(one, mesh.dim).shear_modulus)
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))

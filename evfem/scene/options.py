@@ -5,12 +5,23 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import GONE, Checked, Within, check_fields, number, one_of, real, whole, yes_or_no
+from evfem.common.checks import (
+    GONE,
+    Checked,
+    Within,
+    among,
+    check_fields,
+    number,
+    one_of,
+    real,
+    whole,
+    yes_or_no,
+)
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
+from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.elements import ELEMENTS, elements_on
 
-DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 PRECISIONS = ("single", "double")
 _PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True), "N/mm3")
@@ -35,7 +46,7 @@ class Solver:
     element: Annotated[
         str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
     ] = None
-    dynamics: Annotated[str, one_of(*DYNAMICS), "without time, with viscosity, or with inertia too"] = (
+    dynamics: Annotated[str, among(DYNAMICS), "without time, with viscosity, or with inertia too"] = (
         "quasistatic"
     )
     contact: Annotated[str, one_of(*CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
@@ -67,6 +78,16 @@ class Solver:
         if self.contact == "penalty" and self.penalty_normal is None:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
             raise InputError("penalty_normal", ABSENT, allowed)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the tissue knows of time."""
+        return DYNAMICS[self.dynamics] is not None
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the tissue has mass."""
+        return getattr(DYNAMICS[self.dynamics], "inertia", False)
 
     @classmethod
     def within(cls, error: float = 1e-3) -> Solver:

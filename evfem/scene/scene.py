@@ -337,12 +337,12 @@ def _check_dynamics(scene: Scene) -> None:
     if solver.contact == "penalty" and scene.has_friction and solver.penalty_tangential is None:
         allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
         raise InputError("solver.penalty_tangential", ABSENT, allowed)
-    if solver.dynamics == "quasistatic":
+    if not solver.timed:
         return
     _check_speeds(scene, f"dynamics = {solver.dynamics}")
     own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
-    if solver.dynamics == "viscous" and not max([scene.finger.viscosity, *own]) > 0.0:
-        allowed = "a relaxation time in s, larger than 0, with dynamics = viscous"
+    if not solver.inertial and not max([scene.finger.viscosity, *own]) > 0.0:
+        allowed = f"a relaxation time in s, larger than 0, with dynamics = {solver.dynamics}"
         raise InputError("finger.viscosity", 0.0, allowed)
 
 

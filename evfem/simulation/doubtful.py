@@ -89,7 +89,7 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """Steps in time that dissipate by themselves."""
     hand = scene.hand is not None and scene.hand.timed
-    if scene.solver.dynamics == "quasistatic" and not hand:
+    if not scene.solver.timed and not hand:
         return
     timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
 
