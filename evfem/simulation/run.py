@@ -55,6 +55,8 @@ from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 
+#: what is known where a motion starts
+START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
 #: coulombs per metre of depth in a nanocoulomb per millimetre
 NANO = 1e-6
 
@@ -214,19 +216,11 @@ class Run:
         """Bone position, indentation, force and voltage at which a motion starts, and whether the finger
         is loose: touches nothing and is not attracted.
         """
+        start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
-            return {
-                "position": 0.0,
-                "position_z": 0.0,
-                "indentation": 0.0,
-                "applied_force": 0.0,
-                "voltage": self.voltage_at(0.0, 0.0),
-                "min_gap": 0.0,
-                "loose": 0.0,
-            }
-        row = {"position_z": 0.0, "min_gap": 0.0} | self.rows[rows_before - 1]
-        names = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap")
-        start = {name: row[name] for name in names}
+            return start | {"voltage": self.voltage_at(0.0, 0.0)}
+        row = self.rows[rows_before - 1]
+        start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         start["loose"] = float(row["normal_force"] <= least and row["electrostatic_force"] == 0.0)
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
@@ -274,7 +268,7 @@ class Run:
         if isinstance(self.voltage, FollowForce) or course.gap is not None:
             return False
         if isinstance(self.voltage, ChargeControl):
-            return bool(start["loose"]) and self.voltage.charge_at(time) == 0.0
+            voltage = self.voltage.charge_at(time)
         return bool(start["loose"]) and voltage == 0.0
 
     @property
