@@ -141,7 +141,7 @@ class FingerPad(LayeredFinger):
                 _check_alone(self)
         mistakes.report()
         self._complete()
-        _check_section(self, self._section)
+        _check_section(self, self._shape)
 
     @property
     def _facts(self) -> tuple[dict[str, str], set[str]]:
@@ -155,19 +155,8 @@ class FingerPad(LayeredFinger):
         }
         return facts, told | {"stratum_corneum_thickness"}
 
-    def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order
-        2.
-
-        Both have about the same number of nodes; mid-nodes lie on the true outline, interfaces and
-        bone.
-        """
-        if order not in (1, 2):
-            raise InputError("order", quoted(order), "1 or 2")
-        return self._section.mesh(order)
-
     @property
-    def _section(self) -> Section:
+    def _shape(self) -> Section:
         outer = Ellipse(0.5 * self.width, 0.5 * self.height)
         bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
         ridges: Ridges | ScannedRidges | None = None

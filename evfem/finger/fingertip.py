@@ -136,7 +136,7 @@ class Fingertip(LayeredFinger):
                 set_frozen(self, ridges=_ridges(self))
         mistakes.report()
         self._complete()
-        _check_shape(self, self._solid)
+        _check_shape(self, self._shape)
 
     @classmethod
     def sizes_of(cls, participant: str) -> dict[str, Any]:
@@ -155,12 +155,7 @@ class Fingertip(LayeredFinger):
         return facts, {"width", "height", "length", *facts}
 
     def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: `hexahedron` cells of order 1, or half as many divisions of `hexahedron27`
-        cells of order 2, whose mid-nodes lie on the true surfaces.
-        """
-        if order not in (1, 2):
-            raise InputError("order", quoted(order), "1 or 2")
-        mesh = self._solid.mesh(order)
+        mesh = super().mesh(order)
         if isinstance(self.ridges, HeightMap):
             shape = float(scaled_jacobian(mesh).min())
             if not shape > SMALLEST_SHAPE:
@@ -170,7 +165,7 @@ class Fingertip(LayeredFinger):
         return mesh
 
     @property
-    def _solid(self) -> Solid:
+    def _shape(self) -> Solid:
         outer = Ellipsoid(0.5 * self.width, 0.5 * self.height, 0.5 * self.length)
         axes = 0.5 * self.bone_width, 0.5 * self.bone_height, 0.5 * self.bone_length
         relief: Any = self.ridges

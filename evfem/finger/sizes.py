@@ -15,6 +15,7 @@ from evfem.common.views import called, changed, short, table
 from evfem.errors import InputError, quoted
 from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ridges
+from evfem.mesh.mesh import Mesh
 from evfem.protocols import Material
 from evfem.tissue.laws import LAWS, NeoHookean
 
@@ -158,6 +159,20 @@ class LayeredFinger:
         facts, told = self._facts
         own = {name: short(value) for name, value in self._own(told).items()}
         return table(type(self).__name__, [*(facts | own).items()])
+
+    def mesh(self, order: int = 2) -> Mesh:
+        """The mesh: linear cells of order 1, or half as many divisions of quadratic cells of order 2, whose
+        mid-nodes lie on the true surfaces; both have about the same number of nodes.
+        """
+        if order not in (1, 2):
+            raise InputError("order", quoted(order), "1 or 2")
+        mesh: Mesh = self._shape.mesh(order)
+        return mesh
+
+    @property
+    def _shape(self) -> Any:
+        """Its layers, bone and ridges, divided, with a method `mesh`."""
+        raise NotImplementedError
 
     @property
     def _facts(self) -> tuple[dict[str, str], set[str]]:

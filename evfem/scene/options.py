@@ -5,18 +5,7 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import (
-    GONE,
-    Checked,
-    Within,
-    among,
-    check_fields,
-    number,
-    one_of,
-    real,
-    whole,
-    yes_or_no,
-)
+from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
@@ -44,12 +33,12 @@ class Solver:
     """How a scene is solved; the defaults are the recommended ones."""
 
     element: Annotated[
-        str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
+        str | None, among(ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
     ] = None
     dynamics: Annotated[str, among(DYNAMICS), "without time, with viscosity, or with inertia too"] = (
         "quasistatic"
     )
-    contact: Annotated[str, one_of(*CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
+    contact: Annotated[str, among(CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
     penalty_normal: Annotated[float | None, _PENALTY, "with contact = penalty"] = None
     penalty_tangential: Annotated[float | None, _PENALTY, "with contact = penalty and friction"] = None
     tolerance: Annotated[
@@ -132,7 +121,7 @@ class Output(Checked):
     ] = None
     precision: Annotated[
         str | None,
-        one_of(*PRECISIONS),
+        among(PRECISIONS),
         "of the fields; without it single where they would take more than 25 MB",
     ] = None
     compression: Annotated[

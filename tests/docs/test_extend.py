@@ -87,7 +87,7 @@ ax = plotting.phase(result, "indentation", "normal_force")
 assert (ax.get_xlabel(), ax.lines[0].get_ydata()[-1]) == ("indentation (mm)", result.normal_force[-1])
 
 tip = ev.Fingertip(ridges="slanted", resolution="coarse")
-assert tip._solid.relief.depth(np.array([0.25]), np.array([-0.25]))[0] == 0.0  # along a crest
+assert tip._shape.relief.depth(np.array([0.25]), np.array([-0.25]))[0] == 0.0  # along a crest
 assert ev.Drive(frequency=100.0, skin="moist").skin_layer(0.1, 1.0).eps_r.poles[0][0] == 1100.0
 
 x, y = np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 1.0, 3))
