@@ -13,7 +13,7 @@ from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from numbers import Integral, Real
 from types import NoneType, UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any, ClassVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
@@ -293,3 +293,18 @@ class Checked:
 
     def __post_init__(self) -> None:
         check_fields(self, self._table)
+
+
+class Named(Checked):
+    """A class with a name in files. A family derives from this one and has a live dict of its `kinds`:
+    `class Own(Family, kind="own")` is all that one more needs, here or in a module that has been imported.
+    """
+
+    kind: ClassVar[str]
+    kinds: ClassVar[dict[str, Any]]
+
+    def __init_subclass__(cls, kind: str = "") -> None:
+        if Named in cls.__bases__:
+            cls.kinds = {}
+        if kind:
+            cls.kind, cls.kinds[kind] = kind, cls

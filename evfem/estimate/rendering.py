@@ -21,7 +21,7 @@ from evfem.electrostatics.encoding import Encoding, share_not_renderable
 from evfem.electrostatics.signals import Amplifier, FollowForce, VoltageProfile
 from evfem.errors import InputError
 from evfem.protocols import ForceLaw, Observer, Surface
-from evfem.scene.motion import Press, Slide
+from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.history import SAME
 from evfem.simulation.result import Frame, Result, Row
@@ -228,9 +228,8 @@ def replay(
     press, and slid in the same steps. A `drive` makes the effective voltage alternate.
     """
     motion = list(reference.scene.motion)
-    kinds = [isinstance(part, Slide) for part in motion]
-    first = kinds.index(True) if any(kinds) else 0
-    if first and isinstance(motion[first - 1], Press):
+    first = next((i for i, part in enumerate(motion) if part.course.distance), 0)
+    if first and motion[first - 1].course.presses:
         last_row = int(_slide_rows(reference.result)[0]) - 1
         load = float(reference.result.applied_force[last_row])
         motion[first - 1] = Press(force=load, steps=motion[first - 1].steps)

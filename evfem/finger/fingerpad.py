@@ -8,7 +8,7 @@ parameters with the defaults given there; every length is in mm.
 from __future__ import annotations
 
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
@@ -17,44 +17,28 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem import data
 from evfem.common.checks import (
-    Checked,
-    Within,
     check_fields,
-    choice,
     instance,
-    number,
     one_of,
     set_frozen,
     yes_or_no,
 )
-from evfem.common.views import called, changed, short, table
+from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
-from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
+from evfem.finger.layers import NAIL, thickness_of
 from evfem.finger.outline import Ellipse, Ridges
 from evfem.finger.scan import RidgeScan, ScannedRidges
 from evfem.finger.section import FULL, ZONE, Divisions, Section
 from evfem.finger.sizes import (
     STEEPEST,
-    BoneHeight,
-    BoneOffset,
-    BoneWidth,
-    CellsPerRidge,
-    Dermis,
-    Epidermis,
-    Height,
+    Electrical,
+    LayeredFinger,
+    Materials,
     NailThickness,
     NailWidth,
-    RidgeCrest,
-    RidgeExponent,
-    RidgeGroove,
-    RidgeHeight,
-    RidgePhase,
-    RidgeWidth,
-    StratumCorneum,
+    Skin,
     Viscosity,
-    Width,
     check_at_most,
     check_bone,
     check_cells,
@@ -64,27 +48,9 @@ from evfem.finger.sizes import (
 from evfem.mesh import file as meshfile
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
-from evfem.protocols import Material
-from evfem.tissue.laws import LAWS, NeoHookean
 
-Materials = Annotated[
-    Mapping[str, Material],
-    {"allowed": "a table [finger.materials.NAME]", "kinds": lambda: LAWS, "tag": "law"},
-    "laws of regions that are not to have Table 2's",
-]
-Skin = Annotated["Electrical", {"allowed": "a table [finger.electrical]"}, "the dielectric skin"]
 #: The smallest and the largest ratio of height and width.
 SLIMMEST = 0.5, 1.2
-
-#: What grows with the width of the finger from participant to participant.
-WITH_WIDTH = (
-    "nail_thickness",
-    "nail_width",
-    "bone_width",
-    "bone_offset",
-    "epidermis_thickness",
-    "dermis_thickness",
-)
 
 #: What a scan of the ridges takes the place of, and the part of its depth that two nodes may miss.
 PROFILE = ("ridges", "ridge_height", "ridge_exponent", "ridge_phase", "ridge_crest", "ridge_groove")
@@ -114,23 +80,8 @@ def _regions(key: str, given: Mapping[str, Any]) -> Mapping[str, Any]:
 _REGIONS["check"] = _regions
 
 
-@dataclass(frozen=True)
-class Electrical(Checked):
-    """The dielectric between the pad's surface and the conducting tissue below."""
-
-    stratum_corneum_thickness: Annotated[
-        float | None,
-        number("a thickness in mm, larger than 0, up to 10", Within(0.0, 10.0, above=True), "mm"),
-        "without it the region's local thickness",
-    ] = None
-    stratum_corneum_eps_r: Annotated[
-        float, number("a relative permittivity, at least 1", Within(1.0, 1e9)), "relative permittivity"
-    ] = 1650.0
-    _table = "finger.electrical."
-
-
-@dataclass(frozen=True)
-class FingerPad:
+@dataclass(frozen=True, repr=False)
+class FingerPad(LayeredFinger):
     """The cross-section of a finger: an ellipse around (0, 0) with the pad below and the nail
     above.
 
@@ -159,6 +110,7 @@ class FingerPad:
 
     Raises `InputError` for values out of range and for geometry that cannot exist.
 
+    >>> from evfem.tissue.laws import NeoHookean
     >>> finger = FingerPad(resolution="coarse", materials={"nail": NeoHookean(E=20.0, nu=0.3)})
     >>> mesh = finger.mesh(order=1)
     >>> sorted(mesh.node_sets), mesh.kind, float(mesh.points[:, 1].min())
@@ -168,34 +120,16 @@ class FingerPad:
     evfem.errors.InputError: finger.ridge_height: given 0.5; allowed: 0.02 to 0.4 mm
     """
 
-    width: Width = 16.68
-    height: Height = 12.79
     ridges: Annotated[bool, yes_or_no(), "whether there are fingerprint ridges"] = True
-    ridge_height: RidgeHeight = 0.15
-    ridge_width: RidgeWidth = 0.50
-    ridge_exponent: RidgeExponent = 7.0
-    ridge_phase: RidgePhase = 0.0
-    ridge_crest: RidgeCrest = 0.0
-    ridge_groove: RidgeGroove = 0.0
+    resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 22k, 50k nodes"] = "medium"
     ridge_scan: Annotated[
         RidgeScan | str | os.PathLike[str] | None,
         {"allowed": "the path of a csv file with the header x,height or x,y", "type": _SCAN, "file": True},
         "ridges as they were scanned",
     ] = None
-    # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
-    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
-    epidermis_thickness: Epidermis = thickness_of("epidermis")
-    dermis_thickness: Dermis = thickness_of("dermis")
     nail_thickness: NailThickness = thickness_of("nail")
     nail_width: NailWidth = 11.0
-    bone_width: BoneWidth = 6.0
-    bone_height: BoneHeight = 5.0
-    bone_offset: BoneOffset = 1.0
-    resolution: Annotated[str, one_of(*RESOLUTIONS), "about 3k, 10k, 22k, 50k nodes"] = "medium"
-    cells_per_ridge: CellsPerRidge = None
-    materials: Materials = field(default_factory=dict)
-    electrical: Skin = field(default_factory=Electrical)
-    viscosity: Viscosity = 0.0
+    beside = (NAIL,)
 
     def __post_init__(self) -> None:
         mistakes = Mistakes()
@@ -206,50 +140,23 @@ class FingerPad:
                 set_frozen(self, ridge_scan=RidgeScan.of(self.ridge_scan))
                 _check_alone(self)
         mistakes.report()
-        set_frozen(self, materials=all_materials(self.materials, (*LAYERS, NAIL)))
-        _check_section(self, self._section)
-
-    @classmethod
-    def participant(cls, name: str, resolution: str = "medium") -> FingerPad:
-        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as
-        measured.
-
-        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
-        moduli are Table 2's, because nobody measured them.
-
-        >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
-        (14.04, 5.05)
-        """
-        return cls(resolution=resolution, **participant_sizes(name))
-
-    def __repr__(self) -> str:
-        """What differs from Table 2."""
-        return called("FingerPad", own_parameters(self, (*LAYERS, NAIL)))
-
-    def _repr_html_(self) -> str:
-        """For notebooks: sizes, and what differs from Table 2."""
-        ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
-        ridges = ridges if self.ridge_scan is None else short(self.ridge_scan)
-        rows = [("cross-section", f"{self.width:g} x {self.height:g} mm"), ("ridges", ridges)]
-        rows.append(("stratum corneum", f"{self.stratum_corneum_thickness:g} mm"))
-        rows.append(("resolution", self.resolution))
-        told = {"width", "height", "ridges", "ridge_scan", "ridge_height", "ridge_width", "resolution"}
-        own = own_parameters(self, (*LAYERS, NAIL), told | {"stratum_corneum_thickness"})
-        return table("FingerPad", rows + [(name, short(value)) for name, value in own.items()])
-
-    def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: `quad` cells of order 1, or half as many divisions of `quad9` cells of order
-        2.
-
-        Both have about the same number of nodes; mid-nodes lie on the true outline, interfaces and
-        bone.
-        """
-        if order not in (1, 2):
-            raise InputError("order", quoted(order), "1 or 2")
-        return self._section.mesh(order)
+        self._complete()
+        _check_section(self, self._shape)
 
     @property
-    def _section(self) -> Section:
+    def _facts(self) -> tuple[dict[str, str], set[str]]:
+        ridges = f"{self.ridge_height:g} mm high, every {self.ridge_width:g} mm" if self.ridges else "none"
+        told = {"width", "height", "ridges", "ridge_scan", "ridge_height", "ridge_width", "resolution"}
+        facts = {
+            "cross-section": f"{self.width:g} x {self.height:g} mm",
+            "ridges": ridges if self.ridge_scan is None else short(self.ridge_scan),
+            "stratum corneum": f"{self.stratum_corneum_thickness:g} mm",
+            "resolution": self.resolution,
+        }
+        return facts, told | {"stratum_corneum_thickness"}
+
+    @property
+    def _shape(self) -> Section:
         outer = Ellipse(0.5 * self.width, 0.5 * self.height)
         bone = Ellipse(0.5 * self.bone_width, 0.5 * self.bone_height, self.bone_offset)
         ridges: Ridges | ScannedRidges | None = None
@@ -265,9 +172,9 @@ class FingerPad:
         return Section(
             outer,
             bone,
-            layers=LAYERS,
-            thickness=tuple(getattr(self, layer.parameter) for layer in LAYERS if layer.thickness),
-            rows=tuple(layer.rows[self.resolution] for layer in LAYERS),
+            layers=self.layers,
+            thickness=tuple(getattr(self, layer.parameter) for layer in self.layers if layer.thickness),
+            rows=tuple(layer.rows[self.resolution] for layer in self.layers),
             nail=self.nail_thickness,
             nail_width=self.nail_width,
             ridges=ridges,
@@ -279,38 +186,6 @@ class FingerPad:
         """Distances of nodes from crest to crest; 0 of a smooth pad."""
         ridged = self.ridges or self.ridge_scan is not None
         return (self.cells_per_ridge or 2.0 * RESOLUTIONS[self.resolution].per_ridge) if ridged else 0.0
-
-
-def participant_sizes(name: str) -> dict[str, Any]:
-    """Parameters of `FingerPad` that a participant of Table 1 has of his or her own (mm)."""
-    measured = data.load("table1")
-    choice("finger.participant", name, tuple(measured["participant"]))
-    width, height = measured.value(name, "a"), measured.value(name, "b")
-    sizes = {key: getattr(FingerPad, key) * width / FingerPad.width for key in WITH_WIDTH}
-    sizes["bone_height"] = FingerPad.bone_height * height / FingerPad.height
-    return {"width": width, "height": height, **sizes}
-
-
-def all_materials(own: object, layers: Sequence[TissueLayer]) -> dict[str, Any]:
-    """The laws of the layers, Table 2's where a user gives none of his `own`."""
-    if not isinstance(own, Mapping):
-        raise InputError(
-            "finger.materials", quoted(own), "a law for each region that is not to have that of Table 2"
-        )
-    laws: dict[str, Any] = {layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu) for layer in layers}
-    for name, law in own.items():
-        if name not in laws:
-            raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
-        laws[name] = law
-    return laws
-
-
-def own_parameters(finger: Any, layers: Sequence[TissueLayer], told: Collection[str] = ()) -> dict[str, Any]:
-    """Parameters of a finger that are not the usual ones, without those that are `told`."""
-    usual = all_materials({}, layers)
-    own = {"materials": {name: law for name, law in finger.materials.items() if law != usual[name]}}
-    own = {name: value for name, value in (changed(finger) | own).items() if name not in told}
-    return own if own["materials"] else {name: value for name, value in own.items() if name != "materials"}
 
 
 def _check_alone(pad: FingerPad) -> None:

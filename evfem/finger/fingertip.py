@@ -10,46 +10,22 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 
 from evfem import data
-from evfem.common.checks import between, check_fields, keys_of, one_of, set_frozen
-from evfem.common.views import called, short, table
+from evfem.common.checks import between, check_fields, one_of, set_frozen
+from evfem.common.views import short
 from evfem.errors import InputError, Mistakes, quoted
 from evfem.finger import fingerprint
-from evfem.finger.fingerpad import (
-    Electrical,
-    FingerPad,
-    Materials,
-    Skin,
-    all_materials,
-    own_parameters,
-)
-from evfem.finger.fingerpad import participant_sizes as sizes_in_section
+from evfem.finger.fingerpad import FingerPad
 from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
-from evfem.finger.layers import LAYERS, thickness_of
 from evfem.finger.outline import Ridges
 from evfem.finger.sizes import (
-    BoneHeight,
-    BoneOffset,
-    BoneWidth,
-    CellsPerRidge,
-    Dermis,
-    Epidermis,
-    Height,
-    RidgeCrest,
-    RidgeExponent,
-    RidgeGroove,
-    RidgeHeight,
-    RidgePhase,
-    RidgeWidth,
-    StratumCorneum,
-    Viscosity,
-    Width,
+    LayeredFinger,
     check_at_most,
     check_bone,
     check_cells,
@@ -97,8 +73,8 @@ def _is_file(ridges: str) -> bool:
     return bool(Path(ridges).suffix)
 
 
-@dataclass(frozen=True)
-class Fingertip:
+@dataclass(frozen=True, repr=False)
+class Fingertip(LayeredFinger):
     """The lower half of a finger's end in three dimensions: x across the finger, y up, z along it,
     its tip towards +z.
 
@@ -132,40 +108,21 @@ class Fingertip:
     evfem.errors.InputError: finger.length: given 60.0; allowed: 16 to 32 mm
     """
 
-    width: Width = 16.68
-    height: Height = 12.79
-    length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
     ridges: Annotated[
         bool | str | os.PathLike[str] | HeightMap,
         {"allowed": _RIDGES, "type": bool | str | dict[str, list[Any]], "file": _is_file},
         "pattern of the fingerprint ridges, or a measured print",
     ] = "along"
-    ridge_pixel: Annotated[float, between(0.005, 0.5, "mm"), "from point to point of a grey image"] = 0.05
-    ridge_height: RidgeHeight = 0.15
-    ridge_width: RidgeWidth = 0.50
-    ridge_exponent: RidgeExponent = 7.0
-    ridge_phase: RidgePhase = 0.0
-    ridge_crest: RidgeCrest = 0.0
-    ridge_groove: RidgeGroove = 0.0
-    # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
-    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
-    epidermis_thickness: Epidermis = thickness_of("epidermis")
-    dermis_thickness: Dermis = thickness_of("dermis")
-    bone_width: BoneWidth = 6.0
-    bone_height: BoneHeight = 5.0
-    bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0
-    bone_offset: BoneOffset = 1.0
-    rim: Annotated[str, one_of(*RIMS), "whether the cut around the nail moves with the bone"] = "fixed"
-    posture: Annotated[float, between(0.0, 45.0, "degrees"), "how far the tip is turned down"] = 0.0
     resolution: Annotated[
         str,
         one_of(*TIP_RESOLUTIONS),
         "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more",
     ] = "medium"
-    cells_per_ridge: CellsPerRidge = None
-    materials: Materials = field(default_factory=dict)
-    electrical: Skin = field(default_factory=Electrical)
-    viscosity: Viscosity = 0.0
+    length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
+    bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0
+    rim: Annotated[str, one_of(*RIMS), "whether the cut around the nail moves with the bone"] = "fixed"
+    posture: Annotated[float, between(0.0, 45.0, "degrees"), "how far the tip is turned down"] = 0.0
+    ridge_pixel: Annotated[float, between(0.005, 0.5, "mm"), "from point to point of a grey image"] = 0.05
     ridge_dark: Annotated[
         str | None, one_of("ridges", "grooves"), "what is dark in a grey image, which must be said"
     ] = None
@@ -178,42 +135,27 @@ class Fingertip:
             if not mistakes.found:
                 set_frozen(self, ridges=_ridges(self))
         mistakes.report()
-        set_frozen(self, materials=all_materials(self.materials, LAYERS))
-        _check_shape(self, self._solid)
+        self._complete()
+        _check_shape(self, self._shape)
 
     @classmethod
-    def participant(cls, name: str, resolution: str = "medium", ridges: Any = "along") -> Fingertip:
-        """The finger of a participant, i to xi, of the paper's Table 1: as wide, as high, and seen
-        from above as long as measured, c cos 30 degrees.
+    def sizes_of(cls, participant: str) -> dict[str, Any]:
+        sizes = super().sizes_of(participant)
+        length = data.load("table1").value(participant, "c") * math.cos(math.radians(HELD))
+        return sizes | {"length": length, "bone_length": cls.bone_length * length / cls.length}
 
-        Bone, epidermis and dermis are scaled with it (assumed); the rest is as in
-        `FingerPad.participant`.
-
-        >>> finger = Fingertip.participant("ii", ridges=False)
-        >>> finger.width, round(finger.length, 2), round(finger.bone_length, 2)
-        (14.04, 22.23, 16.8)
-        """
-        return cls(resolution=resolution, ridges=ridges, **tip_sizes(name))
-
-    def __repr__(self) -> str:
-        """What differs from the default."""
-        return called("Fingertip", own_parameters(self, LAYERS))
-
-    def _repr_html_(self) -> str:
-        """For notebooks: sizes, and what differs from the default."""
-        rows = [("ellipsoid", f"{self.width:g} x {self.height:g} x {self.length:g} mm")]
-        rows += [("ridges", short(self.ridges)), ("rim", self.rim), ("resolution", self.resolution)]
-        told = {"width", "height", "length", "ridges", "rim", "resolution"}
-        own = own_parameters(self, LAYERS, told)
-        return table("Fingertip", rows + [(name, short(value)) for name, value in own.items()])
+    @property
+    def _facts(self) -> tuple[dict[str, str], set[str]]:
+        facts = {
+            "ellipsoid": f"{self.width:g} x {self.height:g} x {self.length:g} mm",
+            "ridges": short(self.ridges),
+            "rim": self.rim,
+            "resolution": self.resolution,
+        }
+        return facts, {"width", "height", "length", *facts}
 
     def mesh(self, order: int = 2) -> Mesh:
-        """The mesh: `hexahedron` cells of order 1, or half as many divisions of `hexahedron27`
-        cells of order 2, whose mid-nodes lie on the true surfaces.
-        """
-        if order not in (1, 2):
-            raise InputError("order", quoted(order), "1 or 2")
-        mesh = self._solid.mesh(order)
+        mesh = super().mesh(order)
         if isinstance(self.ridges, HeightMap):
             shape = float(scaled_jacobian(mesh).min())
             if not shape > SMALLEST_SHAPE:
@@ -223,7 +165,7 @@ class Fingertip:
         return mesh
 
     @property
-    def _solid(self) -> Solid:
+    def _shape(self) -> Solid:
         outer = Ellipsoid(0.5 * self.width, 0.5 * self.height, 0.5 * self.length)
         axes = 0.5 * self.bone_width, 0.5 * self.bone_height, 0.5 * self.bone_length
         relief: Any = self.ridges
@@ -234,9 +176,9 @@ class Fingertip:
         return Solid(
             outer,
             Ellipsoid(*axes, self.bone_offset),
-            layers=LAYERS,
-            thickness=tuple(getattr(self, layer.parameter) for layer in LAYERS if layer.thickness),
-            rows=tuple(layer.solid_rows.get(self.resolution, 1) for layer in LAYERS),
+            layers=self.layers,
+            thickness=tuple(getattr(self, layer.parameter) for layer in self.layers if layer.thickness),
+            rows=tuple(layer.solid_rows.get(self.resolution, 1) for layer in self.layers),
             grid=self._grid(outer),
             relief=relief,
             rim_is_fixed=self.rim == "fixed",
@@ -259,7 +201,7 @@ class Fingertip:
             self._lines(axis, fine[k] and self.ridges in ("along", "across"), plain if not fine[k] else 0)
             for k, (axis, plain) in enumerate(((outer.a, divisions.across), (outer.c, divisions.along)))
         )
-        merging = rows_that_merge(LAYERS[0].solid_rows.get(self.resolution, 1), fine)
+        merging = rows_that_merge(self.layers[0].solid_rows.get(self.resolution, 1), fine)
         return Grid((across, along), merging, divisions.sides, (x[0], z[0]), (x[1], z[1]))
 
     @property
@@ -286,15 +228,6 @@ class Fingertip:
 
 #: parametric fingers by their kinds in a file
 FINGERS: Mapping[str, Any] = {"pad": FingerPad, "fingertip": Fingertip}
-
-
-def tip_sizes(name: str) -> dict[str, Any]:
-    """Parameters of `Fingertip` that a participant of Table 1 has of his or her own (mm)."""
-    sizes = sizes_in_section(name)
-    own = {key.name for key in keys_of(Fingertip)}
-    kept = {key: value for key, value in sizes.items() if key in own}
-    length = data.load("table1").value(name, "c") * math.cos(math.radians(HELD))
-    return kept | {"length": length, "bone_length": Fingertip.bone_length * length / Fingertip.length}
 
 
 def _ridges(tip: Fingertip) -> str | HeightMap:

@@ -1,16 +1,23 @@
-"""The sizes of a finger, of a cross-section and of a whole pad: ranges, meanings, what fits together."""
+"""What a cross-section and a whole pad share: sizes with ranges and meanings, and what fits together."""
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
+from evfem import data
 from evfem.common.arrays import Floats
-from evfem.common.checks import between, whole
-from evfem.errors import InputError
-from evfem.finger.layers import LAYERS, NAIL
+from evfem.common.checks import Checked, Within, between, choice, number, set_frozen, whole
+from evfem.common.views import called, changed, short, table
+from evfem.errors import InputError, quoted
+from evfem.finger.layers import LAYERS, NAIL, TissueLayer, thickness_of
 from evfem.finger.outline import Ridges
+from evfem.mesh.mesh import Mesh
+from evfem.protocols import Material
+from evfem.tissue.laws import LAWS, NeoHookean
 
 #: What can be meshed well: the largest slope of the wall of a rounded and of a flat-topped ridge, and the
 #: smallest distance between bone and dermis (mm).
@@ -53,6 +60,148 @@ BoneOffset = Annotated[float, between(-1.0, 3.0, "mm"), "centre of the bone abov
 Viscosity = Annotated[float, between(0.0, 1e3, "s"), "relaxation time of materials without their own"]
 NailThickness = Annotated[float, _thickness("nail"), "of the nail"]
 NailWidth = Annotated[float, between(4.0, 18.0, "mm"), "chord of the nail"]
+Materials = Annotated[
+    Mapping[str, Material],
+    {"allowed": "a table [finger.materials.NAME]", "kinds": lambda: LAWS, "tag": "law"},
+    "laws of regions that are not to have Table 2's",
+]
+Skin = Annotated["Electrical", {"allowed": "a table [finger.electrical]"}, "the dielectric skin"]
+
+
+@dataclass(frozen=True)
+class Electrical(Checked):
+    """The dielectric between the pad's surface and the conducting tissue below."""
+
+    stratum_corneum_thickness: Annotated[
+        float | None,
+        number("a thickness in mm, larger than 0, up to 10", Within(0.0, 10.0, above=True), "mm"),
+        "without it the region's local thickness",
+    ] = None
+    stratum_corneum_eps_r: Annotated[
+        float, number("a relative permittivity, at least 1", Within(1.0, 1e9)), "relative permittivity"
+    ] = 1650.0
+    _table = "finger.electrical."
+
+
+#: What grows with the width of the finger from participant to participant.
+WITH_WIDTH = (
+    "nail_thickness",
+    "nail_width",
+    "bone_width",
+    "bone_offset",
+    "epidermis_thickness",
+    "dermis_thickness",
+)
+
+
+@dataclass(frozen=True, repr=False)
+class LayeredFinger:
+    """A parametric finger: outline, ridges, layers and bone, with materials."""
+
+    width: Width = 16.68
+    height: Height = 12.79
+    ridges: Any = True
+    ridge_height: RidgeHeight = 0.15
+    ridge_width: RidgeWidth = 0.50
+    ridge_exponent: RidgeExponent = 7.0
+    ridge_phase: RidgePhase = 0.0
+    ridge_crest: RidgeCrest = 0.0
+    ridge_groove: RidgeGroove = 0.0
+    # of each layer that has one: default and range stand in its row of `evfem.finger.layers.LAYERS`
+    stratum_corneum_thickness: StratumCorneum = thickness_of("stratum_corneum")
+    epidermis_thickness: Epidermis = thickness_of("epidermis")
+    dermis_thickness: Dermis = thickness_of("dermis")
+    bone_width: BoneWidth = 6.0
+    bone_height: BoneHeight = 5.0
+    bone_offset: BoneOffset = 1.0
+    resolution: str = "medium"
+    cells_per_ridge: CellsPerRidge = None
+    materials: Materials = field(default_factory=dict)
+    electrical: Skin = field(default_factory=Electrical)
+    viscosity: Viscosity = 0.0
+    layers: ClassVar[tuple[TissueLayer, ...]] = LAYERS
+    beside: ClassVar[tuple[TissueLayer, ...]] = ()
+
+    @classmethod
+    def participant(cls, name: str, resolution: str = "medium", **more: Any) -> Self:
+        """The finger of a participant, i to xi, of the paper's Table 1: as wide and as high as measured, a
+        `Fingertip` seen from above as long as measured, c cos 30 degrees; `more` are other parameters.
+
+        Bone, nail, epidermis and dermis are scaled with it (assumed); stratum corneum, ridges and
+        moduli are Table 2's, because nobody measured them.
+
+        >>> from evfem.finger.fingerpad import FingerPad
+        >>> FingerPad.participant("ii").width, round(FingerPad.participant("ii").bone_width, 3)
+        (14.04, 5.05)
+        >>> from evfem.finger.fingertip import Fingertip
+        >>> finger = Fingertip.participant("ii", ridges=False)
+        >>> finger.width, round(finger.length, 2), round(finger.bone_length, 2)
+        (14.04, 22.23, 16.8)
+        """
+        return cls(resolution=resolution, **cls.sizes_of(name) | more)
+
+    @classmethod
+    def sizes_of(cls, participant: str) -> dict[str, Any]:
+        """Parameters that a participant of Table 1 has of his or her own (mm)."""
+        measured = data.load("table1")
+        choice("finger.participant", participant, tuple(measured["participant"]))
+        width, height = measured.value(participant, "a"), measured.value(participant, "b")
+        sizes = {key: getattr(cls, key) * width / cls.width for key in WITH_WIDTH if hasattr(cls, key)}
+        sizes |= {"width": width, "height": height, "bone_height": cls.bone_height * height / cls.height}
+        return sizes
+
+    def __repr__(self) -> str:
+        """What differs from Table 2."""
+        return called(type(self).__name__, self._own())
+
+    def _repr_html_(self) -> str:
+        """For notebooks: sizes, and what differs from Table 2."""
+        facts, told = self._facts
+        own = {name: short(value) for name, value in self._own(told).items()}
+        return table(type(self).__name__, [*(facts | own).items()])
+
+    def mesh(self, order: int = 2) -> Mesh:
+        """The mesh: linear cells of order 1, or half as many divisions of quadratic cells of order 2, whose
+        mid-nodes lie on the true surfaces; both have about the same number of nodes.
+        """
+        if order not in (1, 2):
+            raise InputError("order", quoted(order), "1 or 2")
+        mesh: Mesh = self._shape.mesh(order)
+        return mesh
+
+    @property
+    def _shape(self) -> Any:
+        """Its layers, bone and ridges, divided, with a method `mesh`."""
+        raise NotImplementedError
+
+    @property
+    def _facts(self) -> tuple[dict[str, str], set[str]]:
+        """What a table says first, and the parameters that it has said so."""
+        raise NotImplementedError
+
+    def _complete(self) -> None:
+        """Give the layers without a law that of Table 2."""
+        if not isinstance(self.materials, Mapping):
+            allowed = "a law for each region that is not to have that of Table 2"
+            raise InputError("finger.materials", quoted(self.materials), allowed)
+        laws = self._usual
+        for name in self.materials:
+            if name not in laws:
+                raise InputError(f"finger.materials.{name}", "no such region", " | ".join(laws))
+        set_frozen(self, materials=laws | dict(self.materials))
+
+    @property
+    def _usual(self) -> dict[str, Any]:
+        return {
+            layer.name: NeoHookean(E=layer.moduli.E, nu=layer.moduli.nu)
+            for layer in (*self.layers, *self.beside)
+        }
+
+    def _own(self, told: Collection[str] = ()) -> dict[str, Any]:
+        """Parameters that are not the usual ones, without those that are `told`."""
+        laws = {name: law for name, law in self.materials.items() if law != self._usual[name]}
+        found = {name: value for name, value in changed(self).items() if name not in (*told, "materials")}
+        return found | ({"materials": laws} if laws else {})
 
 
 def check_at_most(name: str, value: float, limit: float, meaning: str, unit: str = " mm") -> None:

@@ -25,7 +25,6 @@ from evfem.electrostatics.signals import FollowForce
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import way
 from evfem.scene.electrics import Electrics
-from evfem.scene.motion import Hover, follows_gap
 from evfem.scene.scene import Scene
 from evfem.tissue.splitlaw import plane_modulus, split
 
@@ -88,7 +87,7 @@ def core_of(scene: Scene, mesh: Mesh) -> Core | None:
     """
     wanted, voltage = scene.solver.core, scene.electrics.largest_voltage
     charged = scene.drive is not None and scene.drive.resolved
-    found = isinstance(scene.voltage, FollowForce) or any(map(follows_gap, scene.motion))
+    found = isinstance(scene.voltage, FollowForce) or any(one.gap is not None for one in scene.courses)
     has_none = charged or found or not scene.air_layer
     if wanted == "off" or not scene.electrics.acts or has_none or _full(scene, mesh):
         return None
@@ -138,8 +137,7 @@ def _full(scene: Scene, mesh: Mesh) -> bool:
 
 def _gap(scene: Scene) -> float:
     """The smallest gap (mm) at which a finger hovers; inf if none does."""
-    gaps = [motion.gap for motion in scene.motion if isinstance(motion, Hover) and motion.gap > 0.0]
-    return min(gaps, default=np.inf)
+    return min((-low for one in scene.courses if (low := one.indentation or 0.0) < 0.0), default=np.inf)
 
 
 def unseen(scene: Scene, mesh: Mesh) -> str | None:

@@ -26,7 +26,6 @@ import numpy as np
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import way
-from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 
 #: a drift of the load that is worth a word
@@ -64,10 +63,10 @@ def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[
         return
     friction = float(np.max(scene.ground.friction_coefficient(way(scene, mesh, STEP))))
     load = None
-    for i, motion in enumerate(scene.motion):
-        if isinstance(motion, Press):
-            load = motion.force
-        elif isinstance(motion, Slide) and motion.hold == "indentation" and load:
+    for i, course in enumerate(scene.courses):
+        if course.depth is not None:
+            load = course.force
+        elif course.distance and course.hold == "indentation" and load:
             drift = load_drift(scene.finger, friction, load, min(moduli.values()))
             if abs(drift) > WORTH:
                 yield (

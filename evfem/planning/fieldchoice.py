@@ -10,7 +10,6 @@ from evfem.contact.fullfield import Bounds, certificate, facing, in_line
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.scene.electrics import without_field
-from evfem.scene.motion import Hover, Press, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.surface.pad import make_pad
 
@@ -52,10 +51,9 @@ def chosen_field(scene: Scene, mesh: Mesh) -> FieldChoice:
 
 def _gaps(scene: Scene) -> list[float]:
     """Gaps (mm) of the undeformed pad where motions end: 0 and those above, without 0 if it only hovers."""
-    hovers = [motion.gap for motion in scene.motion if isinstance(motion, Hover)]
-    lifts = [-(one.indentation or 0.0) for one in scene.motion if isinstance(one, Press)]
-    always = len(hovers) == sum(not isinstance(one, VoltageRamp | Wait) for one in scene.motion) > 0
-    return sorted({*hovers, *(gap for gap in lifts if gap > 0.0), *(() if always else (0.0,))})
+    moves = [course for course in scene.courses if course.distance or course.depth is not None]
+    gaps = {max(-(course.indentation or 0.0), 0.0) for course in moves}
+    return sorted(gaps if moves and all(course.hovers for course in moves) else {*gaps, 0.0})
 
 
 def field_bounds(scene: Scene, mesh: Mesh, gap: float) -> Bounds:

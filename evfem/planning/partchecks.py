@@ -18,7 +18,6 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.electrostatics.roughness import WIDEST
 from evfem.errors import InputError
-from evfem.scene.motion import Slide
 from evfem.scene.scene import Scene
 from evfem.tensor import Array, difference
 
@@ -127,8 +126,7 @@ def _places(scene: Scene) -> Floats:
     """A dozen x (mm) that the pad comes to."""
     width = getattr(scene.finger, "width", None)
     ends = np.array([-0.5, 0.5]) * width if width is not None else _pad_of(scene)
-    bone = np.cumsum([0.0, *(motion.way[0] for motion in scene.motion if isinstance(motion, Slide))])
-    first, last = ends.min() + bone.min(), ends.max() + bone.max()
+    first, last = ends.min() + scene.reach[0], ends.max() + scene.reach[1]
     return np.asarray(first + PLACES * (last - first))
 
 
@@ -145,8 +143,7 @@ def check_friction_law(scene: Scene) -> None:
     """
     key, law, names = "surface.friction_law", scene.friction_law, ("pressure", "mu", "speed", "age")
     check_arguments(key, law.bound, ("bound", *names), by_name=True)
-    slides = {motion.speed or 0.0 for motion in scene.motion if isinstance(motion, Slide)}
-    speeds = np.array(sorted({0.0, *slides}))
+    speeds = np.array(sorted({0.0, *(course.speed or 0.0 for course in scene.courses)}))
     p, speed = np.tile(PRESSURES, speeds.size), np.repeat(speeds, PRESSURES.size)
     nodes = dict(zip(names[1:], (COEFFICIENT + 0.0 * p, speed, 0.0 * p), strict=True))
     bound = evaluated(key, f"bound({', '.join(names)})", lambda at: law.bound(pressure=at, **nodes), p)

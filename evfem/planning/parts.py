@@ -26,7 +26,6 @@ from evfem.planning.partchecks import (
     evaluated,
 )
 from evfem.protocols import RoughnessLaw, TimeSignal
-from evfem.scene.motion import Slide, VoltageRamp, Wait
 from evfem.scene.scene import Scene
 from evfem.tensor import STEP, Array, complex_step, det, difference, inv, trace, transpose
 from evfem.tissue.forms import Form
@@ -219,18 +218,14 @@ def _check_negative(key: str, traction: Callable[[Array], Any], voltage: float) 
 def _lowest(scene: Scene) -> float:
     """Lowest voltage (V) of a scene, as far as some moments and places tell."""
     own: Any = scene.electrics.voltage
-    slides = [motion for motion in scene.motion if isinstance(motion, Slide)]
     if isinstance(own, FollowForce):
         own = 0.0
     elif isinstance(own, VoltageProfile):
-        bone = np.cumsum([0.0, *(motion.way[0] for motion in slides)])
-        own = own(np.linspace(bone.min(), bone.max(), MOMENTS))
+        own = own(np.linspace(*scene.reach, MOMENTS))
     elif isinstance(own, TimeSignal):
-        seconds = sum(abs(motion.distance) / motion.speed for motion in slides if motion.speed)
-        seconds += sum(motion.duration for motion in scene.motion if isinstance(motion, Wait))
+        seconds = sum(course.seconds() for course in scene.courses)
         own = [own(time) for time in np.linspace(0.0, seconds, MOMENTS).tolist()]
-    ramps = [motion.largest for motion in scene.motion if isinstance(motion, VoltageRamp)]
-    return float(min([np.min(own), *ramps]))
+    return float(min([np.min(own), *scene.electrics.ramps]))
 
 
 def _check_rates(key: str, scene: Scene, method: Callable[[str], Callable[[Array], Any]]) -> None:

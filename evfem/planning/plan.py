@@ -31,6 +31,7 @@ from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
+from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
@@ -201,7 +202,7 @@ def _friction(scene: Scene) -> Term:
         return Term("friction", True, "Coulomb")
     timed = ", with speed and time of contact of each node" if getattr(law, "timed", False) else ""
     falling = ""
-    if scene.solver.dynamics != "inertial" and weakens(scene):
+    if not scene.solver.inertial and weakens(scene):
         falling = "; it falls with the speed: tissue without mass may jump, dynamics = inertial follows it"
     return Term("friction", True, f"{type(law).__name__}: a bound of its own for each node{timed}{falling}")
 
@@ -250,13 +251,13 @@ def _drive(scene: Scene) -> tuple[Term, ...]:
 
 
 def _time(scene: Scene) -> Term:
-    dynamics = scene.solver.dynamics
+    dynamics, terms = scene.solver.dynamics, DYNAMICS[scene.solver.dynamics]
     clock = ", the clock sets the voltage alone" if isinstance(scene.electrics.voltage, TimeSignal) else ""
     lost = "released where no equilibrium is near" if scene.solver.strategy.relaxation else ""
-    if dynamics == "quasistatic":
+    if terms is None:
         return Term("time", False, ", ".join(filter(None, (f"quasi-static{clock}", lost))))
     lost = lost and f"; without speed quasi-static, {lost}"
-    return Term("time", True, f"{dynamics}, backward Euler{lost}")
+    return Term("time", True, f"{dynamics}, {terms.scheme}{lost}")
 
 
 def _hand(scene: Scene) -> tuple[Term, ...]:

@@ -17,7 +17,6 @@ from evfem.common.arrays import Ints
 from evfem.electrostatics.timesignals import Carrier
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import TimeSignal
-from evfem.scene.motion import Motion, Slide, Wait
 from evfem.scene.scene import Scene
 from evfem.surface.textures import SelfAffine
 from evfem.tissue.laws import split
@@ -94,9 +93,7 @@ def too_fast(scene: Scene) -> str | None:
     signal = scene.electrics.voltage
     if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
         return None
-    steps = {i: _seconds(motion) / motion.steps for i, motion in enumerate(scene.motion)}
-    longest = max(steps, key=lambda i: steps[i])
-    step, f = steps[longest], signal.highest_frequency
+    (longest, step), f = _longest(scene), signal.highest_frequency
     found = 1.0 / (f * step) if step > 0.0 else math.inf
     if found >= PER_PERIOD * (1.0 - 1e-9):
         return None
@@ -104,7 +101,7 @@ def too_fast(scene: Scene) -> str | None:
     alias = ""
     if 2.0 * f > 0.5 / step:
         alias = f", and shows what the attraction does above {0.5 / step:.4g} Hz at a lower frequency"
-    needed = math.ceil(PER_PERIOD * f * _seconds(scene.motion[longest]) * (1.0 - 1e-9))
+    needed = math.ceil(PER_PERIOD * f * scene.courses[longest].seconds() * (1.0 - 1e-9))
     return f"{few}{alias}: take at least {PER_PERIOD:g}, {needed} steps in all{_instead(signal)}"
 
 
@@ -115,14 +112,13 @@ def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
     material between pad and bone in shear, 4 h sqrt(rho / G), about; damped beyond their critical
     damping neither has one.
     """
-    steps = [_seconds(motion) / motion.steps for motion in scene.motion]
-    longest = max(range(len(steps)), key=lambda i: steps[i])
+    longest, step = _longest(scene)
     for what, period in _periods(scene, mesh):
-        if steps[longest] > period:
+        if step > period:
             yield (
-                f"motion {longest} has steps of {steps[longest]:.3g} s, and {what} by itself swings with a "
+                f"motion {longest} has steps of {step:.3g} s, and {what} by itself swings with a "
                 f"period of {period:.3g} s: they damp that away; take at least {PER_PERIOD:g} in a period, "
-                f"{math.ceil(PER_PERIOD * _seconds(scene.motion[longest]) / period)} in all, to follow it"
+                f"{math.ceil(PER_PERIOD * scene.courses[longest].seconds() / period)} in all, to follow it"
             )
 
 
@@ -131,7 +127,7 @@ def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
     hand = scene.hand
     if hand is not None and hand.damping < 2.0 * math.sqrt(hand.stiffness * hand.mass):
         yield "the hand", 2.0 * math.pi * math.sqrt(hand.mass / hand.stiffness)
-    if scene.solver.dynamics != "inertial":
+    if not scene.solver.inertial:
         return
     law = min(scene.finger.materials.values(), key=lambda one: split(one, mesh.dim).shear_modulus)
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
@@ -142,12 +138,10 @@ def _periods(scene: Scene, mesh: Mesh) -> Iterator[tuple[str, float]]:
         yield "the tissue", period
 
 
-def _seconds(motion: Motion) -> float:
-    """Seconds that a slide, a press from first touch or a wait takes."""
-    if isinstance(motion, Wait):
-        return motion.duration
-    way = getattr(motion, "distance", None) or getattr(motion, "indentation", None) or 0.0
-    return abs(way) / speed if (speed := getattr(motion, "speed", None)) else 0.0
+def _longest(scene: Scene) -> tuple[int, float]:
+    """The motion with the longest steps, presses being from first touch, and their seconds."""
+    steps = [motion.course.seconds() / motion.steps for motion in scene.motion]
+    return steps.index(max(steps)), max(steps)
 
 
 def _instead(signal: TimeSignal) -> str:
@@ -158,7 +152,6 @@ def _instead(signal: TimeSignal) -> str:
 
 def way(scene: Scene, mesh: Mesh, step: float) -> Any:
     """Positions (mm) that the pad may come to, `step` apart or as near to that as memory allows."""
-    position = np.cumsum([0.0, *(motion.way[0] for motion in scene.motion if isinstance(motion, Slide))])
-    pad = mesh.points[mesh.node_sets["pad"], 0]
-    first, last = pad.min() + position.min(), pad.max() + position.max()
+    pad, bone = mesh.points[mesh.node_sets["pad"], 0], scene.reach
+    first, last = pad.min() + bone[0], pad.max() + bone[1]
     return np.linspace(first, last, int(np.clip((last - first) / step, 2, MOST)))

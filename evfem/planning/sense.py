@@ -19,7 +19,6 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.finger.layers import TABLE_2
 from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import way
-from evfem.scene.motion import Hover, Press, Slide, follows_gap
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
 from evfem.tissue.elements import ELEMENTS
@@ -45,8 +44,8 @@ PRESSED = 0.02
 LEAST_TRAVEL, THINNEST_SKIN = 1e-3, 5e-3
 #: load over the whole finger, relative to its softest shear modulus, at most; 2 N over 10 mm are 1
 HEAVIEST = 100.0
-#: lengths (mm) that a motion may have, and distance of the places at which a profile's height is looked at
-TRAVEL, WAY_STEP = ("indentation", "distance", "gap"), 0.02
+#: distance (mm) of the places at which a profile's height is looked at
+WAY_STEP = 0.02
 
 
 def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
@@ -93,8 +92,8 @@ def _small(scene: Scene) -> Iterator[str]:
     skin = getattr(scene.finger.electrical, "stratum_corneum_thickness", None)
     if skin is not None and skin < THINNEST_SKIN:
         yield f"a stratum corneum of {skin:g} mm is thinner than any: lengths are in mm, not in m"
-    lengths = [abs(getattr(m, name) or 0.0) for m in scene.motion for name in TRAVEL if hasattr(m, name)]
-    travel, width = max(lengths, default=0.0), getattr(scene.finger, "width", None)
+    travel = max(abs(length or 0.0) for c in scene.courses for length in (c.distance, c.indentation, c.gap))
+    width = getattr(scene.finger, "width", None)
     # a mesh may have most of a half space beside a small contact
     if width is not None and 0.0 < travel < LEAST_TRAVEL * width:
         yield f"a finger of {width:g} mm is moved by {travel:g} mm at most: lengths are in mm, not in m"
@@ -111,10 +110,9 @@ def _other_units(scene: Scene, mesh: Mesh) -> Iterator[str]:
             f"an insulator of {float(np.max(insulator.thickness)):g} mm is thicker than that of any display"
         )
         yield f"{thick}: lengths are in mm, 1 um is 0.001"
-    for i, motion in enumerate(scene.motion):
-        speed = motion.speed if isinstance(motion, Slide) else None
-        if speed is not None and speed <= SLOWEST:
-            slow = f"motion {i} slides at {speed:g} mm/s, slower than any finger explores"
+    for i, course in enumerate(scene.courses):
+        if course.distance and course.speed is not None and course.speed <= SLOWEST:
+            slow = f"motion {i} slides at {course.speed:g} mm/s, slower than any finger explores"
             yield f"{slow}: speeds are in mm/s, not in m/s"
     if isinstance(scene.ground, Profile):
         slope = np.diff(scene.ground.samples) / np.diff(scene.ground.x)
@@ -127,10 +125,8 @@ def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
     bone, pad = (float(mesh.points[mesh.node_sets[name], 1].min()) for name in ("bone", "pad"))
     sides, unit = (mesh.points[:, ::2], "N") if mesh.dim == 3 else (mesh.points[:, :1], "N/mm")
     size = float(np.prod(np.ptp(sides, axis=0)))
-    for i, motion in enumerate(scene.motion):
-        if not isinstance(motion, Press):
-            continue
-        depth, force = motion.indentation or 0.0, motion.force or 0.0
+    for i, course in enumerate(scene.courses):
+        depth, force = course.indentation or 0.0, course.force or 0.0
         if depth >= bone - pad > 0.0:
             yield f"motion {i} presses {depth:g} mm deep, but the bone is {bone - pad:.2g} mm above the skin"
         if force > HEAVIEST * modulus * size:
@@ -140,8 +136,8 @@ def _large(scene: Scene, mesh: Mesh, modulus: float) -> Iterator[str]:
 
 def _breakdown(scene: Scene) -> Iterator[str]:
     """A field across a solid layer where the skin touches: U / (eps_r s), s the sum of d / eps_r."""
-    found = isinstance(scene.voltage, (FollowForce, ChargeControl)) or any(map(follows_gap, scene.motion))
-    if scene.law is None or found:
+    found = isinstance(scene.voltage, (FollowForce, ChargeControl))
+    if scene.law is None or found or any(course.gap is not None for course in scene.courses):
         return
     seen, voltage = scene.electrics, scene.electrics.largest_voltage
     reduced = float(np.min(seen.attraction[1].reduced))
@@ -171,8 +167,7 @@ def _unbearable(scene: Scene) -> Iterator[str]:
     """An attraction of touching skin beyond what any load presses it with, where a fingertip is pressed;
     of a mesh, which may be anything, the run's own forces tell.
     """
-    pressed = any(isinstance(motion, Press) and _target(motion) > 0.0 for motion in scene.motion)
-    if isinstance(scene.finger, MeshedFinger) or not pressed:
+    if isinstance(scene.finger, MeshedFinger) or not any((c.depth or 0.0) > 0.0 for c in scene.courses):
         return
     traction = touching_traction(scene)
     if traction is not None and traction > PRESSED:
@@ -186,7 +181,7 @@ def weakens(scene: Scene) -> bool:
     """Whether friction falls with the speed somewhere up to ten times the fastest motion's: a node that is
     let go is faster than the bone.
     """
-    law, fastest = scene.friction_law, max(getattr(one, "speed", None) or 0.0 for one in scene.motion)
+    law, fastest = scene.friction_law, max(course.speed or 0.0 for course in scene.courses)
     if not (scene.has_friction and getattr(law, "timed", False)):
         return False
     speed = fastest * np.concatenate([[0.0], np.logspace(-4.0, 1.0, 101)])
@@ -197,21 +192,14 @@ def weakens(scene: Scene) -> bool:
 
 def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
     """Slides after the last press that do not touch: before it, the bone may be on its way."""
-    presses = [i for i, m in enumerate(scene.motion) if isinstance(m, Press) and _target(m) > 0.0]
+    presses = [i for i, course in enumerate(scene.courses) if (course.depth or 0.0) > 0.0]
     first, indentation = (presses[-1] + 1, math.inf) if presses else (0, 0.0)
-    for i, motion in enumerate(scene.motion[first:], first):
-        if isinstance(motion, Hover):
-            indentation = -motion.gap
-        elif isinstance(motion, Press):
-            indentation = _target(motion)
-        elif isinstance(motion, Slide) and _stays_up(scene, mesh, -indentation):
+    for i, course in enumerate(scene.courses[first:], first):
+        if course.depth is not None:
+            indentation = course.depth
+        elif course.distance and _stays_up(scene, mesh, -indentation):
             above = f"{-indentation:g} mm above first touch" if indentation else "at first touch"
             yield f"motion {i}, a slide {above}, never touches: press before it"
-
-
-def _target(press: Press) -> float:
-    """Indentation that a press ends at, as far as it is known: a force always touches."""
-    return math.inf if press.indentation is None else press.indentation
 
 
 def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:

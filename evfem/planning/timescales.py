@@ -83,7 +83,7 @@ def bandwidth(scene: Scene) -> float:
     """Highest frequency (Hz) that the tissue follows, infinite without time in the mechanics."""
     own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
     slowest = max([scene.finger.viscosity, *own])
-    if scene.solver.dynamics == "quasistatic" or not slowest > 0.0:
+    if not scene.solver.timed or not slowest > 0.0:
         return np.inf
     return 1.0 / (2.0 * np.pi * slowest)
 

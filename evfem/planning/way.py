@@ -20,7 +20,7 @@ def remembers(scene: Scene) -> tuple[str, ...]:
     drive = scene.drive is not None and scene.drive.resolved
     found = {
         "friction": scene.has_friction,
-        "time": scene.solver.dynamics != "quasistatic",
+        "time": scene.solver.timed,
         "charges": drive,
         "the hand": scene.hand is not None and scene.hand.timed,
         "who touches": scene.law is not None and not scene.air_layer,

@@ -22,7 +22,6 @@ from evfem.electrostatics.timesignals import Carrier, ChargeControl, OpenCircuit
 from evfem.errors import ABSENT, InputError
 from evfem.mesh.faces import layer_thickness
 from evfem.protocols import TimeSignal
-from evfem.scene.motion import VoltageRamp
 
 #: voltages that follow from the charge of the electrode
 CHARGED = (OpenCircuit, ChargeControl)
@@ -53,7 +52,7 @@ class Electrics:
             thickness = getattr(scene.finger, "stratum_corneum_thickness", SKIN)
         eps_r = float(getattr(electrical, "stratum_corneum_eps_r", 1650.0))
         skin = (scene.drive or Drive()).skin_layer(float(thickness), eps_r)
-        ramps = tuple(motion.largest for motion in scene.motion if isinstance(motion, VoltageRamp))
+        ramps = tuple(found for one in scene.courses if (found := one.largest_voltage) is not None)
         return cls(scene.law, scene.drive, scene.voltage, ramps, eps_r, skin, scene.ground.insulator)
 
     def above(self, electrical: Any, mesh: Any, nodes: Ints) -> Electrics:
@@ -212,8 +211,8 @@ def _check_resolved(scene: Any, drive: Drive) -> None:
     if isinstance(voltage, Carrier) and not voltage.resolved:
         allowed = "a carrier with resolved=True in a resolved drive"
         raise InputError("electrostatics.signal", "the mean of a carrier", allowed)
-    for i, motion in enumerate(scene.motion):
-        if isinstance(motion, VoltageRamp):
+    for i, course in enumerate(scene.courses):
+        if course.largest_voltage is not None:
             raise InputError(f"motion[{i}]", "a voltage ramp in a resolved drive", "a signal over time")
 
 

@@ -17,8 +17,8 @@ from typing import Any
 from evfem.common.checks import MOST_STEPS
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.errors import ABSENT, InputError, Mistakes, StorageError
-from evfem.finger.fingerpad import FingerPad, MeshedFinger, participant_sizes
-from evfem.finger.fingertip import FINGERS, tip_sizes
+from evfem.finger.fingerpad import FingerPad, MeshedFinger
+from evfem.finger.fingertip import FINGERS
 from evfem.finger.layers import TABLE_2
 from evfem.scene.format import (
     HOMES,
@@ -31,7 +31,7 @@ from evfem.scene.format import (
     names,
 )
 from evfem.scene.keys import VERSION, at, check_size, kind_of, read, read_kind, shown
-from evfem.scene.motion import MOTIONS, Motion, VoltageRamp
+from evfem.scene.motion import MOTIONS, Motion
 from evfem.scene.scene import DEPTH, Output, Scene, Solver
 from evfem.scene.written import dump
 from evfem.solver.hand import Hand
@@ -97,19 +97,20 @@ def loads(text: str, folder: str | Path = ".", name: str = "scene") -> Scene:
     parts: dict[str, Any] = {}
     with mistakes.of_a_part():
         parts |= _finger({} if top.finger is None else top.finger, folder)
+    of_motions = Mistakes()
+    with of_motions.of_a_part():
+        parts["motion"] = _motions(top.motion)
     insulated: dict[str, Any] = {}
     with mistakes.of_a_part():
         if top.electrostatics is not None:
             found, law = _electrostatics(top.electrostatics, folder)
-            ramped = any(
-                isinstance(one, Mapping) and one.get("kind") == VoltageRamp.kind for one in top.motion
-            )
+            motions = parts.get("motion", ())
+            ramped = not motions or any(one.course.largest_voltage is not None for one in motions)
             parts |= found.scene_keys(law, ramped)
             insulated = {"insulator": found.layer(), "electrodes": found.electrodes}
     with mistakes.of_a_part():
         parts |= _surface(top.surface, folder, **insulated)
-    with mistakes.of_a_part():
-        parts["motion"] = _motions(top.motion)
+    mistakes.found += of_motions.found
     for key, cls in (("hand", Hand), ("solver", Solver), ("output", Output)):
         with mistakes.of_a_part():
             if (table := getattr(top, key)) is not None:
@@ -192,7 +193,7 @@ def _parametric(table: Mapping[str, Any], folder: Path) -> Any:
     mistakes, sizes, found = Mistakes(), dict[str, Any](), None
     with mistakes.of_a_part(), at("finger"):
         if "participant" in table:
-            sizes = (participant_sizes if cls is FingerPad else tip_sizes)(table["participant"])
+            sizes = cls.sizes_of(table["participant"])
     if isinstance(laws := table.get("materials"), Mapping):
         table = {**table, "materials": {name: _completed(name, law) for name, law in laws.items()}}
     with mistakes.of_a_part():

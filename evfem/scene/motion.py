@@ -1,15 +1,14 @@
 """What the finger does: press, slide, hover, wait, and voltage ramps; frozen and validated (mm,
-N/mm, V, s).
+N/mm, V, s). A run and its plan know no kind: each motion gives its `Course`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
-from evfem.common.checks import Checked, Within, check_fields, number, one_of, whole
+from evfem.common.checks import Named, Within, number, one_of, whole
 from evfem.errors import InputError, quoted
 
 Hold = Literal["indentation", "force"]
@@ -33,8 +32,96 @@ Steps = Annotated[int, whole(), "in how many equal parts"]
 Held = Annotated[Hold, one_of(*get_args(Hold)), "what stays as it was: the indentation, or the applied force"]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Course:
+    """What a motion of any kind does; what is None stays as it is.
+
+    It goes `distance` (mm) towards `angle` (degrees from +x), to an `indentation` (mm) or an applied
+    `force` (N/mm); one that `hovers` leaves no load to hold. `hold` says what stays where neither is given.
+    It takes the voltage to `voltage` (V), or to what makes the smallest gap of the deformed pad `gap` (mm).
+    It goes with a `speed` (mm/s) or lasts a `duration` (s), else no time passes.
+
+    >>> Course(distance=2.0, angle=90.0).travel
+    (0.0, 2.0)
+    """
+
+    distance: float = 0.0
+    angle: float = 0.0
+    indentation: float | None = None
+    force: float | None = None
+    hovers: bool = False
+    hold: Hold = "indentation"
+    voltage: float | None = None
+    gap: float | None = None
+    speed: float | None = None
+    duration: float = 0.0
+
+    @property
+    def direction(self) -> tuple[float, float]:
+        """Where its angle points, x and z of a unit vector; quarter turns are exact."""
+        quarters, rest = divmod(self.angle, 90.0)
+        x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
+        for _ in range(int(quarters) % 4):
+            x, z = -z, x
+        return x, z
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """How far it goes along x and along z, in mm."""
+        x, z = self.direction
+        return self.distance * x + 0.0, self.distance * z + 0.0
+
+    @property
+    def depth(self) -> float | None:
+        """Indentation (mm) at its end, as far as it is known: a force always touches."""
+        return self.indentation if self.force is None else math.inf
+
+    @property
+    def presses(self) -> bool:
+        """Whether there is a load to hold after it."""
+        return self.depth is not None and not self.hovers
+
+    @property
+    def largest_voltage(self) -> float | None:
+        """Voltage (V) of a ramp that counts in estimates: how much a gap takes is found."""
+        return self.voltage if self.gap is None else UNKNOWN_VOLTAGE
+
+    @property
+    def takes_time(self) -> bool:
+        """Whether any time passes."""
+        return self.speed is not None or self.duration > 0.0
+
+    def seconds(self, steps: int = 1, start: float = 0.0) -> float:
+        """Seconds of each of so many equal steps, from the indentation `start` (mm).
+
+        >>> Course(indentation=1.5, speed=2.0).seconds(steps=10, start=0.5)
+        0.05
+        """
+        if self.speed is None:
+            return self.duration / steps
+        deeper = 0.0 if self.indentation is None else self.indentation - start
+        return abs(self.distance or deeper) / steps / self.speed
+
+
+class Motion(Named):
+    """A motion: a dataclass with `steps` and the `course` that its fields mean."""
+
+    steps: int
+
+    @property
+    def course(self) -> Course:
+        """What it does."""
+        raise NotImplementedError
+
+    def _check_one_of(self, *names: str) -> None:
+        given = [name for name in names if getattr(self, name) is not None]
+        if len(given) != 1:
+            found = " and ".join(given) or "neither " + " nor ".join(names)
+            raise InputError(names[0], found, "exactly one of the two")
+
+
 @dataclass(frozen=True)
-class Press:
+class Press(Motion, kind="press"):
     """Press to a force on the bone or to an indentation, both absolute, in equal parts.
 
     Without a `speed` the press takes no time and is quasi-static. Raises InputError unless exactly one target
@@ -53,20 +140,21 @@ class Press:
     )
     steps: Steps = 10
     speed: Annotated[float | None, _SPEED, "of a press to an indentation; without it no time passes"] = None
-    kind = "press"
 
     def __post_init__(self) -> None:
-        if (self.force is None) == (self.indentation is None):
-            given = "neither force nor indentation" if self.force is None else "force and indentation"
-            raise InputError("force", given, "exactly one of the two")
+        self._check_one_of("force", "indentation")
         if self.force is not None and self.speed is not None:
             allowed = "no speed with a press to a force, only to an indentation"
             raise InputError("speed", quoted(self.speed), allowed)
-        check_fields(self)
+        super().__post_init__()
+
+    @property
+    def course(self) -> Course:
+        return Course(force=self.force, indentation=self.indentation, speed=self.speed)
 
 
 @dataclass(frozen=True)
-class Slide(Checked):
+class Slide(Motion, kind="slide"):
     """Slide over the surface in equal parts.
 
     `hold` keeps the applied force of the moment before, as experiments do, or the indentation, at
@@ -76,8 +164,6 @@ class Slide(Checked):
 
     >>> Slide(distance=5.0).steps
     100
-    >>> Slide(distance=2.0, angle=90.0).way
-    (0.0, 2.0)
     """
 
     distance: Annotated[float, _DISTANCE, "from where it is, negative towards -x"]
@@ -85,26 +171,14 @@ class Slide(Checked):
     speed: Annotated[float | None, _SPEED, "needed with dynamics other than quasistatic"] = None
     hold: Held = "indentation"
     angle: Annotated[float, _ANGLE, "from +x, of a fingertip; 90 is along the finger"] = 0.0
-    kind = "slide"
 
     @property
-    def direction(self) -> tuple[float, float]:
-        """Where its angle points, x and z of a unit vector; quarter turns are exact."""
-        quarters, rest = divmod(self.angle, 90.0)
-        x, z = math.cos(math.radians(rest)), math.sin(math.radians(rest))
-        for _ in range(int(quarters) % 4):
-            x, z = -z, x
-        return x, z
-
-    @property
-    def way(self) -> tuple[float, float]:
-        """How far it goes along x and along z, in mm."""
-        x, z = self.direction
-        return self.distance * x + 0.0, self.distance * z + 0.0
+    def course(self) -> Course:
+        return Course(distance=self.distance, angle=self.angle, speed=self.speed, hold=self.hold)
 
 
 @dataclass(frozen=True)
-class Hover(Checked):
+class Hover(Motion, kind="hover"):
     """Hold the bone so that the undeformed outline is off the surface: `indentation = -gap`.
 
     The tissue is free to move under the attraction. Going there takes no time.
@@ -112,18 +186,21 @@ class Hover(Checked):
 
     gap: Annotated[float, _GAP, "of the undeformed outline to the surface"]
     steps: Steps = 1
-    kind = "hover"
+
+    @property
+    def course(self) -> Course:
+        return Course(indentation=-self.gap, hovers=True)
 
 
 @dataclass(frozen=True)
-class VoltageRamp:
+class VoltageRamp(Motion, kind="voltage"):
     """Take the voltage from its present value to another, or to where the smallest gap of the deformed pad
     is a given one, in equal parts.
 
     A gap is followed where a given voltage pulls the pad in, and back; the voltage is what it takes. Raises
     InputError unless exactly one of the two is given.
 
-    >>> VoltageRamp(gap=0.05).largest
+    >>> VoltageRamp(gap=0.05).course.largest_voltage
     10000.0
     """
 
@@ -131,22 +208,18 @@ class VoltageRamp:
     steps: Steps = 10
     hold: Held = "indentation"
     gap: Annotated[float | None, _NARROWED, "smallest gap of the deformed pad at the end"] = None
-    kind = "voltage"
 
     def __post_init__(self) -> None:
-        if (self.voltage is None) == (self.gap is None):
-            given = "neither voltage nor gap" if self.gap is None else "voltage and gap"
-            raise InputError("voltage", given, "exactly one of the two")
-        check_fields(self)
+        self._check_one_of("voltage", "gap")
+        super().__post_init__()
 
     @property
-    def largest(self) -> float:
-        """Voltage (V) that counts in estimates: how much a gap takes is found."""
-        return UNKNOWN_VOLTAGE if self.voltage is None else self.voltage
+    def course(self) -> Course:
+        return Course(voltage=self.voltage, gap=self.gap, hold=self.hold)
 
 
 @dataclass(frozen=True)
-class Wait(Checked):
+class Wait(Motion, kind="wait"):
     """Stay where it is for some time: for a voltage that changes with time, and for tissue that creeps.
 
     >>> Wait(duration=0.1).steps
@@ -156,26 +229,10 @@ class Wait(Checked):
     duration: Annotated[float, _DURATION, "how long it stays"]
     steps: Steps = 100
     hold: Held = "indentation"
-    kind = "wait"
+
+    @property
+    def course(self) -> Course:
+        return Course(duration=self.duration, hold=self.hold)
 
 
-Motion = Press | Slide | Hover | VoltageRamp | Wait
-MOTIONS: Mapping[str, type] = {cls.kind: cls for cls in get_args(Motion)}
-
-
-def follows_gap(motion: Motion) -> bool:
-    """Whether the voltage of a motion is what makes a gap.
-
-    >>> follows_gap(VoltageRamp(100.0)), follows_gap(VoltageRamp(gap=0.1))
-    (False, True)
-    """
-    return isinstance(motion, VoltageRamp) and motion.gap is not None
-
-
-def takes_time(motion: Motion) -> bool:
-    """Whether any time passes in a motion.
-
-    >>> takes_time(Slide(1.0)), takes_time(Slide(1.0, speed=20.0)), takes_time(Wait(0.1))
-    (False, True, True)
-    """
-    return isinstance(motion, Wait) or getattr(motion, "speed", None) is not None
+MOTIONS = Motion.kinds

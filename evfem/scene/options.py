@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import InitVar, dataclass, field
 from typing import Annotated
 
-from evfem.common.checks import GONE, Checked, Within, check_fields, number, one_of, real, whole, yes_or_no
+from evfem.common.checks import GONE, Checked, Within, among, check_fields, number, real, whole, yes_or_no
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
+from evfem.tissue.dynamics import DYNAMICS
 from evfem.tissue.elements import ELEMENTS, elements_on
 
-DYNAMICS = ("quasistatic", "viscous", "inertial")
 CONTACTS = ("exact", "penalty")
 PRECISIONS = ("single", "double")
 _PENALTY = number("a penalty in N/mm3, larger than 0", Within(0.0, above=True), "N/mm3")
@@ -33,12 +33,12 @@ class Solver:
     """How a scene is solved; the defaults are the recommended ones."""
 
     element: Annotated[
-        str | None, one_of(*ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
+        str | None, among(ELEMENTS), "without it q2p1 on quads, p2 on triangles, hex27p1 on hexahedra"
     ] = None
-    dynamics: Annotated[str, one_of(*DYNAMICS), "without time, with viscosity, or with inertia too"] = (
+    dynamics: Annotated[str, among(DYNAMICS), "without time, with viscosity, or with inertia too"] = (
         "quasistatic"
     )
-    contact: Annotated[str, one_of(*CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
+    contact: Annotated[str, among(CONTACTS), "exact (Signorini, Coulomb), or springs"] = "exact"
     penalty_normal: Annotated[float | None, _PENALTY, "with contact = penalty"] = None
     penalty_tangential: Annotated[float | None, _PENALTY, "with contact = penalty and friction"] = None
     tolerance: Annotated[
@@ -67,6 +67,16 @@ class Solver:
         if self.contact == "penalty" and self.penalty_normal is None:
             allowed = 'a penalty in N/mm3, needed with contact = "penalty"'
             raise InputError("penalty_normal", ABSENT, allowed)
+
+    @property
+    def timed(self) -> bool:
+        """Whether the tissue knows of time."""
+        return DYNAMICS[self.dynamics] is not None
+
+    @property
+    def inertial(self) -> bool:
+        """Whether the tissue has mass."""
+        return getattr(DYNAMICS[self.dynamics], "inertia", False)
 
     @classmethod
     def within(cls, error: float = 1e-3) -> Solver:
@@ -111,7 +121,7 @@ class Output(Checked):
     ] = None
     precision: Annotated[
         str | None,
-        one_of(*PRECISIONS),
+        among(PRECISIONS),
         "of the fields; without it single where they would take more than 25 MB",
     ] = None
     compression: Annotated[

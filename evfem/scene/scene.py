@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate
 from typing import Annotated, Any, Protocol, runtime_checkable
 
 from evfem.common.checks import (
@@ -31,17 +32,7 @@ from evfem.electrostatics.signals import FollowForce, VoltageProfile
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.protocols import CompleteSurface, ForceLaw, FrictionLaw, Surface, TimeSignal
 from evfem.scene.electrics import Electrics, check_drive, without_field
-from evfem.scene.motion import (
-    VOLTAGE,
-    Hover,
-    Motion,
-    Press,
-    Slide,
-    VoltageRamp,
-    Wait,
-    follows_gap,
-    takes_time,
-)
+from evfem.scene.motion import MOTIONS, VOLTAGE, Course, Motion, Press, Slide
 from evfem.scene.options import Output, Solver
 from evfem.scene.terms import Boundary, Region, Term
 from evfem.solver.hand import Hand
@@ -183,6 +174,17 @@ class Scene:
         return Electrics.of(self)
 
     @property
+    def courses(self) -> tuple[Course, ...]:
+        """What each of the motions does."""
+        return tuple(motion.course for motion in self.motion)
+
+    @property
+    def reach(self) -> tuple[float, float]:
+        """Smallest and largest x (mm) of the bone where motions begin and end."""
+        x = [0.0, *accumulate(course.travel[0] for course in self.courses)]
+        return min(x), max(x)
+
+    @property
     def has_friction(self) -> bool:
         """Whether anything may resist sliding."""
         return self.ground.has_friction or not isinstance(self.friction_law, Coulomb)
@@ -229,10 +231,10 @@ def _check_parts(scene: Scene) -> None:
     if not all(isinstance(term, Term) for term in scene.forms):
         raise InputError("forms", quoted(scene.forms), "terms as made by Scene.with_term")
     if not scene.motion:
-        raise InputError("motion", ABSENT, "at least one of Press, Slide, Hover, VoltageRamp, Wait")
+        raise InputError("motion", ABSENT, f"at least one of {_names(MOTIONS)}")
     for i, motion in enumerate(scene.motion):
         if not isinstance(motion, Motion):
-            raise InputError(f"motion[{i}]", quoted(motion), "Press, Slide, Hover, VoltageRamp or Wait")
+            raise InputError(f"motion[{i}]", quoted(motion), f"one of {_names(MOTIONS)}")
 
 
 def _check_electrostatics(scene: Scene) -> None:
@@ -247,10 +249,10 @@ def _check_electrostatics(scene: Scene) -> None:
         set_frozen(scene, voltage=voltage)
     if scene.law is None:
         if scene.voltage != 0.0:
-            allowed = f"{_laws()} or a law of your own"
+            allowed = f"{_names(FORCE_LAWS, '()')} or a law of your own"
             raise InputError("electrostatics.law", "a voltage without a law", allowed)
     elif isinstance(scene.law, type) or not isinstance(scene.law, ForceLaw):
-        allowed = f"{_laws()} or an object with a method traction(gap, voltage, layers)"
+        allowed = f"{_names(FORCE_LAWS, '()')} or an object with a method traction(gap, voltage, layers)"
         raise InputError("electrostatics.law", quoted(scene.law), allowed)
     elif scene.direction == "normal" and not callable(getattr(scene.law, "potential", None)):
         allowed = 'vertical, or a law that also has potential(gap, voltage, layers), for direction = "normal"'
@@ -260,8 +262,8 @@ def _check_electrostatics(scene: Scene) -> None:
         raise InputError("surface.insulator", "a law and no insulator", allowed)
 
 
-def _laws() -> str:
-    return ", ".join(f"{cls.__name__}()" for cls in FORCE_LAWS.values())
+def _names(classes: Mapping[str, type], made: str = "") -> str:
+    return ", ".join(f"{cls.__name__}{made}" for cls in classes.values())
 
 
 def _check_hand(scene: Scene) -> None:
@@ -272,10 +274,15 @@ def _check_hand(scene: Scene) -> None:
         raise InputError("hand", quoted(hand), "a Hand, or None")
     if isinstance(scene.voltage, FollowForce):
         raise InputError("hand", "a hand beside a wished friction force", "one of the two")
-    for i, motion in enumerate(scene.motion if hand.timed else ()):
-        if isinstance(motion, Slide) and motion.speed is None:
-            allowed = "a speed in mm/s, needed with a hand that has a damping or a mass"
-            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
+    if hand.timed:
+        _check_speeds(scene, "a hand that has a damping or a mass")
+
+
+def _check_speeds(scene: Scene, timed: str) -> None:
+    """Raise InputError for a slide that takes no time beside something `timed`."""
+    for i, course in enumerate(scene.courses):
+        if course.distance and not course.takes_time:
+            raise InputError(f"motion[{i}].speed", ABSENT, f"a speed in mm/s, needed with {timed}")
 
 
 def _check_field(scene: Scene) -> None:
@@ -293,28 +300,26 @@ def _check_friction(scene: Scene) -> None:
     if isinstance(law, type) or not isinstance(law, FrictionLaw):
         allowed = "Coulomb() or another law of friction, or an object with bound(pressure, mu, speed, age)"
         raise InputError("surface.friction_law", quoted(law), allowed)
-    for i, motion in enumerate(scene.motion if getattr(law, "timed", False) else ()):
-        if isinstance(motion, Slide) and motion.speed is None:
-            allowed = f"a speed in mm/s, needed with {type(law).__name__}"
-            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
+    if getattr(law, "timed", False):
+        _check_speeds(scene, type(law).__name__)
 
 
 def _check_motion(scene: Scene) -> None:
     pressed = False
-    for i, motion in enumerate(scene.motion):
-        key = f"motion[{i}]"
-        pressed = (pressed or isinstance(motion, Press)) and not isinstance(motion, Hover)
-        if isinstance(motion, VoltageRamp) and scene.law is None:
+    for i, course in enumerate(scene.courses):
+        key, ramps = f"motion[{i}]", course.largest_voltage is not None
+        pressed = (pressed or course.presses) and not course.hovers
+        if ramps and scene.law is None:
             raise InputError(key, "a voltage ramp without a law", "a scene with an electrostatic law")
-        if isinstance(motion, VoltageRamp) and isinstance(scene.voltage, SIGNALS):
+        if ramps and isinstance(scene.voltage, SIGNALS):
             raise InputError(key, "a voltage ramp beside a voltage profile or signal", "one of the two")
-        if follows_gap(motion) and scene.coupling != "monolithic":
+        if course.gap is not None and scene.coupling != "monolithic":
             raise InputError(f"{key}.gap", f"a gap with coupling = {scene.coupling}", "coupling = monolithic")
-        if isinstance(motion, (Slide, VoltageRamp, Wait)) and motion.hold == "force" and not pressed:
+        if course.hold == "force" and not pressed:
             raise InputError(
                 f"{key}.hold", "force before any press", "a press first, to have a force to hold"
             )
-        if isinstance(motion, Press) and motion.force == 0.0 and scene.law is None:
+        if course.force == 0.0 and scene.law is None:
             raise InputError(f"{key}.force", 0.0, "larger than 0 when nothing else pulls the finger down")
 
 
@@ -322,7 +327,7 @@ def _check_time(scene: Scene) -> None:
     timed = isinstance(scene.electrics.voltage, TimeSignal) or (
         scene.drive is not None and scene.drive.resolved
     )
-    if timed and not any(takes_time(motion) for motion in scene.motion):
+    if timed and not any(course.takes_time for course in scene.courses):
         given = "a signal over time, and no motion that takes any"
         raise InputError("electrostatics.voltage", given, "a Wait, or a slide or press with a speed")
 
@@ -332,15 +337,12 @@ def _check_dynamics(scene: Scene) -> None:
     if solver.contact == "penalty" and scene.has_friction and solver.penalty_tangential is None:
         allowed = 'a penalty in N/mm3, needed with contact = "penalty" and friction'
         raise InputError("solver.penalty_tangential", ABSENT, allowed)
-    if solver.dynamics == "quasistatic":
+    if not solver.timed:
         return
-    for i, motion in enumerate(scene.motion):
-        if isinstance(motion, Slide) and motion.speed is None:
-            allowed = f"a speed in mm/s, needed with dynamics = {solver.dynamics}"
-            raise InputError(f"motion[{i}].speed", ABSENT, allowed)
+    _check_speeds(scene, f"dynamics = {solver.dynamics}")
     own = [getattr(law, "viscosity", None) or 0.0 for law in scene.finger.materials.values()]
-    if solver.dynamics == "viscous" and not max([scene.finger.viscosity, *own]) > 0.0:
-        allowed = "a relaxation time in s, larger than 0, with dynamics = viscous"
+    if not solver.inertial and not max([scene.finger.viscosity, *own]) > 0.0:
+        allowed = f"a relaxation time in s, larger than 0, with dynamics = {solver.dynamics}"
         raise InputError("finger.viscosity", 0.0, allowed)
 
 

@@ -13,7 +13,6 @@ from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError, Mistakes
 from evfem.mesh.mesh import Mesh
 from evfem.protocols import FrictionLaw
-from evfem.scene.motion import Slide
 from evfem.scene.scene import Scene
 from evfem.surface.friction import AgeingFriction, RateFriction
 
@@ -35,9 +34,9 @@ def check_space(scene: Scene, mesh: Mesh) -> None:
 
 def _check_plane(scene: Scene) -> list[tuple[str, str, str]]:
     return [
-        (f"motion[{i}].angle", f"{motion.angle:g} degrees with a finger in the plane", "0, or a Fingertip")
-        for i, motion in enumerate(scene.motion)
-        if isinstance(motion, Slide) and motion.angle != 0.0
+        (f"motion[{i}].angle", f"{course.angle:g} degrees with a finger in the plane", "0, or a Fingertip")
+        for i, course in enumerate(scene.courses)
+        if course.angle != 0.0
     ]
 
 
@@ -46,7 +45,7 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if len(scene.ground.friction_jumps):
         allowed = "a number, or a table without jumps: a short ramp from one coefficient to the next"
         found.append(("surface.friction", f"a jump of the coefficient {SOLID}", allowed))
-    if scene.hand is not None and _goes_across(scene):
+    if scene.hand is not None and any(course.travel[1] for course in scene.courses):
         found.append(("hand", "a hand on a slide across x", "angle 0 or 180: its spring acts along x"))
     if scene.solver.contact != "exact":
         found.append(("solver.contact", f"{scene.solver.contact} {SOLID}", "exact"))
@@ -63,7 +62,7 @@ def _check_solid(scene: Scene) -> list[tuple[str, str, str]]:
     if scene.depth is not None:
         found.append(("depth", f"{scene.depth:g} {SOLID}", "no depth: its forces are in N already"))
     if isinstance(scene.voltage, FollowForce) and any(
-        isinstance(motion, Slide) and motion.direction != (1.0, 0.0) for motion in scene.motion
+        course.direction != (1.0, 0.0) for course in scene.courses
     ):
         allowed = "angle 0, and a negative distance for the way back: what is followed is the force along x"
         found.append(("electrostatics.voltage", "a friction force to follow on a slide across x", allowed))
@@ -75,10 +74,6 @@ def _falls(law: FrictionLaw) -> bool:
     if isinstance(law, RateFriction):
         return law.exponent == 0.0 and law.ratio <= 1.0
     return isinstance(law, AgeingFriction) or not getattr(law, "timed", False)
-
-
-def _goes_across(scene: Scene) -> bool:
-    return any(isinstance(motion, Slide) and motion.way[1] != 0.0 for motion in scene.motion)
 
 
 def needed_memory(mesh: Mesh) -> float:

@@ -23,7 +23,7 @@ import evfem
 from evfem.common.checks import plain
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.errors import InputError
-from evfem.simulation.history import COLUMNS, RESUMED, SUMS, columns_of
+from evfem.simulation.history import COLUMNS, NEEDED, SUMS, columns_of
 from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
@@ -202,5 +202,5 @@ def _check_rows(rows: Any) -> None:
             raise ValueError(f"row {step}")
         if not all(type(value) in (int, float) for value in numbers):
             raise ValueError(f"row {step}")
-        if not all(math.isfinite(row[name]) for name in RESUMED):
+        if not all(math.isfinite(row[name]) for name in NEEDED if name != "motion"):
             raise ValueError(f"row {step}")

@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene
 from evfem.simulation.history import Row
 from evfem.simulation.model import Model
@@ -59,10 +58,10 @@ def _column(rows: Sequence[Row], name: str) -> Floats:
 
 def _missed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """Slides that touch nothing, unless on the way to where the finger is pressed."""
-    for i, motion in enumerate(scene.motion):
+    for i, course in enumerate(scene.courses):
         forces = [row["normal_force"] for row in rows if row["motion_index"] == i]
-        later = any(isinstance(one, Press) for one in scene.motion[i:])
-        if isinstance(motion, Slide) and forces and not any(forces) and not later:
+        later = any(one.presses for one in scene.courses[i:])
+        if course.distance and forces and not any(forces) and not later:
             yield f"motion {i}, a slide, never touched"
 
 
@@ -74,7 +73,7 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     if not pull.any():
         return
     first, worst, most = int(np.argmax(pull)), int(np.argmax(np.where(pull > 0.0, peak, 0.0))), load.max()
-    if any(isinstance(motion, Press) for motion in scene.motion) and pull[first] > max(most, 0.0):
+    if any(course.presses for course in scene.courses) and pull[first] > max(most, 0.0):
         times = f"{pull[first] / most:.3g} times the load, " if most > 0.0 else "more than the load, "
         yield (
             f"the attraction, {pull[first]:.3g} {unit} in step {rows[first]['step']}, is {times}"
@@ -90,7 +89,7 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """Steps in time that dissipate by themselves."""
     hand = scene.hand is not None and scene.hand.timed
-    if scene.solver.dynamics == "quasistatic" and not hand:
+    if not scene.solver.timed and not hand:
         return
     timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
 

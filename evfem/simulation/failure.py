@@ -90,15 +90,15 @@ def _may_have_an_energy(scene: Scene) -> bool:
 
 def _try(scene: Scene, failed: StepFailed, lost: bool) -> str:
     """What may help a scene of its kind; of what it has not nothing is said."""
-    dynamics, pulled = scene.solver.dynamics, scene.electrics.acts
+    pulled = scene.electrics.acts
     finer = "less friction or a finer mesh" if scene.has_friction else "a finer mesh"
     if isinstance(failed, LiftedOff):
         return f"try {'more voltage, or ' if pulled else ''}hold = indentation"
     if isinstance(failed, Folded):
         return f"try {'less voltage, a thicker insulator, ' if pulled else ''}smaller steps, {finer}"
-    if dynamics != "inertial" and weakens(scene):
+    if not scene.solver.inertial and weakens(scene):
         return "try dynamics = inertial: friction that falls with the speed lets go at once what has no mass"
-    if dynamics != "quasistatic":
+    if scene.solver.timed:
         passing = failed.last is None or failed.last[1].duration > 0.0
         time = "a larger viscosity of the finger" if passing else "a motion with a speed"
         return f"try smaller steps, {time}, {finer}"

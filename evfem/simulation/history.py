@@ -28,16 +28,14 @@ DRIFT = 0.05
 SAME = 1e-9
 #: unit per mm of depth -> unit over a depth
 WHOLE = {"N/mm": "N", "N": "mJ"}
-#: columns from which a run goes on
-RESUMED = ("time", "position", "indentation", "voltage", "applied_force")
-#: columns without which a saved result is none; where an older version did not write another one yet, it is
-#: NaN, or 0 if it counts something
-NEEDED = ("motion", "step", "motion_index", "substeps", "newton_iterations", *RESUMED)
 
 
-def column(unit: str, meaning: str, whole: str | None = None) -> dict[str, str]:
-    """Metadata of a field of `History`: its unit, what it is, and its unit over a whole depth."""
-    return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE.get(unit, unit)}
+def column(unit: str, meaning: str, *traits: str, whole: str | None = None) -> dict[str, Any]:
+    """Metadata of a field of `History`: its unit, what it is, its unit over a whole depth, and `traits`. A
+    saved result without what is `needed` is none (what an older version did not write yet is else NaN, or 0
+    if it counts something); of the last step what is `shown` is printed.
+    """
+    return {"unit": unit, "meaning": meaning, "whole": whole or WHOLE.get(unit, unit), "traits": traits}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,21 +47,29 @@ class History:
     `result["normal_force"]` is `result.normal_force`.
     """
 
-    step: Ints = field(metadata=column("", "number of the step in the run, from 1"))
-    motion_index: Ints = field(metadata=column("", "number of the motion, from 0"))
-    motion: Words = field(metadata=column("", "kind of the motion"))
-    time: Floats = field(metadata=column("s", "at the end of the step"))
-    position: Floats = field(metadata=column("mm", "x of the bone"))
-    indentation: Floats = field(metadata=column("mm", "travel of the bone beyond first touch"))
-    voltage: Floats = field(metadata=column("V", "effective; of the moment where it is resolved in time"))
-    applied_force: Floats = field(metadata=column("N/mm", "down, on the bone"))
+    step: Ints = field(metadata=column("", "number of the step in the run, from 1", "needed"))
+    motion_index: Ints = field(metadata=column("", "number of the motion, from 0", "needed"))
+    motion: Words = field(metadata=column("", "kind of the motion", "needed"))
+    time: Floats = field(metadata=column("s", "at the end of the step", "needed"))
+    position: Floats = field(metadata=column("mm", "x of the bone", "needed", "shown"))
+    indentation: Floats = field(
+        metadata=column("mm", "travel of the bone beyond first touch", "needed", "shown")
+    )
+    voltage: Floats = field(
+        metadata=column("V", "effective; of the moment where it is resolved in time", "needed", "shown")
+    )
+    applied_force: Floats = field(metadata=column("N/mm", "down, on the bone", "needed"))
     applied_tangential_force: Floats = field(metadata=column("N/mm", "forward along the slide, on the bone"))
-    normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards"))
-    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x"))
-    electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards"))
+    normal_force: Floats = field(metadata=column("N/mm", "sum of contact forces, upwards", "shown"))
+    tangential_force: Floats = field(metadata=column("N/mm", "sum of contact forces, against +x", "shown"))
+    electrostatic_force: Floats = field(metadata=column("N/mm", "attraction, downwards", "shown"))
     electrostatic_force_x: Floats = field(metadata=column("N/mm", "x component of the attraction"))
-    contact_width: Floats = field(metadata=column("mm", "from the first to the last edge of contact", "mm2"))
-    real_contact_width: Floats = field(metadata=column("mm", "sum of what touches, between edges", "mm2"))
+    contact_width: Floats = field(
+        metadata=column("mm", "from the first to the last edge of contact", "shown", whole="mm2")
+    )
+    real_contact_width: Floats = field(
+        metadata=column("mm", "sum of what touches, between edges", whole="mm2")
+    )
     min_gap: Floats = field(metadata=column("mm", "smallest gap of the deformed pad"))
     peak_contact_pressure: Floats = field(metadata=column("MPa", "largest contact pressure of a node"))
     mean_contact_pressure: Floats = field(metadata=column("MPa", "pressing forces over what touches"))
@@ -81,8 +87,8 @@ class History:
         metadata=column("N", "of the field on the pad's length, where it is resolved in time")
     )
     field_energy: Floats = field(metadata=column("N", "of the electric field, where it is resolved in time"))
-    substeps: Ints = field(metadata=column("", "parts in which the step was reached"))
-    newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts"))
+    substeps: Ints = field(metadata=column("", "parts in which the step was reached", "needed"))
+    newton_iterations: Ints = field(metadata=column("", "outer iterations of all parts", "needed"))
     relaxations: Ints = field(metadata=column("", "releases where no equilibrium is near"))
     jumps: Ints = field(metadata=column("", "releases, and snaps that iterations made by themselves"))
     seconds: Floats = field(metadata=column("s", "wall time"))
@@ -119,27 +125,32 @@ COLUMNS = tuple(spec.name for spec in fields(History))
 INTEGERS = tuple(spec.name for spec in fields(History) if spec.type == "Ints")
 #: columns to which every part of a step adds
 SUMS = tuple(name for name in COLUMNS if name.endswith(("_work", "_dissipation")))
-#: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
-UNITS: Mapping[str, str] = {spec.name: spec.metadata["unit"] for spec in fields(History)}
-WHOLE_UNITS: Mapping[str, str] = {spec.name: spec.metadata["whole"] for spec in fields(History)}
-MEANINGS: Mapping[str, str] = {spec.name: spec.metadata["meaning"] for spec in fields(History)}
-#: further columns of a finger in three dimensions -> unit and meaning
-SPATIAL: Mapping[str, tuple[str, str]] = {
-    "position_z": ("mm", "z of the bone"),
-    "applied_tangential_force_x": ("N", "along +x, on the bone"),
-    "applied_tangential_force_z": ("N", "along +z, on the bone"),
-    "tangential_force_x": ("N", "sum of contact forces, against +x"),
-    "tangential_force_z": ("N", "sum of contact forces, against +z"),
-    "contact_area": ("mm2", "of the convex hull of what touches"),
-    "real_contact_area": ("mm2", "of all that touches"),
+#: further columns of a finger in three dimensions
+SPATIAL: Mapping[str, Mapping[str, Any]] = {
+    "position_z": column("mm", "z of the bone"),
+    "applied_tangential_force_x": column("N", "along +x, on the bone"),
+    "applied_tangential_force_z": column("N", "along +z, on the bone"),
+    "tangential_force_x": column("N", "sum of contact forces, against +x"),
+    "tangential_force_z": column("N", "sum of contact forces, against +z", "shown"),
+    "contact_area": column("mm2", "of the convex hull of what touches", "shown"),
+    "real_contact_area": column("mm2", "of all that touches", "shown"),
 }
-#: columns that it leaves empty
+_ABOUT = {spec.name: spec.metadata for spec in fields(History)}
+#: column -> its unit ("" for a number or a word), that over a whole depth, and what it is
+UNITS: Mapping[str, str] = {name: about["unit"] for name, about in _ABOUT.items()}
+WHOLE_UNITS: Mapping[str, str] = {name: about["whole"] for name, about in _ABOUT.items()}
+MEANINGS: Mapping[str, str] = {name: about["meaning"] for name, about in _ABOUT.items()}
+#: columns that a finger in three dimensions leaves empty
 WIDTHS = tuple(name for name in COLUMNS if WHOLE_UNITS[name] == "mm2")
 SPATIAL_UNITS: Mapping[str, str] = {
     **WHOLE_UNITS,
     **dict.fromkeys(WIDTHS, "mm"),
-    **{name: unit for name, (unit, _) in SPATIAL.items()},
+    **{name: about["unit"] for name, about in SPATIAL.items()},
 }
+NEEDED, SHOWN = (
+    tuple(name for name, about in {**_ABOUT, **SPATIAL}.items() if trait in about["traits"])
+    for trait in ("needed", "shown")
+)
 
 
 def columns_of(names: Iterable[str]) -> tuple[str, ...]:

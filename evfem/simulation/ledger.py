@@ -12,7 +12,6 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.contact.signorini import FORWARD, OPEN
-from evfem.scene.motion import Slide
 from evfem.simulation.history import SUMS, WIDTHS
 from evfem.simulation.model import Model
 from evfem.simulation.result import Frame, Row
@@ -87,8 +86,8 @@ class Ledger:
         """Axes in the plane of the display, and the direction of the last slide's angle, +x before."""
         if self.model.mesh.dim == 2:
             return [0], np.ones(1)
-        motions = self.model.scene.motion[: motion_index + 1]
-        slides = [one.direction for one in motions if isinstance(one, Slide)]
+        courses = self.model.scene.courses[: motion_index + 1]
+        slides = [course.direction for course in courses if course.distance]
         return [0, 2], np.array(slides[-1] if slides else (1.0, 0.0))
 
     def _field_energy(self, state: State) -> float:

@@ -21,7 +21,6 @@ from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
 from evfem.planning.core import Core, core_of, electrics_of
 from evfem.planning.plan import plan_on, scene_mesh
-from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
 from evfem.scene.terms import Boundary
@@ -99,11 +98,13 @@ def make_model(scene: Scene) -> Model:
     ]
     dynamics = None
     if needed.has("time"):
-        dynamics = make_dynamics(space, laws, scene.finger.viscosity, inertia=solver.dynamics == "inertial")
+        dynamics = make_dynamics(space, laws, scene.finger.viscosity, solver.dynamics)
     body = Body(space, laws, terms, dynamics)
-    deepest = max((one.indentation or 0.0 for one in scene.motion if isinstance(one, Press)), default=0.0)
-    if mesh.dim == 3:  # a dense compliance of three unknowns a node: candidates as they are needed
-        deepest = 0.0
+    deepest = (
+        0.0  # of a solid, whose dense compliance has three unknowns a node: candidates as they are needed
+    )
+    if mesh.dim == 2:
+        deepest = max(0.0, *(course.indentation or 0.0 for course in scene.courses))
     limits = Limits(solver.tolerance, solver.strategy, solver.threads, deepest)
     interface = make_interface(scene, mesh, pad, surface)
     if core is not None and attraction is not None:

@@ -28,10 +28,12 @@ from evfem.simulation.history import (
     DRIFT,
     INTEGERS,
     NEEDED,
+    SHOWN,
     SPATIAL,
     SPATIAL_UNITS,
     UNITS,
     WHOLE_UNITS,
+    WIDTHS,
     History,
     Row,
     column_of,
@@ -44,18 +46,6 @@ from evfem.simulation.provenance import provenance as provenance
 #: key of the provenance of a total, with its depth (mm)
 WHOLE = "over_mm"
 RESULT_FORMAT = "evfem-result-1"
-#: what is shown of the last step
-SHOWN = (
-    *("position", "indentation", "voltage"),
-    *("normal_force", "tangential_force", "electrostatic_force", "contact_width"),
-)
-#: what is shown of it over a whole depth
-SHOWN_WHOLE = SHOWN[3:]
-#: and of a finger in three dimensions
-SHOWN_SPATIAL = (
-    *("position", "indentation", "voltage", "normal_force", "tangential_force", "tangential_force_z"),
-    *("electrostatic_force", "contact_area", "real_contact_area"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,15 +62,15 @@ class Frame:
     step: int
     time: float
     position: float
-    displacement: Floats
-    gap: Floats
-    contact_pressure: Floats
-    shear_traction: Floats
-    electrostatic_traction: Floats
-    contact_status: Ints
-    von_mises: Floats
-    cauchy_stress: Floats
-    J: Floats
+    displacement: Floats = field(metadata={"shape": ("N", "dim")})
+    gap: Floats = field(metadata={"shape": ("N",)})
+    contact_pressure: Floats = field(metadata={"shape": ("N",)})
+    shear_traction: Floats = field(metadata={"shape": ("N",)})
+    electrostatic_traction: Floats = field(metadata={"shape": ("N",)})
+    contact_status: Ints = field(metadata={"shape": ("N",)})
+    von_mises: Floats = field(metadata={"shape": ("E",)})
+    cauchy_stress: Floats = field(metadata={"shape": ("E", "stresses")})
+    J: Floats = field(metadata={"shape": ("E",)})
 
     def __repr__(self) -> str:
         """Which step it is, where, and its size."""
@@ -88,13 +78,11 @@ class Frame:
         return f"Frame of step {self.step} at {plus(self.position):.4g} mm, {plus(self.time):.4g} s: {size}"
 
 
-POINT_FIELDS = ("gap", "contact_pressure", "shear_traction", "electrostatic_traction", "contact_status")
-CELL_FIELDS = ("von_mises", "cauchy_stress", "J")
 _SHAPES: dict[str, tuple[str, ...]] = {
-    "displacement": ("N", "dim"),
-    **dict.fromkeys(POINT_FIELDS, ("N",)),
+    spec.name: spec.metadata["shape"] for spec in fields(Frame) if spec.metadata
 }
-_SHAPES |= {"von_mises": ("E",), "cauchy_stress": ("E", "stresses"), "J": ("E",)}
+POINT_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape == ("N",))
+CELL_FIELDS = tuple(name for name, shape in _SHAPES.items() if shape[0] == "E")
 
 
 def _component(name: str) -> Any:
@@ -105,7 +93,7 @@ def _component(name: str) -> Any:
             return result.in_space[name]
         return result[name.removesuffix("_x")] if name.endswith("_x") else np.zeros_like(result.position)
 
-    return property(found, doc=f"{SPATIAL[name][1]}; in the plane all is along x")
+    return property(found, doc=f"{SPATIAL[name]['meaning']}; in the plane all is along x")
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,11 +276,12 @@ class Result(History):
     def _last(self) -> list[tuple[str, str]]:
         if not len(self.step):
             return []
-        return [*self._ends(self._shown), *(self.total._ends(SHOWN_WHOLE) if self._shows_total else [])]
+        return [*self._ends(self._shown), *(self.total._ends(self._shown[3:]) if self._shows_total else [])]
 
     @property
     def _shown(self) -> tuple[str, ...]:
-        return SHOWN_SPATIAL if self.in_space else SHOWN
+        left_out = WIDTHS if self.in_space else SPATIAL
+        return tuple(name for name in SHOWN if name not in left_out)
 
     @property
     def _shows_total(self) -> bool:

@@ -22,7 +22,7 @@ from evfem.electrostatics.timesignals import ChargeControl, OpenCircuit
 from evfem.errors import InputError, NotConverged, StopRun, Unresolved, quoted
 from evfem.planning.way import allowed_error
 from evfem.protocols import Observer, TimeSignal
-from evfem.scene.motion import Hover, Motion, Press, Slide, VoltageRamp, Wait, follows_gap
+from evfem.scene.motion import Course
 from evfem.scene.scene import Scene
 from evfem.simulation.barrier import rise
 from evfem.simulation.checkpoint import (
@@ -57,6 +57,8 @@ from evfem.solver.state import State, StepFailed
 from evfem.solver.stepping import Path, Stepper
 from evfem.tissue.kernels.blocks import loops
 
+#: what is known where a motion starts
+START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
 #: coulombs per metre of depth in a nanocoulomb per millimetre
 NANO = 1e-6
 
@@ -193,19 +195,21 @@ class Run:
     def requests(self) -> Iterator[Request]:
         """The steps still to do; paths start from the state at the time they are asked for."""
         done, step = len(self.rows), 0
+        before = Course()
         for index, motion in enumerate(self.scene.motion):
-            first = step
+            course, last, first = motion.course, before, step
+            before = course
             step += motion.steps
             if step <= done:
                 continue
             start = self._start_of(first)
-            let_go = index and follows_gap(self.scene.motion[index - 1]) and not follows_gap(motion)
+            let_go = last.gap is not None and course.gap is None
             if let_go and done <= first and (said := unheld(self.model, self.state, self.rows)):
                 notices.warn(f"motion {index}: {said}")
             for k in range(max(done - first, 0) + 1, motion.steps + 1):
-                seconds, now = _duration(motion, start), self.time
-                begin = self._target(motion, start, (k - 1) / motion.steps, now)
-                end = self._target(motion, start, k / motion.steps, now + seconds)
+                seconds, now = course.seconds(motion.steps, start["indentation"]), self.time
+                begin = self._target(course, start, (k - 1) / motion.steps, now)
+                end = self._target(course, start, k / motion.steps, now + seconds)
                 if first + k == 1 and not self._follows(seconds):
                     # the voltage acts in full; only a first step that must be cut raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
@@ -218,19 +222,11 @@ class Run:
         """Bone position, indentation, force and voltage at which a motion starts, and whether the finger
         is loose: touches nothing and is not attracted.
         """
+        start = dict.fromkeys(START, 0.0)
         if rows_before == 0:
-            return {
-                "position": 0.0,
-                "position_z": 0.0,
-                "indentation": 0.0,
-                "applied_force": 0.0,
-                "voltage": self.voltage_at(0.0, 0.0),
-                "min_gap": 0.0,
-                "loose": 0.0,
-            }
-        row = {"position_z": 0.0, "min_gap": 0.0} | self.rows[rows_before - 1]
-        names = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap")
-        start = {name: row[name] for name in names}
+            return start | {"voltage": self.voltage_at(0.0, 0.0)}
+        row = self.rows[rows_before - 1]
+        start |= {name: row[name] for name in START if name in row}
         least = self.model.equilibrium.tolerance * SMALLEST_FORCE
         start["loose"] = float(row["normal_force"] <= least and row["electrostatic_force"] == 0.0)
         return start if self.scene.hand is None else start | {"position": self._driven(rows_before)}
@@ -240,55 +236,45 @@ class Run:
         x, done = 0.0, 0
         for motion in self.scene.motion:
             done += motion.steps
-            if done <= rows_before and isinstance(motion, Slide):
-                x = x + motion.distance
+            if done <= rows_before:
+                x = x + motion.course.travel[0]
         return x
 
-    def _target(self, motion: Motion, start: dict[str, float], fraction: float, time: float) -> Target:
+    def _target(self, course: Course, start: dict[str, float], fraction: float, time: float) -> Target:
         """The target at `fraction` (0 to 1) of a motion, to be reached at `time` (s)."""
 
-        def towards(name: str, end: float) -> float:
-            return end if fraction == 1.0 else start[name] + fraction * (end - start[name])
+        def towards(name: str, end: float | None) -> float:
+            begin = start[name]
+            return begin if end is None else end if fraction == 1.0 else begin + fraction * (end - begin)
 
-        position, position_z = start["position"], start["position_z"]
-        indentation, force = start["indentation"], None
-        voltage = start["voltage"]
-        if isinstance(motion, Press) and motion.force is not None:
-            force = towards("applied_force", motion.force)
-        elif isinstance(motion, Press) and motion.indentation is not None:
-            indentation = towards("indentation", motion.indentation)
-        elif isinstance(motion, Hover):
-            indentation = towards("indentation", -motion.gap)
-        elif isinstance(motion, Slide):
-            x, z = motion.way
-            position = towards("position", start["position"] + x)
-            position_z = towards("position_z", start["position_z"] + z)
-        elif isinstance(motion, VoltageRamp) and motion.voltage is not None:
-            voltage = towards("voltage", motion.voltage)
+        position = towards("position", start["position"] + course.travel[0])
+        position_z = towards("position_z", start["position_z"] + course.travel[1])
+        voltage = towards("voltage", course.voltage)
         if isinstance(self.voltage, (VoltageProfile, TimeSignal)):
             voltage = self.voltage_at(position, time)
-        if isinstance(motion, Slide | VoltageRamp | Wait) and motion.hold == "force":
-            force = start["applied_force"]
-        bone = self.model.bone(position, indentation, position_z)
-        height: HeightControl = Indentation(float(bone[1])) if force is None else Force(force)
-        if force is not None and self._resting(motion, start, voltage, time):
-            height = Loose(float(bone[1]))
+        bone = self.model.bone(position, towards("indentation", course.indentation), position_z)
+        height: HeightControl = Indentation(float(bone[1]))
+        if course.force is not None:
+            height = Force(towards("applied_force", course.force))
+        elif course.hold == "force":
+            loose = self._loose(course, start, voltage, time)
+            height = Loose(float(bone[1])) if loose else Force(start["applied_force"])
         drive: VoltageControl = GivenVoltage(voltage)
-        if isinstance(motion, VoltageRamp) and motion.gap is not None:
-            drive = GivenGap(towards("min_gap", motion.gap))
-        if isinstance(self.voltage, FollowForce) and isinstance(motion, Slide):
+        if course.gap is not None:
+            drive = GivenGap(towards("min_gap", course.gap))
+        if isinstance(self.voltage, FollowForce) and course.distance:
             drive = self._following(self.voltage, position)
         along = position_z if bone.size == 3 else None
         return Target(position, height, drive, z=along, hand=self._grip)
 
-    def _resting(self, motion: Motion, start: dict[str, float], voltage: float, time: float) -> bool:
+    def _loose(self, course: Course, start: dict[str, float], voltage: float, time: float) -> bool:
         """Whether a force is held that the finger has at any height: it is loose, and nothing is to
         attract it at `time` (s).
         """
-        if isinstance(motion, Press) or isinstance(self.voltage, FollowForce) or follows_gap(motion):
+        if isinstance(self.voltage, FollowForce) or course.gap is not None:
             return False
         if isinstance(self.voltage, ChargeControl):
-            return bool(start["loose"]) and self.voltage.charge_at(time) == 0.0
+            voltage = self.voltage.charge_at(time)
         return bool(start["loose"]) and voltage == 0.0
 
     @property
@@ -411,23 +397,6 @@ class Run:
         self.stepper.substep, self.time = float(arrays["substep"]), float(arrays["time"])
         self.ledger, self.sunk = ledger_of(self.model, arrays), arrays["sunk"]
         self.rows = list(saved.rows)
-
-
-def _duration(motion: Motion, start: dict[str, float]) -> float:
-    """Seconds that one step of a motion takes: 0 without a speed or duration."""
-    if isinstance(motion, Wait):
-        return motion.duration / motion.steps
-    speed = getattr(motion, "speed", None)
-    if speed is None:
-        return 0.0
-    if isinstance(motion, Slide):
-        return abs(motion.distance) / motion.steps / speed
-    end = (
-        motion.indentation
-        if isinstance(motion, Press) and motion.indentation is not None
-        else start["indentation"]
-    )
-    return abs(end - start["indentation"]) / motion.steps / speed
 
 
 def _check_observers(observers: Sequence[Observer]) -> None:

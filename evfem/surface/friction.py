@@ -32,7 +32,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from evfem.common.arrays import Floats
-from evfem.common.checks import Checked, Values, Within, number, plain
+from evfem.common.checks import Named, Values, Within, number, plain
 from evfem.protocols import FrictionLaw
 from evfem.tensor import derivative
 
@@ -52,15 +52,18 @@ _EXPONENT = number("an exponent from -2 to 2", Within(-2.0, 2.0))
 _TIME = number("a time in s, larger than 0", Within(0.0, 1e6, above=True), "s")
 
 
+class NamedFriction(Named):
+    """A law with a name in scene files."""
+
+
 @dataclass(frozen=True)
-class Coulomb:
+class Coulomb(NamedFriction, kind="coulomb"):
     """Coulomb's law, which a scene has without any.
 
     >>> Coulomb().bound(0.01, 0.3, 5.0, 0.0)
     0.003
     """
 
-    kind = "coulomb"
     timed = False
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
@@ -69,7 +72,7 @@ class Coulomb:
 
 
 @dataclass(frozen=True)
-class LoadIndexFriction(Checked):
+class LoadIndexFriction(NamedFriction, kind="load_index"):
     """The force grows with a power of the load; the coefficient is that of the surface at one pressure.
 
     >>> law = LoadIndexFriction(pressure=0.01, index=0.7)
@@ -82,7 +85,6 @@ class LoadIndexFriction(Checked):
     lowest: Annotated[
         float | None, _PRESSURE, "below it the coefficient stays; without it a hundredth of the pressure"
     ] = None
-    kind = "load_index"
     timed = False
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
@@ -92,7 +94,7 @@ class LoadIndexFriction(Checked):
 
 
 @dataclass(frozen=True)
-class AdhesiveFriction(Checked):
+class AdhesiveFriction(NamedFriction, kind="adhesive"):
     """Every place in real contact resists with a shear strength besides mu p; contact grows in proportion to
     the pressure until it is complete.
 
@@ -108,7 +110,6 @@ class AdhesiveFriction(Checked):
         _PRESSURE,
         "contact pressure at which real contact is complete; without it the strength",
     ] = None
-    kind = "adhesive"
     timed = False
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
@@ -118,7 +119,7 @@ class AdhesiveFriction(Checked):
 
 
 @dataclass(frozen=True)
-class RateFriction(Checked):
+class RateFriction(NamedFriction, kind="rate"):
     """Friction of sliding: it falls from mu to `ratio` mu around `speed`, and goes with a power of the speed.
 
     >>> stribeck = RateFriction(speed=5.0, ratio=0.5)
@@ -135,7 +136,6 @@ class RateFriction(Checked):
     slowest: Annotated[
         float | None, _SPEED, "below it that power stays; without it a hundredth of the speed"
     ] = None
-    kind = "rate"
     timed = True
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
@@ -147,7 +147,7 @@ class RateFriction(Checked):
 
 
 @dataclass(frozen=True)
-class AgeingFriction(Checked):
+class AgeingFriction(NamedFriction, kind="ageing"):
     """A place that has just touched resists with a share of mu p; the rest comes with its real area of
     contact, of first order with the time, sliding or not.
 
@@ -158,7 +158,6 @@ class AgeingFriction(Checked):
 
     fresh: Annotated[float, _SHARE, "share of the friction that a place has when it touches"]
     time: Annotated[float, _TIME, "time constant of the rest"] = 6.7
-    kind = "ageing"
     timed = True
 
     def bound(self, pressure: Values, mu: Values, speed: Values, age: Values) -> Values:
@@ -166,9 +165,7 @@ class AgeingFriction(Checked):
         return plain(mu * pressure * (1.0 - (1.0 - self.fresh) * np.exp(-np.asarray(age) / self.time)))
 
 
-KINDS = {
-    cls.kind: cls for cls in (Coulomb, LoadIndexFriction, AdhesiveFriction, RateFriction, AgeingFriction)
-}
+KINDS = NamedFriction.kinds
 
 
 def with_core(pressure: Floats, withheld: Values, left: Values) -> Floats:

@@ -18,7 +18,7 @@ from evfem.simulation.history import SPATIAL, SPATIAL_UNITS, UNITS, WHOLE_UNITS
 Units = Mapping[str, str]
 #: what a plane finger with a depth has of the columns in three dimensions
 AREAS = ("contact_area", "real_contact_area")
-OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name][0] for name in AREAS}}
+OVER_DEPTH: Units = {**WHOLE_UNITS, **{name: SPATIAL[name]["unit"] for name in AREAS}}
 
 
 def units_of(scene: Scene) -> Units:

@@ -31,11 +31,22 @@ from evfem.tissue.laws import split
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space
 
+#: `dynamics` of a scene -> its terms
+DYNAMICS: dict[str, Any] = {"quasistatic": None}
+
 
 class Dynamics:
     """Viscous and inertial forces of a body; `begin` sets the step, then it acts like any other
     term of the internal forces.
+
+    A class with a `name` is one of `DYNAMICS`. `inertia`: whether tissue has mass. At the end of a step the
+    velocity is v_0 + `slope` ((u - u_0)/dt - v_0).
     """
+
+    inertia, slope, scheme = False, 1.0, "backward Euler"
+
+    def __init_subclass__(cls, name: str) -> None:
+        DYNAMICS[name] = cls
 
     def __init__(self, space: Space, viscosity: Floats | None, density: Floats | None) -> None:
         """`viscosity` (E,) eta in MPa s per cell, `density` (E,) in t/mm3 per cell; None leaves
@@ -87,7 +98,7 @@ class Dynamics:
         elif self.viscosity is not None:
             total += self._damping.forces(u)
         if self._inertia is not None:
-            total += self._inertia @ ((u - self._u0) / self.step**2 - self._v0 / self.step)
+            total += self._inertia @ (self.slope * ((u - self._u0) / self.step**2 - self._v0 / self.step))
         return total
 
     def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
@@ -99,11 +110,13 @@ class Dynamics:
         elif self.viscosity is not None:
             self._damping.add_tangent(u, pattern, data)
         if self.mass is not None:
-            data += self.mass.data(pattern) / self.step**2
+            data += self.slope * self.mass.data(pattern) / self.step**2
 
     def velocity(self, u: Floats) -> Floats:
         """Nodal velocities (N, dim) in mm/s at the end of the step; zero when no time passes."""
-        return (u - self._u0) / self.step if self.step > 0.0 else np.zeros_like(u)
+        if self.step == 0.0:
+            return np.zeros_like(u)
+        return self.slope * (u - self._u0) / self.step + (1.0 - self.slope) * self._v0
 
     def dissipation(self, u: Floats) -> float:
         """What the viscous stress dissipates in the step: N mm, in the plane per mm of depth."""
@@ -142,6 +155,15 @@ class Dynamics:
         return self.space.cells, np.ascontiguousarray(u), rate, self._strain0
 
 
+DYNAMICS["viscous"] = Dynamics
+
+
+class Inertial(Dynamics, name="inertial"):
+    """Of tissue with mass."""
+
+    inertia = True
+
+
 def assembled(space: Space, matrices: Floats) -> Any:
     """Sparse matrix (N, N) of cell matrices (E, n, n)."""
     import scipy.sparse as sparse
@@ -160,18 +182,19 @@ def mass_matrices(space: Space) -> Floats:
     return np.ascontiguousarray(form.cell_tangents(np.zeros((space.size, dim)))[:, ::dim, ::dim])
 
 
-def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, inertia: bool) -> Dynamics | None:
-    """The time-dependent terms that the laws ask for, or None if there are none; `viscosity` is
-    the laws' default relaxation time (s).
+def make_dynamics(space: Space, laws: Mapping[str, Any], viscosity: float, name: str) -> Dynamics | None:
+    """The time-dependent terms of `DYNAMICS` that the laws ask for, or None if there are none; `viscosity`
+    is the laws' default relaxation time (s).
     """
     eta, density = np.zeros(len(space.nodes)), np.zeros(len(space.nodes))
-    for name, law in laws.items():
-        cells = space.mesh.cells_of(name)
+    for region, law in laws.items():
+        cells = space.mesh.cells_of(region)
         own = getattr(law, "viscosity", None)
         tau = viscosity if own is None else own
         if tau:
             eta[cells] = tau * split(law, space.dim).shear_modulus
         density[cells] = getattr(law, "density", 1e-9)
-    if not eta.any() and not inertia:
+    kind: type[Dynamics] | None = DYNAMICS[name]
+    if kind is None or not (eta.any() or kind.inertia):
         return None
-    return Dynamics(space, eta if eta.any() else None, density if inertia else None)
+    return kind(space, eta if eta.any() else None, density if kind.inertia else None)

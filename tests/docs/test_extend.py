@@ -1,7 +1,7 @@
 """The recipes that change files of the package are put into a copy of it, which then runs.
 
-A mark says where a block goes: `into FILE, FILE before WORDS` or `instead of WORDS`, the words being
-once in each file, at the beginning of a line, however they are spaced there.
+A mark says where a block goes: `into FILE before WORDS` or `instead of WORDS`, the words being once in
+the file, at the beginning of a line, however they are spaced there.
 """
 
 import re
@@ -12,14 +12,13 @@ from pathlib import Path
 from textwrap import indent
 
 import pytest
-from docs.test_pages import blocks
+from docs.test_pages import DOCS, blocks
 
 import evfem
 
-PLACE = re.compile(r"not run: into (?P<files>.+?) (?P<how>before|instead of) (?P<words>.+)")
-RECIPES = [
-    (found, text) for _, text, mark, _ in blocks("howto/extend.md") if (found := PLACE.match(mark or ""))
-]
+PLACE = re.compile(r"not run: into (?P<file>\S+) (?P<how>before|instead of) (?P<words>.+)")
+PAGE = "howto/extend.md"
+RECIPES = [(found, text, line) for _, text, mark, line in blocks(PAGE) if (found := PLACE.match(mark or ""))]
 
 LAYER = """
 moduli = {"fascia": ev.NeoHookean(E=0.3, nu=0.4)}
@@ -79,6 +78,51 @@ assert abs(scene.drive.peak(100.0) - 100.0 * 3**0.5) < 1e-9
 assert ev.simulate(scene).electrostatic_force[-1] > 0.0
 """
 
+OTHERS = """
+import numpy as np
+import evfem.plotting as plotting
+pad = ev.FingerPad(ridges=False, resolution="coarse")
+result = ev.simulate(ev.Scene(pad, ev.Flat(), motion=ev.Press(indentation=0.1, steps=2)))
+ax = plotting.phase(result, "indentation", "normal_force")
+assert (ax.get_xlabel(), ax.lines[0].get_ydata()[-1]) == ("indentation (mm)", result.normal_force[-1])
+
+tip = ev.Fingertip(ridges="slanted", resolution="coarse")
+assert tip._shape.relief.depth(np.array([0.25]), np.array([-0.25]))[0] == 0.0  # along a crest
+assert ev.Drive(frequency=100.0, skin="moist").skin_layer(0.1, 1.0).eps_r.poles[0][0] == 1100.0
+
+x, y = np.meshgrid(np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 1.0, 3))
+i = (np.arange(2)[:, None] * 5 + np.arange(4)).ravel()
+quads, region = np.stack([i, i + 1, i + 6, i + 5], axis=1), np.zeros(8, dtype=np.int64)
+sets = {"pad": np.arange(5), "bone": np.arange(10, 15)}
+block = ev.Mesh(np.column_stack([x.ravel(), y.ravel()]), quads, "quad", region, {"block": 0}, sets)
+
+from evfem.tissue.dynamics import DYNAMICS
+from evfem.tissue.space import make_space
+term = DYNAMICS["trapezoidal"](make_space(block, "q1"), None, np.full(8, 1e-9))
+u = v = np.zeros((15, 2))
+for _ in range(5):  # 2 mm2 fall as a parabola
+    term.begin(u, v, 0.01)
+    none, one = (term.forces(u + far)[:, 1].sum() for far in (0.0, 1.0))
+    u = u + (2e-9 * 9.81e3 - none) / (one - none)
+    v = term.velocity(u)
+np.testing.assert_allclose(u, 0.5 * 9.81e3 * 0.05**2)
+solver = ev.Solver(dynamics="trapezoidal")
+timed = ev.Scene(pad, ev.Flat(), motion=ev.Wait(duration=1e-3, steps=2), solver=solver)
+timed = ev.scenefile.loads(ev.scenefile.dump(timed))
+assert "trapezoidal displacements" in " ".join(term.reason for term in ev.plan(timed).terms)
+assert ev.simulate(timed).time[-1] == 1e-3
+
+finger = ev.MeshedFinger(block, {"block": ev.NeoHookean(E=0.1, nu=0.4)})
+scene = ev.Scene(finger, ev.Flat(friction=0.3), motion=[ev.Press(indentation=0.1), ev.Slide(0.2, steps=4)])
+dense = ev.simulate(scene)
+assert dense.provenance["solver"]["backend"] == "Dense", dense.provenance["solver"]["backend"]
+from evfem.solver import linearisation
+linearisation.make_condensation = evfem.solver.condensation.SuperLU
+usual = ev.simulate(scene)
+assert usual.provenance["solver"]["backend"] == "SuperLU"
+np.testing.assert_allclose(dense.tangential_force, usual.tangential_force, rtol=1e-9, atol=1e-15)
+"""
+
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
@@ -86,10 +130,8 @@ def copy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("copy")
     package = Path(evfem.__file__).parent
     shutil.copytree(package, folder / "evfem", ignore=shutil.ignore_patterns("__pycache__"))
-    for found, text in RECIPES:
-        first, *others = found["files"].split(", ")
-        for file in (folder / first, *((folder / first).with_name(other) for other in others)):
-            put_in(file, found["how"], found["words"], text)
+    for found, text, _ in RECIPES:
+        put_in(folder / found["file"], found["how"], found["words"], text)
     return folder
 
 
@@ -102,13 +144,34 @@ def put_in(file, how, words, text):
 
 
 def test_every_block_that_does_not_run_on_the_page_has_its_place():
-    marks = [mark for kind, _, mark, _ in blocks("howto/extend.md") if kind == "python" and mark]
+    marks = [mark for kind, _, mark, _ in blocks(PAGE) if kind == "python" and mark]
     assert len(marks) == len(RECIPES) > 6
 
 
-@pytest.mark.parametrize("use", [LAYER, COLUMN, WAVEFORM], ids=["layer", "column", "waveform"])
+def test_the_table_says_how_many_files_each_change_touches():
+    """Three at most: a fourth is a fact that stands at two places."""
+    page = (DOCS / PAGE).read_text(encoding="utf-8").splitlines()
+    headings = [(line, text[3:]) for line, text in enumerate(page) if text.startswith("## ")]
+    touched = {text.lower().replace(" ", "-"): set() for _, text in headings}
+    for found, _, line in RECIPES:
+        heading = [text for at, text in headings if at < line][-1]
+        touched[heading.lower().replace(" ", "-")] |= {found["file"]}
+    told = {
+        row[1]: int(row[2])
+        for row in re.finditer(r"^\| \[.*?\]\(#(.*?)\) \| (\d+) \|$", "\n".join(page), re.M)
+    }
+    assert told == {place: len(touched[place]) for place in told}
+    assert {place for place, named in touched.items() if named} <= set(told)
+    assert max(told.values()) <= 3
+
+
+@pytest.mark.parametrize(
+    "use", [LAYER, COLUMN, WAVEFORM, OTHERS], ids=["layer", "column", "waveform", "others"]
+)
 def test_the_recipes_work_together_in_a_copy(copy, use):
     path = [str(copy), *sys.path]
-    head = f"import sys\nsys.path[:] = {path!r}\nimport evfem as ev\nassert {path[0]!r} in ev.__file__\n"
+    head = (
+        f"import sys\nsys.path[:] = {path!r}\nimport evfem, evfem as ev\nassert {path[0]!r} in ev.__file__\n"
+    )
     done = subprocess.run([sys.executable, "-c", head + use], capture_output=True, text=True, cwd=copy)
     assert done.returncode == 0, done.stderr[-2000:]

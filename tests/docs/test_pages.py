@@ -14,6 +14,7 @@ import runpy
 import shlex
 import subprocess
 import sys
+from contextlib import ExitStack
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -25,7 +26,9 @@ import evfem
 from evfem import cli, studies
 from evfem.electrostatics.laws import FORCE_LAWS
 from evfem.scene import file as scenefile
+from evfem.scene.motion import Motion
 from evfem.simulation.result import COLUMNS
+from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
 from evfem.textures.importing import IMPORTERS
 from evfem.tissue import elements, space
@@ -97,7 +100,10 @@ def test_page_runs(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(space, "ELEMENTS", table := dict(space.ELEMENTS))  # a page adds one
     monkeypatch.setattr(elements, "ELEMENTS", table)
-    with patch.dict(FORCE_LAWS), patch.dict(IMPORTERS):  # and another a law and an importer
+    families = FORCE_LAWS, IMPORTERS, Motion.kinds, NamedFriction.kinds
+    with ExitStack() as kept:  # what a page adds to a family goes with it
+        for family in families:
+            kept.enter_context(patch.dict(family))
         run(page, {None}, capsys)
 
 

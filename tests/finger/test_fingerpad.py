@@ -12,7 +12,6 @@ import evfem as ev
 from evfem import data
 from evfem.common.checks import Within, keys_of
 from evfem.errors import InputError, readable
-from evfem.finger import fingerpad
 from evfem.finger.fingerpad import RESOLUTIONS, Electrical, FingerPad, MeshedFinger
 from evfem.finger.fingertip import Fingertip
 from evfem.finger.layers import LAYERS, NAIL, TABLE_2, Moduli, Thickness, TissueLayer
@@ -228,15 +227,16 @@ def test_table_2_is_that_of_the_paper():
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("place", [1, 2, 3])
 @pytest.mark.parametrize("resolution", RESOLUTIONS)
-def test_a_layer_more_is_a_row_and_its_thickness(resolution, place, order, monkeypatch):
+def test_a_layer_more_is_a_row_and_its_thickness(resolution, place, order):
     rows = dict.fromkeys(RESOLUTIONS, 2)
     fascia = TissueLayer("fascia", 5, Moduli(0.5, 0.4), Thickness(0.3, 0.1, 0.6), rows)
     layers = (*LAYERS[:place], fascia, *LAYERS[place:])
-    monkeypatch.setattr(fingerpad, "LAYERS", layers)
 
     @dataclass(frozen=True)
     class Layered(FingerPad):
         fascia_thickness: float = 0.3
+
+    Layered.layers = layers
 
     pad = Layered(resolution=resolution)
     mesh = check(pad.mesh(order))

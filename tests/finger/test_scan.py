@@ -86,7 +86,7 @@ def test_a_scene_with_a_scan_is_written_and_read_back(relief, tmp_path):
     again = scenefile.loads(scenefile.dump(scene), tmp_path / "elsewhere")
     assert again.digest() == scene.digest()
     assert repr(scene.finger).startswith(
-        "FingerPad(ridge_scan=RidgeScan(2641 points, x -6.6 to 6.6 mm, height 0.6"
+        "FingerPad(resolution='coarse', ridge_scan=RidgeScan(2641 points, x -6.6 to 6.6 mm, height 0.6"
     )
     touching = ev.simulate(scene)
     # crests touch, grooves do not

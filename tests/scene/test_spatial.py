@@ -18,7 +18,7 @@ PRESS = ev.Press(indentation=0.1)
 
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, 135.0, 180.0, -90.0, -45.0, 270.0, 360.0])
 def test_a_slide_goes_at_its_angle_from_x_towards_z(angle):
-    x, z = ev.Slide(2.0, angle=angle).way
+    x, z = ev.Slide(2.0, angle=angle).course.travel
     assert_allclose([x, z], [2.0 * np.cos(np.radians(angle)), 2.0 * np.sin(np.radians(angle))], atol=1e-15)
     if angle % 90.0 == 0.0:
         assert {abs(x), abs(z)} == {0.0, 2.0}

@@ -56,6 +56,14 @@ def test_a_hand_lags_behind_by_its_stretch():
     assert balance(result) < 1e-6
 
 
+def test_a_hand_that_went_backwards_goes_on_from_there():
+    there, back = ev.Slide(0.1, steps=1, angle=180.0), ev.Slide(0.1, steps=1)
+    result = simulate(dome_scene(PRESS, there, back, hand=ev.Hand(0.1)))
+    assert_allclose(
+        0.1 * ([0.0, 0.0, -0.1, 0.0] - result.position), result.applied_tangential_force_x, atol=1e-9
+    )
+
+
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_a_resolved_drive_has_the_mean_of_its_cycle_and_closed_books():
     """A leaking gap under a square wave of 250 Hz, settled, beside the closed form of its mean."""

@@ -172,7 +172,7 @@ def test_free_fall():
     """
     space = rectangle("q1_fbar", (2, 2), jitter=0.2)
     law, gravity, dt = NeoHookean(E=0.05, nu=0.48), -9810.0, 1e-3
-    term = make_dynamics(space, {"lower": law}, viscosity=1e-3, inertia=True)
+    term = make_dynamics(space, {"lower": law}, 1e-3, "inertial")
     body = Sum(Tissue(space, {"lower": law}), term)
     weight = np.zeros((space.size, 2))
     np.add.at(weight[:, 1], space.nodes, gravity * law.density * mass_matrices(space).sum(axis=2))
@@ -193,7 +193,7 @@ def shear_oscillation(steps, viscosity=0.0):
     frequency = 0.5 * np.pi / height * np.sqrt(law.mu / law.density)
     space = rectangle("q2", (1, 6), size=(0.5, height))
     X, sets = space.mesh.points, space.mesh.node_sets
-    term = make_dynamics(space, {"lower": law}, viscosity, inertia=True)
+    term = make_dynamics(space, {"lower": law}, viscosity, "inertial")
     body = Sum(Tissue(space, {"lower": law}), term)
     free = np.zeros(X.shape, dtype=bool)
     free[:, 0] = True
@@ -232,7 +232,7 @@ def test_creep_takes_the_relaxation_time():
         (NeoHookean(E=0.26, nu=0.3), 2.0, 2.0),
         (NeoHookean(E=0.26, nu=0.3, viscosity=0.5), 2.0, 0.5),
     ):
-        term = make_dynamics(space, {"lower": law}, default, inertia=False)
+        term = make_dynamics(space, {"lower": law}, default, "viscous")
         body = Sum(Tissue(space, {"lower": law}), term)
         free = np.zeros(X.shape, dtype=bool)
         free[sets["top"], 0] = True
@@ -258,16 +258,16 @@ def test_only_what_is_asked_for():
         "lower": NeoHookean(E=0.26, nu=0.3, viscosity=0.0, density=2e-9),
         "upper": NeoHookean(E=2.6, nu=0.3),
     }
-    assert make_dynamics(space, laws, 0.0, inertia=False) is None
-    viscous = make_dynamics(space, laws, 0.5, inertia=False)
+    assert make_dynamics(space, laws, 0.0, "viscous") is None
+    viscous = make_dynamics(space, laws, 0.5, "viscous")
     np.testing.assert_allclose(viscous.viscosity, [0.0, 0.0, 0.5, 0.5])  # tau times mu = 1 MPa
     assert viscous.mass is None
-    inertial = make_dynamics(space, laws, 0.0, inertia=True)
+    inertial = make_dynamics(space, laws, 0.0, "inertial")
     assert inertial.viscosity is None
     np.testing.assert_allclose(
         inertial.mass.matrices.sum(axis=(1, 2)), 0.25 * np.array([2e-9, 2e-9, 1e-9, 1e-9])
     )
-    both = make_dynamics(space, laws, 0.5, inertia=True)
+    both = make_dynamics(space, laws, 0.5, "inertial")
     u = wavy(space.mesh.points)
     both.begin(0 * u, 0 * u, 0.0)
     K = tangent_of(space, u, both)
@@ -284,7 +284,7 @@ def test_body_adds_tissue_forms_and_time():
     spring = make_term(
         space, form(lambda u, v, w: (1.0 + w.x[0]) * (u[0] * v[0] + u[1] ** 3 * v[1])), "lower", False
     )
-    term = make_dynamics(space, {"lower": law}, 1e-2, inertia=True)
+    term = make_dynamics(space, {"lower": law}, 1e-2, "inertial")
     body = Body(space, {"lower": law}, [spring], term)
     reduced = 0.05 * np.sin(1.0 + np.arange(body.size))
     start = body.expand(0.03 * np.cos(np.arange(body.size)))
