@@ -1,9 +1,9 @@
 r"""Sweeps over the nodes of a contact problem in three dimensions: block Gauss-Seidel.
 
 Every node in turn takes the forces that its own laws ask for while all others stay: a contact force
-projected with the node's own compliance (`evfem.contact.coulomb`), or a gap with what its attraction
+projected with the node's own compliance (`evfem.contact.signorini`), or a gap with what its attraction
 is there. Sweeps alone converge in 500 to 1,500 rounds; a few lead Newton's method to its start
-(`evfem.contact.disc`). Where the attraction makes a node's own compliance negative, pressing it
+(`evfem.contact.solve`). Where the attraction makes a node's own compliance negative, pressing it
 opens no gap, and sweeps cannot begin; where it makes the compliance indefinite, they diverge.
 
 Source: M. Jean, Comput. Methods Appl. Mech. Eng. 177 (1999) 235,
@@ -18,11 +18,10 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import DIVERGED, STABLE
-from evfem.contact.coulomb import DiscProblem, Forces
-from evfem.contact.signorini import ContactNotSolved
+from evfem.contact.signorini import ContactNotSolved, ContactProblem, Forces
 
 
-def sweeps(problem: DiscProblem, forces: Forces, count: int) -> Forces:
+def sweeps(problem: ContactProblem, forces: Forces, count: int) -> Forces:
     """Forces after so many sweeps of block Gauss-Seidel; the extra unknowns stay.
 
     Raises `ContactNotSolved` where a node's own compliance is not positive, and when forces diverge.
@@ -67,7 +66,7 @@ class _Node:
     gain: float
 
     @classmethod
-    def of(cls, problem: DiscProblem, i: int, start: Floats) -> _Node:
+    def of(cls, problem: ContactProblem, i: int, start: Floats) -> _Node:
         place, known = slice(3 * i, 3 * i + 3), problem.attraction
         rows = problem.compliance[place]
         own = rows[:, place]
