@@ -85,16 +85,6 @@ class ExtraUnknowns:
         some = self.conditioned
         return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
-    def lacking(self, forces: Forces, scale: float) -> float:
-        """The most that the equations lack, a condition of its own as a share of its terms times the
-        `scale`.
-        """
-        terms = np.hstack([self.rows * forces.all, self.pivot * forces.extra])
-        lacking, own = self.right - terms.sum(axis=1), self.conditioned
-        size = np.abs(terms[own]).sum(axis=1) + np.abs(self.right[own])
-        lacking[own] *= scale / np.maximum(size, 1e-300)
-        return float(np.abs(lacking).max(initial=0.0))
-
 
 @dataclass(frozen=True, eq=False)
 class Forces:
@@ -103,16 +93,6 @@ class Forces:
     contact: Floats
     drop: Floats
     extra: Floats
-
-    @property
-    def all(self) -> Floats:
-        """What the body feels (m,)."""
-        return self.contact + self.drop
-
-    def towards(self, other: Forces, fraction: float) -> Forces:
-        """This fraction of the way of the forces to others, with the extra unknowns of those."""
-        contact = self.contact + fraction * (other.contact - self.contact)
-        return Forces(contact, self.drop + fraction * (other.drop - self.drop), other.extra)
 
 
 @dataclass(frozen=True)
@@ -156,11 +136,6 @@ class ContactProblem:
         except np.linalg.LinAlgError:
             return True
 
-    @cached_property
-    def yields(self) -> bool:
-        """Whether every node gives way to forces of its own, in their direction."""
-        return bool((np.diagonal(self.compliance) > 0.0).all())
-
     @property
     def resists(self) -> Any:
         """Which nodes have friction (k,) bool."""
@@ -187,7 +162,7 @@ class ContactProblem:
 
     def state(self, forces: Forces) -> Floats:
         """Gaps and slips (m,) under these forces."""
-        v = self.start + self.compliance @ forces.all
+        v = self.start + self.compliance @ (forces.contact + forces.drop)
         if self.give is not None:
             v = v + self.give * forces.contact
         return v if self.extra_unknowns is None else v + self.extra_unknowns.columns @ forces.extra
@@ -216,38 +191,35 @@ class ContactSolution:
 
 @dataclass(frozen=True, eq=False)
 class Projected:
-    """What the laws make of forces, gaps and slips: p and z of every node, (k,) and (k, d), its
-    status (k,), and by how much a force misses them, relative to the largest one.
+    """What the laws make of forces, gaps and slips: p and z of every node, (k,) and (k, d), its status (k,),
+    and by how much its forces miss the laws (k,), relative to the largest force.
     """
 
     p: Floats
     z: Floats
     status: Ints
-    miss: float
+    miss: Floats
+
+    @classmethod
+    def of(cls, problem: ContactProblem, forces: Forces) -> Projected:
+        """Of these forces."""
+        state, (normal_own, shear_own) = problem.state(forces), problem.own
+        force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        p = force[:, 0] - v[:, 0] / normal_own
+        z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
+        limit, size = np.where(p > 0.0, problem.limit(p), 0.0), sizes(z)
+        slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
+        status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
+        part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
+        wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
+        held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
+        scale = max(1e-300, *(np.abs(one).max(initial=0.0) for one in (wanted, force, drop, held)))
+        return cls(p, z, status, np.abs(wanted - force).max(axis=1) / scale)
 
 
-def projected(problem: ContactProblem, forces: Forces) -> Projected:
-    """Forces in three dimensions against the laws of Signorini and Coulomb."""
-    state, (normal_own, shear_own) = problem.state(forces), problem.own
-    force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
-    p = force[:, 0] - v[:, 0] / normal_own
-    z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
-    limit, size = np.where(p > 0.0, problem.limit(p), 0.0), np.hypot(*z.T)
-    status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, SLIP))
-    part = limit / np.maximum(size, np.maximum(limit, 1e-300))
-    shear = z * np.where(status == STICK, 1.0, part)[:, None]
-    shear[status == OPEN] = 0.0
-    wanted = np.column_stack([np.maximum(p, 0.0), shear])
-    fallen = -drop[:, 0]
-    if (known := problem.attraction) is not None:
-        weaker = known.negative_stiffness * (v[:, 0] - known.reference_gap)
-        fallen += np.where(status == OPEN, weaker, -known.gain_on_closing)
-    held = 1e-3 * np.abs(v[:, 0] / normal_own)  # what would close the gap, where no node presses
-    scale = max(1e-300, *(np.abs(part).max(initial=0.0) for part in (wanted, force, drop, held)))
-    miss = max(np.abs(wanted - force).max(initial=0.0), np.abs(fallen).max(initial=0.0))
-    if problem.extra_unknowns is not None:
-        miss = max(miss, problem.extra_unknowns.lacking(forces, scale))
-    return Projected(p, z, status, float(miss / scale))
+def sizes(vectors: Floats) -> Floats:
+    """Lengths (k,) of vectors (k, d) in the plane of contact."""
+    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -379,7 +351,10 @@ def solve_statuses(
 
 
 def linearised(problem: ContactProblem, found: Projected) -> Forces:
-    """The forces in three dimensions that solve the equations linearised where the laws were projected."""
-    size = np.maximum(np.hypot(*found.z.T), 1e-300)
-    turning = np.minimum(1.0, np.where(found.status == SLIP, problem.limit(found.p), 0.0) / size)
-    return solve_statuses(problem, found.status, found.z / size[:, None], turning)
+    """The forces that solve the equations linearised where the laws were projected."""
+    if problem.dim == 2:
+        against = np.subtract(found.status == BACKWARD, found.status == FORWARD, dtype=float)
+        return solve_statuses(problem, found.status, against[:, None])
+    size = np.maximum(sizes(found.z), 1e-200)
+    limit = np.where(found.status == SLIP, np.maximum(problem.limit(found.p), 0.0), 0.0)
+    return solve_statuses(problem, found.status, found.z / size[:, None], np.minimum(1.0, limit / size))

@@ -26,7 +26,7 @@ from evfem.common.constants import (
     SMALLEST_FORCE,
 )
 from evfem.contact.condensed import Candidates
-from evfem.contact.signorini import FORWARD, OPEN, STICK
+from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw
 from evfem.solver.slipping import Returned
 from evfem.solver.state import State
@@ -395,11 +395,6 @@ class PenaltyInterface(Interface):
         step.
         """
         return 1.0 / np.outer(self.shares(old), self.penalties)
-
-
-def sizes(vectors: Floats) -> Floats:
-    """Lengths (k,) of vectors (k, d) in the plane of contact."""
-    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
 
 
 def slipped(interface: Interface, old: State, new: State) -> Floats:

@@ -95,7 +95,11 @@ def laws(step, found):
     moved = found.moved.reshape(-1, 2)
     gap = known.surface.normal_gap + np.sum(normal * moved, axis=1)
     gap = gap + known.interface_compliance[:, 0] * found.force[:, 0]
-    slip = known.slip[:, 0] + np.sum(tangent * moved, axis=1) + known.interface_compliance[:, 1] * found.force[:, 1]
+    slip = (
+        known.slip[:, 0]
+        + np.sum(tangent * moved, axis=1)
+        + known.interface_compliance[:, 1] * found.force[:, 1]
+    )
     pressing, shear = found.force.T
     limit = known.friction * pressing
     rougher = known.friction_slope * moved[:, 0] * known.force[:, 0]
