@@ -96,8 +96,10 @@ def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, P
         after = _passing(found, Projected.of(problem, forces))
         changed = after.status != found.status
         rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
+        if not np.isfinite(after.miss).all():
+            break
         if not (after.miss[rest] > ROUNDING).any():
-            return forces, found if problem.dim == 2 else after, solves
+            return forces, found, solves
         if changed.any():
             late, key = solves > ACTIVE_SET_LIMIT // 3, found.status.tobytes()
             if late and key in alone:
