@@ -133,7 +133,9 @@ class Interface:
         self.follows = self.dim == 3
         self.length = pad.spacing(self.points)
         self._down = pad.facing(self.points)
-        self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
+        # coefficients of friction may change over x in three dimensions, but not jump
+        jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
+        self.pins = Pins(jumps, pad.nodes.size)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._returned = Returned(pad.nodes.size)

@@ -57,26 +57,6 @@ def test_forces_in_the_laboratory_stand_on_the_slope():
 
 
 FLAT = ev.Flat(friction=0.5)
-#: force, motion and status of a node, and whether they obey the laws; |(3, 4)| = 5 is the limit at 10
-CASES = {
-    "slip against the motion": ([10.0, -3.0, -4.0], [0.003, 0.004], SLIP, True),
-    "slip along the motion": ([10.0, 3.0, 4.0], [0.003, 0.004], SLIP, False),
-    "slip across the motion": ([10.0, -4.0, 3.0], [0.003, 0.004], SLIP, False),
-    "slip beyond the cone": ([10.0, -3.1, -4.1], [0.003, 0.004], SLIP, False),
-    "slip below the cone": ([10.0, -2.9, -3.9], [0.003, 0.004], SLIP, False),
-    "stick": ([10.0, 2.0, -4.0], [0.0, 0.0], STICK, True),
-    "stick that moves": ([10.0, 2.0, -4.0], [0.0, 1e-5], STICK, False),
-    "stick beyond the cone": ([10.0, 3.1, -4.1], [0.0, 0.0], STICK, False),
-    "pulling": ([-10.0, 0.0, 0.0], [0.0, 0.0], STICK, False),
-    "open": ([0.0, 0.0, 0.0], [0.1, 0.2], OPEN, True),
-}
-
-
-@pytest.mark.parametrize("case", CASES)
-def test_a_state_obeys_the_laws_or_not(case):
-    force, moved, status, obeys = CASES[case]
-    interface, old, new, _ = touching(FLAT, force, moved, status)
-    assert interface.obeyed(old, new) is obeys
 
 
 def test_a_closed_node_must_be_on_the_surface():
