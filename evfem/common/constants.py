@@ -46,15 +46,7 @@ STUCK                   a step is given up, after twice as many iterations, if s
 FALLING                 this fraction of those before
 ANDERSON_DEPTH          earlier iterations that are combined                                      A, B
 ACTIVE_SET_LIMIT        solves of an active set                                                   attraction
-DISC_SWEEPS             sweeps of block Gauss-Seidel before Newton's iterations in 3D, twice      discs
-                        as many each time that they come again
-DISC_NEWTON             iterations of Newton's method before sweeps come again                    discs
-DISC_FALL               where they come again, a step after which the forces miss the laws by     discs
-                        more than this fraction of before is shortened
 DISC_OWN                a node's own compliance counts as no less than this fraction of the mean  attraction
-DIVERGED                forces grown by this factor in sweeps are those of no body                attraction
-DISC_ROUNDS             so often before the contact problem is given up                           discs
-DISC_ROUNDING           forces that miss the laws by less than this fraction of the largest one
 STABLE                  fraction of the critical negative stiffness that is used if the           attraction
                         attraction weakens with the gap faster than the tissue stiffens
 LEFT_OVER               least share of a contact force that the tangent leaves where the          attraction
@@ -126,9 +118,7 @@ STUCK = 8
 FALLING = 0.9
 ANDERSON_DEPTH = 3
 ACTIVE_SET_LIMIT = 60
-DISC_SWEEPS, DISC_NEWTON, DISC_ROUNDS = 15, 14, 7
-DISC_FALL, DISC_ROUNDING = 0.9, 1e-12
-DISC_OWN, DIVERGED = 0.1, 1e6
+DISC_OWN = 0.1
 STABLE = 0.9
 LEFT_OVER = 0.01
 ROUNDING = 1e-12

@@ -18,8 +18,8 @@ from evfem.common.arrays import Floats, Ints
 
 @dataclass(frozen=True)
 class Roughness:
-    """Attraction between rough faces, along normals, then tangents: stronger by `gain` (2 k,) times
-    what a contact force has beyond `present` (k,), weaker by `loss_on_opening` (2 k,) N/mm where open.
+    """Attraction between rough faces, along normal and tangent: stronger by `gain` (k, 1 + d) times what a
+    contact force has beyond `present` (k,), weaker by `loss_on_opening` (k, 1 + d) N/mm where open.
     """
 
     gain: Floats
@@ -28,8 +28,7 @@ class Roughness:
 
     def of(self, nodes: Ints) -> Roughness:
         """Of these nodes alone."""
-        gain, loss = (each.reshape(2, -1)[:, nodes].ravel() for each in (self.gain, self.loss_on_opening))
-        return Roughness(gain, loss, self.present[nodes])
+        return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
 
 
 @dataclass(frozen=True)

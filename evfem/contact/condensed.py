@@ -1,6 +1,5 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
-problem posed on it. For the plane, where a node has one slip; what differs in three dimensions is
-in `evfem.contact.spatial`.
+problem posed on it.
 
 With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel
 under a prescribed force, the squared voltage under a prescribed friction force) that push with p,
@@ -28,7 +27,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -40,12 +38,14 @@ from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
+    SLIP,
     ContactNotSolved,
     ContactProblem,
+    ContactSolution,
     ExtraUnknowns,
     Unstable,
-    solve_with_attraction,
 )
+from evfem.contact.solve import solve_with_attraction
 from evfem.surface.pad import SurfaceState
 
 #: why there is no solution where the compliance is not positive
@@ -54,12 +54,12 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate.
+    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in three dimensions.
 
-    The `surface` below them, slip since the last accepted state (c,) in mm, contact forces (c, 2)
-    along normal and tangent in N/mm, statuses (c,), friction coefficients (c,) and their slopes
-    over x (c,) in 1/mm. `interface_compliance` (c, 2) in mm per N/mm along normal and tangent: 0
-    for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
+    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d)
+    along normal and tangents in N/mm (N in three dimensions), statuses (c,), friction coefficients (c,) and
+    their slopes over x (c,) in 1/mm. `interface_compliance` (c, 1 + d) in mm per N/mm along normal and
+    tangents: 0 for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
     needs no other solver. A law of friction other than Coulomb's gives its derivative by the
     contact force as the coefficient, and beside it `cohesion` (c,) in N/mm and how much friction
     grows with the slip of the step, `slip_stiffness` (c,) in N/mm per mm. The attraction weakens
@@ -82,16 +82,53 @@ class Candidates:
 
     @cached_property
     def axes(self) -> Floats:
-        """Rows n and t of every node, (c, 2, 2)."""
+        r"""Rows :math:`n = (-h', 1, 0)/r`, :math:`t_1 = (1, h', 0)/r`, :math:`t_2 = (0, 0, 1)` of every node,
+        :math:`r = \sqrt{1 + h'^2}`, in the order (y, x[, z]) of their components, (c, 1 + d, 1 + d).
+        """
         cos, sin = 1.0 / self.surface.stretch, self.surface.slope / self.surface.stretch
-        axes = np.empty((sin.size, 2, 2))
-        axes[:, 0, 0], axes[:, 1, 1] = -sin, sin
-        axes[:, 0, 1] = axes[:, 1, 0] = cos
+        axes = np.zeros((cos.size, *2 * self.force.shape[1:]))
+        axes[:, 0, 0] = axes[:, 1, 1] = cos
+        axes[:, 0, 1], axes[:, 1, 0] = -sin, sin
+        axes[:, 2:, 2:] = 1.0
         return axes
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force in the laboratory frame per x displacement of its node, (c,
-        2): it turns with the profile, and friction grows where its coefficient does.
+        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d): it turns with
+        the profile, and friction grows where its coefficient does; `own` (c,) as for `friction_growth`.
+        """
+        axes = self.axes
+        rate = self.surface.curvature / self.surface.stretch**2
+        turned = rate[:, None] * (self.force[:, 1:2] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
+        return np.asarray(turned + np.einsum("ca,cak->ck", self.friction_growth(own), axes[:, 1:]))
+
+    @property
+    def shear_direction(self) -> Floats:
+        """Unit vectors (c, d) of the friction of slipping nodes, 0 of others."""
+        if self.force.shape[1] == 2:
+            return np.subtract(self.status == BACKWARD, self.status == FORWARD, dtype=float)[:, None]
+        shear = np.hypot(*self.force[:, 1:].T)
+        slips = (self.status == SLIP) & (shear > 0.0)
+        return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
+
+    def by_chords(self, near: Ints, compliance: Floats) -> Floats | None:
+        """Coefficients (k,) of the `near` nodes by the chords of their friction law from no force to the
+        present one, none so steep that friction presses a slipping node on without end; None for Coulomb's.
+        """
+        if self.cohesion is None:
+            return None
+        normal, along, n = (
+            np.maximum(self.force[near, 0], 0.0),
+            self.shear_direction[near],
+            self.axes.shape[1],
+        )
+        chord = self.friction[near] + self.cohesion[near] / np.where(normal > 0.0, normal, np.inf)
+        blocks = compliance.reshape(near.size, n, near.size, n)[np.arange(near.size), 0, np.arange(near.size)]
+        pressed = -blocks[:, 1:] / blocks[:, :1]
+        on = np.where(along.any(axis=1), np.sum(pressed * along, axis=1), np.linalg.norm(pressed, axis=1))
+        return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
+
+    def friction_growth(self, own: Floats) -> Floats:
+        """That part of it which is friction: change of the shear force per x displacement, (c, d).
 
         `own` (c,) is the compliance of each node along x. Where friction falls along the way
         faster than the tissue stiffens, a node snaps forward and has no equilibrium at the slope:
@@ -99,29 +136,11 @@ class Candidates:
         snap. Friction that rises along the way holds, whatever the body alone would do: the own
         compliance of a squeezed pad, which only its contact holds, is negative.
         """
-        axes = self.axes
-        rate = self.surface.curvature / self.surface.stretch**2
-        turned = rate[:, None] * (self.force[:, 1:] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
-        return turned + self.friction_growth(own)[:, None] * axes[:, 1]
-
-    def by_chords(self, near: Ints, status: Ints, compliance: Floats) -> Floats:
-        """Coefficients (k,) of the `near` nodes by the chords of their friction law from no force to the
-        present one, none so steep that friction presses a slipping node on without end.
-        """
-        normal, index = np.maximum(self.force[near, 0], 0.0), np.arange(near.size)
-        cohesion: Any = 0.0 if self.cohesion is None else self.cohesion[near]
-        chord = self.friction[near] + cohesion / np.where(normal > 0.0, normal, np.inf)
-        pressed = compliance[index, near.size + index] / compliance[index, index]
-        on = np.where(status >= FORWARD, np.where(status == FORWARD, pressed, -pressed), np.abs(pressed))
-        return np.where(chord * on > STABLE, STABLE / np.maximum(on, 1e-300), chord)
-
-    def friction_growth(self, own: Floats) -> Floats:
-        """That part of it which is friction: change of the shear force per x displacement, (c,)."""
-        sign = (self.status == BACKWARD).astype(float) - (self.status == FORWARD)
-        growth = sign * self.friction_slope * self.force[:, 0]
+        growth = self.shear_direction * (self.friction_slope * self.force[:, 0])[:, None]
         if self.slip_stiffness is not None:
-            growth = growth - self.slip_stiffness * self.surface.stretch
-        return np.where((growth < 0.0) | (growth * own < STABLE), growth, 0.0)
+            growth[:, 0] -= self.slip_stiffness * self.surface.stretch
+        steep = growth[:, :1]
+        return np.where((steep < 0.0) | (steep * own[:, None] < STABLE), growth, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +176,8 @@ class CondensedTangent:
         return cls(schur, _inverse(inner, symmetric=coupling is None), dim)
 
     def rows(self, near: Ints) -> Ints:
-        """Rows of these candidates: in the plane y before x, in three dimensions node by node."""
-        if self.dim == 2:
-            return y_before_x(near)
-        return np.asarray((3 * near[:, None] + np.arange(3)).ravel())
+        """Rows of these candidates, (y, x[, z]) node by node."""
+        return np.asarray((self.dim * near[:, None] + np.array([1, 0, 2])[: self.dim]).ravel())
 
     def among(self, near: Ints) -> Floats:
         """Compliance among these candidates, in the order of `rows`; they are often those of the
@@ -245,10 +262,10 @@ class LinearContactStep:
                 break
             near = np.union1d(near, hit)
         force = np.zeros_like(self.candidates.force)
-        force[near] = self._by_node(found.force)
+        force[near] = found.force.reshape(-1, self.body.dim)
         own = np.diagonal(self.body.compliance)[0 :: self.body.dim]
-        grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim]
-        force[:, 1] += np.where(status != OPEN, grown, 0.0)
+        grown = self.candidates.friction_growth(own) * moved[0 :: self.body.dim, None]
+        force[:, 1:] += np.where((status != OPEN)[:, None], grown, 0.0)
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
@@ -265,12 +282,8 @@ class LinearContactStep:
         return float(unknown.force + own - found)
 
     def _along_normal(self, moved: Floats) -> Floats:
-        return np.einsum("ck,ck->c", self.candidates.axes[:, 0], moved.reshape(-1, self.body.dim))
-
-    @staticmethod
-    def _by_node(force: Floats) -> Floats:
-        """Forces (k, dim) from how the contact problem orders them."""
-        return force.reshape(2, -1).T
+        normal = self.candidates.axes[:, 0]
+        return np.einsum("ck,ck->c", normal[:, :2], moved.reshape(-1, self.body.dim)[:, 1::-1])
 
     def _free_motion(self) -> Floats:
         """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1
@@ -285,7 +298,8 @@ class LinearContactStep:
     @cached_property
     def _present(self) -> Floats:
         """Present contact forces on the candidates (dim c,), in the laboratory frame."""
-        return np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes).ravel()
+        force = np.einsum("ca,cak->ck", self.candidates.force, self.candidates.axes)
+        return np.concatenate([force[:, 1::-1], force[:, 2:]], axis=1).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
         """Candidates' motion (dim c,) by forces on the near ones, in the order of
@@ -295,85 +309,76 @@ class LinearContactStep:
         force[self.body.rows(near)] = pushed
         return self.body.compliance @ force
 
-    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[Any, Floats]:
-        """Contact among the `near` nodes: solution in their frames, and the forces (2 k,), y
-        before x, that move the body, those of the follower stiffness included.
+    def _solve_near(self, near: Ints, free: Floats, status: Ints) -> tuple[ContactSolution, Floats]:
+        """Contact among the `near` nodes: solution in their frames, and the forces (dim k,) that move the
+        body, those of the follower stiffness included.
 
         What moves beyond the present forces `held` is small near the equilibrium: a steep stiffness, of
         friction that rises with the speed for example, multiplies that and not the whole free motion.
         """
-        own_x = np.diagonal(self.body.compliance)[0::2]
-        follower = FollowerStiffness.of(self.candidates.follower_rate(own_x)[near])
-        known, rows = self.candidates, y_before_x(near)
+        known, rows, dim = self.candidates, self.body.rows(near), self.body.dim
+        follower = FollowerStiffness.of(known.follower_rate(np.diagonal(self.body.compliance)[::dim])[near])
         among, own, held = self.body.among(near), free[rows], self._present[rows]
         own[:, 0] += among @ held
         C, W = follower.apply(among, own)
         W[:, 0] -= C @ held
-        axes = known.axes[near]
-        start = local(axes, W[:, :1])[:, 0] + np.concatenate(
-            [known.surface.normal_gap[near], known.slip[near]]
-        )
-        compliance = local(axes, local(axes, C).T).T
-        give = known.interface_compliance[near].T.ravel() if known.interface_compliance.any() else None
-        extra_unknowns = self._bone_balance(rows, free, (C, W), follower, axes) if self.unknowns else None
-        cohesion = None if known.cohesion is None else known.cohesion[near]
-        problem = ContactProblem(
-            start,
-            compliance,
-            known.friction[near],
-            extra_unknowns,
-            None,
-            cohesion,
-            give,
-            None if cohesion is None else known.by_chords(near, status, compliance),
-        )
+        problem = self._problem(near, (C, W), self._bone_balance(rows, free, (C, W), follower))
         attraction = AttractionStiffness(
             known.negative_stiffness[near],
             known.surface.normal_gap[near],
             known.gain_on_closing[near],
             None if known.roughness is None else known.roughness.of(near),
         )
+        touching = np.where((status != OPEN)[:, None], known.force[near], 0.0).ravel()
         try:
-            found = solve_with_attraction(problem, attraction, status)
+            found = solve_with_attraction(problem, attraction, status, touching)
         except ContactNotSolved as error:
             if follower.loaded.size and problem.gives_way:
                 raise Unstable(LOST_STABILITY) from error
             raise
-        pressed = (found.force + found.attraction_drop).reshape(2, -1)
-        force = np.einsum("ak,kab->bk", pressed, axes)[::-1].ravel()
+        pressed = (found.force + found.attraction_drop).reshape(-1, dim)
+        force = np.einsum("ka,kab->kb", pressed, known.axes[near]).ravel()
         if follower.loaded.size:
             force = force + follower.force(W[:, 0] + C @ force + W[:, 1:] @ found.extra)
         return found, force
 
+    def _problem(
+        self, near: Ints, moved: tuple[Floats, Floats], balance: tuple[Floats, Floats, Floats] | None
+    ) -> ContactProblem:
+        """That of the `near` nodes in their frames, which other forces have `moved`."""
+        known, (C, W), extra = self.candidates, moved, None
+        axes = known.axes[near]
+        at_rest = np.column_stack([known.surface.normal_gap[near], known.slip[near]])
+        if balance is not None:
+            row, pivot, right = balance
+            own = np.flatnonzero([unknown.condition is not None for unknown in self.unknowns])
+            extra = ExtraUnknowns(local(axes, W[:, 1:]), local(axes, row.T).T, pivot, right, own)
+        compliance = local(axes, local(axes, C).T).T
+        return ContactProblem(
+            local(axes, W[:, :1])[:, 0] + at_rest.ravel(),
+            compliance,
+            known.friction[near],
+            extra,
+            chords=known.by_chords(near, compliance),
+            cohesion=None if known.cohesion is None else known.cohesion[near],
+            give=known.interface_compliance[near].ravel() if known.interface_compliance.any() else None,
+        )
+
     def _bone_balance(
-        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness, axes: Floats
-    ) -> ExtraUnknowns:
-        """Balance of the bone along the unknowns' axes, as the equations that settle them."""
-        C, W = near
-        row, pivot, value = self._balance(rows, free)
-        through = follower.transposed(row)
-        row, pivot, value = row + through @ C, pivot + through @ W[:, 1:], value - through @ W[:, 0]
-        return self._settling(local(axes, W[:, 1:]), local(axes, row.T).T, (pivot, value), free)
-
-    def _settling(
-        self, moved: Floats, row: Floats, equations: tuple[Floats, Floats], free: Floats
-    ) -> ExtraUnknowns:
-        """The unknowns with their equations, pivot and right-hand side."""
-        pivot, right = equations
-        own = np.flatnonzero([unknown.condition is not None for unknown in self.unknowns])
-        held = self._held(pivot, free)
-        held[own] = pivot[own]
-        return ExtraUnknowns(moved, row, held, right, own)
-
-    def _balance(self, rows: Ints, free: Floats) -> tuple[Floats, Floats, Floats]:
-        """What the unknowns' equations get by forces on these rows of the candidates, by the unknowns, and
-        what is missing without both.
+        self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
+    ) -> tuple[Floats, Floats, Floats] | None:
+        """Balance of the bone along the unknowns' axes, as the equations that settle them: what forces on
+        these rows of the candidates and what the unknowns add, and what is missing without both.
         """
+        if not self.unknowns:
+            return None
+        C, W = near
         S, share, wanted, carried = self.equations
-        dim = self.body.dim
-        pivot = S[:, :-dim] @ free[:, 1:] + share
-        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0]
-        return carried[:, rows], pivot, value
+        dim, row = self.body.dim, carried[:, rows]
+        through = follower.transposed(row)
+        pivot = S[:, :-dim] @ free[:, 1:] + share + through @ W[:, 1:]
+        value = wanted - S[:, -dim:] @ self.bone - S[:, :-dim] @ free[:, 0] - through @ W[:, 0]
+        return row + through @ C, self._held(pivot, free), value
 
     @cached_property
     def equations(self) -> tuple[Floats, Floats, Floats, Floats]:
@@ -392,14 +397,14 @@ class LinearContactStep:
         return S, share, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
-        """A body that nothing holds has a zero here, whose rounding may be negative: let it fall,
-        not rise.
+        """The pivot without the zeros of a body that nothing holds, whose rounding may be negative: let it
+        fall, not rise. A condition keeps its own.
         """
         dim = self.body.dim
         axis = [unknown.axis - dim for unknown in self.unknowns]
         floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)
-        own = np.diagonal(pivot)
-        return pivot + np.diag(np.where(np.abs(own) < floor, floor - own, 0.0))
+        own, bone = np.diagonal(pivot), [unknown.condition is None for unknown in self.unknowns]
+        return pivot + np.diag(np.where((np.abs(own) < floor) & bone, floor - own, 0.0))
 
 
 def _inverse(matrix: Floats, symmetric: bool) -> Floats:
@@ -416,8 +421,3 @@ def _inverse(matrix: Floats, symmetric: bool) -> Floats:
         raise np.linalg.LinAlgError("singular compliance")
     # solving with the unit matrix, as numpy does, takes 1.6 times as long
     return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=64 * len(matrix))[0])
-
-
-def y_before_x(nodes: Ints) -> Ints:
-    """Rows (2 k,) of these nodes among interleaved x and y components."""
-    return np.concatenate([2 * nodes + 1, 2 * nodes])

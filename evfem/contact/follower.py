@@ -8,6 +8,9 @@ free motions.
 
 Where the feedback C T of the slipping nodes exceeds 1, the forces push them aside harder than the
 tissue holds them: stability is lost, and the linear problem has no solution, or one the wrong way.
+
+Components of the block are ordered per node, (y, x[, z]): on a flat surface those along its normal and
+tangents. Axes (k, 1 + d, 1 + d) hold the rows n, t[, t2] of every node in that order.
 """
 
 from __future__ import annotations
@@ -21,55 +24,56 @@ from evfem.common.arrays import Floats, Ints
 
 @dataclass(frozen=True, eq=False)
 class FollowerStiffness:
-    """Forces along x and y per x displacement, `rate` (l, 2), of the `loaded` ones (l,) among
-    `size` = k nodes. Components of others come y before x.
+    """Forces (y, x[, z]) per x displacement, `rate` (l, 1 + d), of the `loaded` ones (l,) among the nodes
+    near contact.
     """
 
-    size: int
     loaded: Ints
     rate: Floats
 
     @classmethod
     def of(cls, rate: Floats) -> FollowerStiffness:
-        """From the rates of all nodes (k, 2); on a flat surface without slopes of friction no node
+        """From the rates of all nodes (k, 1 + d); on a flat surface without slopes of friction no node
         is loaded.
         """
         loaded = np.flatnonzero(rate.any(axis=1))
-        return cls(len(rate), loaded, rate[loaded])
+        return cls(loaded, rate[loaded])
+
+    @property
+    def _x(self) -> Ints:
+        return self.rate.shape[1] * self.loaded + 1
+
+    def _through(self, C: Floats) -> Floats:
+        """C (q, m) times the columns of T that are not zero."""
+        each = (C[:, self._x - 1 + a] * self.rate[:, a] for a in range(self.rate.shape[1]))
+        return np.asarray(sum(each))
 
     def apply(self, C: Floats, W: Floats) -> tuple[Floats, Floats]:
-        """(1 - C T)^-1 applied to the compliance (2 k, 2 k) and to motions (2 k, p): a small
-        system, T has few columns.
+        """(1 - C T)^-1 applied to the compliance (m, m) and to motions (m, p): a small system, T has few
+        columns.
         """
         if not self.loaded.size:
             return C, W
-        x, y = self.size + self.loaded, self.loaded
-        B = C[:, x] * self.rate[:, 0] + C[:, y] * self.rate[:, 1]
+        x, B = self._x, self._through(C)
         gain = B @ np.linalg.inv(np.eye(x.size) - B[x])
         return C + gain @ C[x], W + gain @ W[x]
 
     def force(self, moved: Floats) -> Floats:
-        """Change of the forces (2 k,) by displacements (2 k,)."""
-        change = np.zeros((2, self.size))
-        change[:, self.loaded] = self.rate.T[::-1] * moved[self.size + self.loaded]
+        """Change of the forces (m,) by displacements (m,)."""
+        change = np.zeros((moved.size // self.rate.shape[1], self.rate.shape[1]))
+        change[self.loaded] = self.rate * moved[self._x, None]
         return change.ravel()
 
     def transposed(self, rows: Floats) -> Floats:
-        """Rows (p, 2 k) times T."""
-        through, x = np.zeros_like(rows), self.size + self.loaded
-        through[:, x] = rows[:, x] * self.rate[:, 0] + rows[:, self.loaded] * self.rate[:, 1]
+        """Rows (p, m) times T."""
+        through = np.zeros_like(rows)
+        through[:, self._x] = self._through(rows)
         return through
 
 
 def local(axes: Floats, columns: Floats) -> Floats:
-    """Columns (2 k, m), y before x, as (all normal, all tangential) ones; the same on a flat
-    surface.
-    """
-    if not axes[:, 0, 0].any():
+    """Columns (m, p) of (y, x[, z]) as those along the `axes`; the same on a flat surface."""
+    if not axes[:, 0, 1].any():
         return columns
-    k, found = len(axes), np.empty(columns.shape)
-    y, x = columns[:k], columns[k:]
-    for a, part in enumerate((found[:k], found[k:])):
-        np.multiply(axes[:, a, :1], x, out=part)
-        part += axes[:, a, 1:] * y
-    return found
+    by_node = columns.reshape(*axes.shape[:2], -1)
+    return np.asarray(np.matmul(axes, by_node).reshape(columns.shape))

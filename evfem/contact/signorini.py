@@ -1,20 +1,29 @@
-r"""Unilateral contact with Coulomb friction, solved exactly on the dense compliance of the contact
-candidates.
+r"""Unilateral contact with Coulomb friction on the dense compliance of the contact candidates: the problem,
+its laws, and its equations where every node has a status.
 
-For k candidates in their local frames (n normal, t tangential), with the contact forces
-:math:`\lambda` the new gaps and slips are :math:`(g, s) = (g, s)_0 + C\lambda + e\,d`, where d are
-optional extra unknowns (the bone's travel under a prescribed force, the squared voltage under a
-prescribed friction force) with the equations :math:`r\lambda + \rho\,d = b`. Signorini and Coulomb
-ask, per node, for exactly one of
+A node has a normal n and d tangents, one in the plane and two in three dimensions; components are ordered
+per node (n, t) or (n, t1, t2). With the contact forces :math:`\lambda` the new gaps and slips are
+:math:`v = (g, s) = v_0 + C\lambda + e\,d`, where d are optional extra unknowns (the bone's travel under a
+prescribed force, the squared voltage under a prescribed friction force) with the equations
+:math:`r\lambda + \rho\,d = b`. Signorini and Coulomb ask, per node, for exactly one of
 
-========  ==========================  =================================================
-status    equations                   stays if
-========  ==========================  =================================================
-OPEN      lam_n = lam_t = 0           g >= 0
-STICK     g = 0, s = 0                lam_n >= 0 and abs(lam_t) <= mu lam_n
-FORWARD   g = 0, lam_t = -mu lam_n    lam_n >= 0 and s >= 0
-BACKWARD  g = 0, lam_t = +mu lam_n    lam_n >= 0 and s <= 0
-========  ==========================  =================================================
+======  ==============================  =====================================================
+status  equations                       stays if
+======  ==============================  =====================================================
+OPEN    lam_n = 0, lam_t = 0            g >= 0
+STICK   g = 0, s = 0                    lam_n >= 0 and abs(lam_t) <= mu lam_n
+slip    g = 0, lam_t = mu lam_n e       lam_n >= 0, s along -e
+======  ==============================  =====================================================
+
+In the plane a slip is FORWARD, e = -1, or BACKWARD, e = +1. In three dimensions it is SLIP, along
+e = z/abs(z), and the direction is an unknown of its own (`solve_statuses`). The same laws as projections:
+
+.. math:: \lambda_n = \max(0, p), \quad \lambda_t = \mathrm{proj}_{\mu\lambda_n}(z), \qquad
+          p = \lambda_n - r_n g, \quad z = \lambda_t - r_t s,
+
+for any positive r; taken is the inverse of the node's own compliance. Where the attraction grows with
+areas that follow the nodes, that may vanish or be negative: r is then bounded by what is usual among the
+nodes, and g = 0 to rounding stays a small p.
 
 The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
 has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
@@ -23,41 +32,17 @@ only where it can. Between rough faces it also grows with what presses the node 
 closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
 gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
 
-Algorithm (`solve_contact`), a primal-dual active set::
-
-    status <- that of the last iteration
-    repeat
-        solve the equations of `status` (one dense linear system) for forces and extra unknowns
-        gaps, slips <- start + C (forces + drops) + e d
-        wanted <- the status that each node's forces, gap and slip ask for
-        if wanted = status: done
-        change all violated nodes; from the first statuses on that have been met before, the worst one
-            alone; give up where these go round in a circle
-
-A node goes from open to slip the way it is moving, from slip to open when it pulls, from stick to
-slip with the sign of its force when it leaves the cone, from slip to stick (never straight to the
-other slip) when it moves along its own friction. It passes through slip between open and stick:
-one that sticks beside a pulling shear force would seem to open. No constant has to be chosen. What
-has not converged is never used.
-
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
 
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
-solution, or the wrong one; its negative stiffness is then scaled to 0.9 of the critical value
-(`solve_with_attraction`).
-
 Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175,
 doi:10.1016/0045-7825(86)90095-2 (the frictional problem as complementarity); P. Alart and A.
-Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X; S.
-Hueeber, G. Stadler and B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061
-(primal-dual active set).
+Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X
+(projections and their linearisation).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -65,15 +50,12 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
-from evfem.contact.attracted import AttractionStiffness, feedback
+from evfem.common.constants import DISC_OWN
+from evfem.contact.attracted import AttractionStiffness
 
+#: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3
-#: how often the attraction's stiffness is scaled down, by at least which factor, before that of a pad
-#: without closed nodes decides
-SCALINGS, SOFTER = 2, 1.1
-
-
+SLIP = 2
 NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
@@ -93,9 +75,9 @@ class Unstable(ContactNotSolved):
 
 @dataclass(frozen=True)
 class ExtraUnknowns:
-    """p extra unknowns d: what they do to gaps then slips, `columns` (2 k, p), and the equations
-    that settle them, `rows` (p, 2 k) lam + `pivot` (p, p) d = `right` (p,). Those `conditioned` follow what
-    the body does even where its stability is asked for, as a voltage that keeps a charge.
+    """p extra unknowns d: what they do to gaps and slips, `columns` (m, p) with m = (1 + d) k, and the
+    equations that settle them, `rows` (p, m) lam + `pivot` (p, p) d = `right` (p,). Those `conditioned`
+    follow what the body does even where its stability is asked for, as a voltage that keeps a charge.
     """
 
     columns: Floats
@@ -106,20 +88,27 @@ class ExtraUnknowns:
 
     @property
     def followed(self) -> Floats:
-        """What the conditioned ones take from the compliance (2 k, 2 k)."""
+        """What the conditioned ones take from the compliance (m, m)."""
         some = self.conditioned
         return self.columns[:, some] @ np.linalg.solve(self.pivot[np.ix_(some, some)], self.rows[some])
 
 
+@dataclass(frozen=True, eq=False)
+class Forces:
+    """Contact forces and drops of the attraction (m,), and extra unknowns (p,)."""
+
+    contact: Floats
+    drop: Floats
+    extra: Floats
+
+
 @dataclass(frozen=True)
 class ContactProblem:
-    """Gaps and slips without contact forces (2 k,), compliance (2 k, 2 k), friction coefficients
-    (k,), optional extra_unknowns, the shear force that friction has without a pressing one,
-    `cohesion` (k,) in N/mm, and how far the interface itself gives way to contact forces, not to
-    attraction, `give` (2 k,) in mm per N/mm.
-
-    The first k entries are normal (gap, pressing force), the last k tangential (slip, shear
-    force).
+    """Gaps and slips without contact forces (m,), m = (1 + d) k, and compliance (m, m), both per node
+    (n, t[, t2]), friction coefficients (k,), optional extra_unknowns and attraction, the shear force that
+    friction has without a pressing one, `cohesion` (k,) in N/mm (N in three dimensions), and how far the
+    interface itself gives way to contact forces, not to attraction, `give` (m,) in mm per N/mm.
+    `chords` (k,): coefficients that take the place of tangents and cohesion of a friction law.
     """
 
     start: Floats
@@ -135,16 +124,21 @@ class ContactProblem:
     def by_chords(self) -> ContactProblem:
         """The problem with the chords of its friction laws in the place of their tangents."""
         assert self.chords is not None
-        return replace(self, friction=self.chords, cohesion=None)
+        return replace(self, friction=self.chords, cohesion=None, chords=None)
 
     @property
     def size(self) -> int:
         """Number of candidate nodes k."""
         return self.friction.size
 
+    @property
+    def dim(self) -> int:
+        """Components of a node, 1 + d."""
+        return self.start.size // self.friction.size
+
     @cached_property
     def under_forces(self) -> Floats:
-        """Compliance (2 k, 2 k) of body and interface to contact forces."""
+        """Compliance (m, m) of body and interface to contact forces."""
         return self.compliance if self.give is None else self.compliance + np.diag(self.give)
 
     @cached_property
@@ -168,11 +162,31 @@ class ContactProblem:
         limit = self.friction * normal
         return limit if self.cohesion is None else limit + self.cohesion
 
+    @cached_property
+    def own(self) -> tuple[Floats, Floats]:
+        """Size of each node's own compliance along the normal and, the largest one, along the tangents,
+        (k,), nowhere less than the fraction `DISC_OWN` of the mean.
+        """
+        i, C = self.dim * np.arange(self.size), self.under_forces
+        shear = np.abs(C[i + 1, i + 1])
+        if self.dim == 3:
+            a, b, c = C[i + 1, i + 1], C[i + 2, i + 2], 0.5 * (C[i + 1, i + 2] + C[i + 2, i + 1])
+            shear = 0.5 * np.abs(a + b) + np.hypot(0.5 * (a - b), c)
+        normal, shear = (np.maximum(a, max(DISC_OWN * a.mean(), 1e-300)) for a in (np.abs(C[i, i]), shear))
+        return normal, shear
+
+    def state(self, forces: Forces) -> Floats:
+        """Gaps and slips (m,) under these forces."""
+        v = self.start + self.compliance @ (forces.contact + forces.drop)
+        if self.give is not None:
+            v = v + self.give * forces.contact
+        return v if self.extra_unknowns is None else v + self.extra_unknowns.columns @ forces.extra
+
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (2 k,), drops of the attraction (2 k,), statuses (k,), the extra unknowns
-    (p,), new gaps and slips (2 k,), the number of dense solves, and whether the negative stiffness
+    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns
+    (p,), new gaps and slips (m,), the number of dense solves, and whether the negative stiffness
     had to be scaled down.
     """
 
@@ -184,175 +198,178 @@ class ContactSolution:
     solves: int
     reduced: bool = False
 
+    @classmethod
+    def of(cls, problem: ContactProblem, forces: Forces, status: Ints, solves: int) -> ContactSolution:
+        """These forces, with these statuses of the nodes, after so many dense solves."""
+        return cls(forces.contact, forces.drop, status, forces.extra, problem.state(forces), solves)
 
-def solve_contact(problem: ContactProblem, status: Ints) -> ContactSolution:
-    """Signorini-Coulomb, started from `status` (k,); raises `ContactNotSolved` when the active set does
-    not end within `ACTIVE_SET_LIMIT` solves.
+
+@dataclass(frozen=True, eq=False)
+class Projected:
+    """What the laws make of forces, gaps and slips: p and z of every node, (k,) and (k, d), its status (k,),
+    and by how much its forces miss the laws (k,), relative to the largest force.
     """
-    status = np.where(~problem.resists & (status != OPEN), FORWARD, status)
-    met, alone, late, violated = set[bytes](), set[bytes](), False, np.zeros(0, dtype=np.int64)
-    for solves in range(1, ACTIVE_SET_LIMIT + 1):
-        force, attraction_drop, extra = _solve_statuses(problem, status)
-        state = problem.start + problem.compliance @ (force + attraction_drop)
-        if problem.give is not None:
-            state = state + problem.give * force
-        if problem.extra_unknowns is not None:
-            state = state + problem.extra_unknowns.columns @ extra
-        wanted, violation = _next_statuses(problem, status, force, state)
-        violated = np.flatnonzero(wanted != status)
-        if not violated.size:
-            return ContactSolution(force, attraction_drop, status, extra, state, solves)
-        key = status.tobytes()
-        late = late or key in met
-        if key in alone:
-            break
-        changed = violation.argmax() if late else violated
-        (alone if late else met).add(key)
-        status = status.copy()
-        status[changed] = wanted[changed]
-    raise ContactNotSolved(
-        f"{violated.size} of {problem.size} nodes keep changing", np.where(wanted != status, OPEN, status)
-    )
+
+    p: Floats
+    z: Floats
+    status: Ints
+    miss: Floats
+
+    @classmethod
+    def of(cls, problem: ContactProblem, forces: Forces) -> Projected:
+        """Of these forces."""
+        state, (normal_own, shear_own) = problem.state(forces), problem.own
+        force, v, drop = (each.reshape(problem.size, -1) for each in (forces.contact, state, forces.drop))
+        p = force[:, 0] - v[:, 0] / normal_own
+        z = force[:, 1:] - v[:, 1:] / shear_own[:, None]
+        limit, size = np.where(p > 0.0, problem.limit(p), 0.0), sizes(z)
+        slip = np.where(z[:, 0] < 0.0, FORWARD, BACKWARD) if problem.dim == 2 else SLIP
+        status = np.where(p <= 0.0, OPEN, np.where((size <= limit) & problem.resists, STICK, slip))
+        part = np.where(status == STICK, 1.0, limit / np.maximum(size, np.maximum(limit, 1e-300)))
+        wanted = np.column_stack([np.maximum(p, 0.0), z * np.where(status == OPEN, 0.0, part)[:, None]])
+        held = 1e-3 * v[:, 0] / normal_own  # what would close the gap, where no node presses
+        scale = max(1e-300, *(np.abs(one).max(initial=0.0) for one in (wanted, force, drop, held)))
+        return cls(p, z, status, np.abs(wanted - force).max(axis=1) / scale)
 
 
-def solve_with_attraction(
-    problem: ContactProblem, attraction: AttractionStiffness, status: Ints
-) -> ContactSolution:
-    """Contact of a pad whose open nodes are attracted.
+def sizes(vectors: Floats) -> Floats:
+    """Lengths (k,) of vectors (k, d) in the plane of contact."""
+    return np.asarray(np.hypot(vectors[:, 0], vectors[:, 1] if vectors.shape[1] > 1 else 0.0))
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
-    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
-    one without them. The law of friction is taken by its tangents first, then by its chords: the
-    tangent of one that levels off soon grows so fast that there may be no solution.
+
+@dataclass(frozen=True, eq=False)
+class _Unknowns:
+    """Those of nodes with statuses: at `place` (u,) of the m components first the pressing forces of the
+    `closed` nodes, which the body feels as `felt` (c, 1 + d), the shear forces of those that stick, and
+    the drops of the `attracted` open ones; then the shear forces of the `turned` nodes (t,) along `aside`
+    (t, d), which keep the share `kept` (t,), the slip across counting `turns` (t,).
     """
-    laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
-    if not attraction.negative_stiffness.any() and attraction.roughness is None:
-        return _first(laws, status)
-    attracted = [replace(law, attraction=attraction) for law in laws]
-    root = np.sqrt(attraction.negative_stiffness)
-    gain = root[:, None] * problem.compliance[: problem.size, : problem.size] * root
-    if np.abs(gain).sum(axis=1).max() < STABLE:
-        return _first(attracted, status)
 
-    def scaled(most: float) -> AttractionStiffness:
-        return replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
+    place: Ints
+    closed: Ints
+    attracted: Ints
+    felt: Floats
+    turned: Ints
+    aside: Floats
+    kept: Floats
+    turns: Floats
 
-    most = _feedback(problem, attraction, status)
-    for law in (*laws, *[laws[-1]] * SCALINGS):
-        pulled = scaled(most) if most >= 1.0 else attraction
-        try:
-            found = solve_contact(replace(law, attraction=pulled), status)
-            softest = found.status
-            if _feedback(problem, pulled, softest) < 1.0:
-                return replace(found, reduced=most >= 1.0)
-        except ContactNotSolved as error:
-            softest = error.softest
-        most = max(SOFTER * most, float(law is laws[-1]), _feedback(problem, attraction, softest))
-    most = max(most, _feedback(problem, attraction, np.full(problem.size, OPEN)))
-    return replace(_first([replace(law, attraction=scaled(most)) for law in laws], status), reduced=True)
+    @classmethod
+    def of(
+        cls, problem: ContactProblem, known: _Known, status: Ints, turning: tuple[Floats, Floats] | None
+    ) -> _Unknowns:
+        n, closed, stick = problem.dim, np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
+        attracted = turned = np.zeros(0, dtype=np.int64)
+        aside = kept = turns = np.zeros(0)
+        if problem.attraction is not None:
+            attracted = np.flatnonzero((status == OPEN) & (problem.attraction.negative_stiffness > 0.0))
+        if turning is not None:
+            turned = np.flatnonzero((status == SLIP) & problem.resists)
+            aside = turning[0][turned, ::-1] * np.array([-1.0, 1.0])
+            kept, turns = 1.0 - turning[1][turned], turning[1][turned] / problem.own[1][turned]
+        held = (n * stick[:, None] + np.arange(1, n)).ravel()
+        place = np.concatenate([n * closed, held, n * attracted])
+        return cls(place, closed, attracted, (known.sheared - known.gain)[closed], turned, aside, kept, turns)
 
+    def columns(self, C: Floats) -> Floats:
+        """What they do to the rows of C (q, m)."""
+        found, n = C[:, self.place], self.felt.shape[1]
+        first = found[:, : self.closed.size]
+        if (self.felt[:, 0] != 1.0).any():
+            first *= self.felt[:, 0]
+        for a in range(1, n):
+            if (some := np.flatnonzero(self.felt[:, a])).size:
+                first[:, some] += C[:, n * self.closed[some] + a] * self.felt[some, a]
+        if not self.turned.size:
+            return found
+        across = (C[:, n * self.turned + 1 + a] * self.aside[:, a] for a in range(n - 1))
+        return np.hstack([found, sum(across)])
 
-def _first(problems: Sequence[ContactProblem], status: Ints) -> ContactSolution:
-    """The solution of the first of these problems that has one."""
-    for problem in problems[:-1]:
-        with suppress(ContactNotSolved):
-            return solve_contact(problem, status)
-    return solve_contact(problems[-1], status)
-
-
-def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
-    """`feedback` where the nodes have these statuses (k,)."""
-    stiffness, open_nodes = attraction.negative_stiffness, status == OPEN
-    gaps = np.flatnonzero(open_nodes & (stiffness > 0.0))
-    held = np.concatenate([np.flatnonzero(~open_nodes), problem.size + np.flatnonzero(status == STICK)])
-    taken: Any = 0.0 if problem.extra_unknowns is None else problem.extra_unknowns.followed
-    return feedback(problem.compliance - taken, problem.under_forces - taken, gaps, held, stiffness[gaps])
-
-
-def _attracted(problem: ContactProblem, status: Ints) -> tuple[Ints, Floats, Floats]:
-    """Open nodes that it pulls less with the gap, drops (2 k,) by status, gain per contact force (2 k,)."""
-    k, attraction = problem.size, problem.attraction
-    drop, gain = np.zeros(2 * k), np.zeros(2 * k)
-    if attraction is None:
-        return np.zeros(0, dtype=np.int64), drop, gain
-    is_open = status == OPEN
-    drop[:k] = np.where(is_open, 0.0, -attraction.gain_on_closing)
-    if attraction.roughness is not None:
-        rough, gain = attraction.roughness, attraction.roughness.gain
-        drop += np.where(np.tile(is_open, 2), rough.loss_on_opening, gain * np.tile(rough.present, 2))
-    return np.flatnonzero(is_open & (attraction.negative_stiffness > 0.0)), drop, gain
+    def rows(self, v: Floats) -> Floats:
+        """Their equations' part of gaps and slips v (m, q)."""
+        if not self.turned.size:
+            return v[self.place]
+        n, weight = self.felt.shape[1], self.turns[:, None] * self.aside
+        across = (v[n * self.turned + 1 + a] * weight[:, a, None] for a in range(n - 1))
+        return np.vstack([v[self.place], sum(across)])
 
 
-def _solve_statuses(problem: ContactProblem, status: Ints) -> tuple[Floats, Floats, Floats]:
-    """Contact forces (2 k,), drops (2 k,) and extra unknowns (p,): one dense linear system."""
-    k, C, extra, attraction = problem.size, problem.compliance, problem.extra_unknowns, problem.attraction
-    active, stick = np.flatnonzero(status != OPEN), np.flatnonzero(status == STICK)
-    against = (status == BACKWARD).astype(float) - (status == FORWARD)
-    ratio = problem.friction * against  # shear force per pressing force of slipping nodes
-    attracted, drop, gain = _attracted(problem, status)
-    gain, aside = gain[active], gain[k + active]
-    rows = np.concatenate([active, k + stick, attracted])
-    matrix, right, known = C[np.ix_(rows, rows)], -problem.start[rows], drop
-    matrix[:, : active.size] *= 1.0 - gain
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """Per node, (k, 1 + d): the force of a closed one that presses with 1, what attraction that adds
+    (`gain`), and the drops and shear forces that no unknown changes.
+    """
+
+    sheared: Floats
+    gain: Floats
+    drop: Floats
+    shear: Floats
+
+    @classmethod
+    def of(cls, problem: ContactProblem, status: Ints, along: Floats) -> _Known:
+        k, attraction, opened = problem.size, problem.attraction, (status == OPEN)[:, None]
+        along = np.where((status >= SLIP)[:, None], along, 0.0)
+        sheared = np.hstack([np.ones((k, 1)), problem.friction[:, None] * along])
+        gain, drop, shear = np.zeros_like(sheared), np.zeros_like(sheared), np.zeros_like(sheared)
+        if problem.cohesion is not None:
+            shear[:, 1:] = problem.cohesion[:, None] * along
+        if attraction is None:
+            return cls(sheared, gain, drop, shear)
+        drop[:, 0] = np.where(opened[:, 0], 0.0, -attraction.gain_on_closing)
+        if (rough := attraction.roughness) is not None:
+            gain = rough.gain
+            drop += np.where(opened, rough.loss_on_opening, gain * rough.present[:, None])
+        return cls(sheared, gain, drop, shear)
+
+
+def solve_statuses(
+    problem: ContactProblem, status: Ints, along: Floats, turning: Floats | None = None
+) -> Forces:
+    r"""Forces of nodes that have these statuses (k,), slipping ones with a shear force `along` e (k, d): one
+    dense linear system; raises `numpy.linalg.LinAlgError` where that is singular.
+
+    In three dimensions the direction of a slip turns by a shear force lam_e along e_perp,
+
+    .. math:: (1 - m)\,\lambda_e + m\,r_t\,(e_\perp \cdot s) = 0, \qquad m = \min(1, \mu p/|z|),
+
+    with m given as `turning` (k,); at the solution r drops out.
+    """
+    k, n, extra = problem.size, problem.dim, problem.extra_unknowns
+    known = _Known.of(problem, status, along)
+    unknowns = _Unknowns.of(problem, known, status, None if turning is None else (along, turning))
+    place, closed, attracted = unknowns.place, unknowns.closed, unknowns.attracted
+    rows = unknowns.rows(problem.compliance)
+    matrix, right = unknowns.columns(rows), -unknowns.rows(problem.start[:, None])[:, 0]
+    pressed, own = np.split(np.arange(place.size), [place.size - attracted.size])
+    last, steady = np.arange(place.size, right.size), (known.drop + known.shear).ravel()
+    matrix[last, last] += unknowns.kept
     if problem.give is not None:
-        pressed = np.arange(rows.size - attracted.size)
-        matrix[pressed, pressed] += problem.give[rows[pressed]]
-    sheared = ratio[active] - aside
-    if (some := np.flatnonzero(sheared)).size:
-        matrix[:, some] += C[np.ix_(rows, k + active[some])] * sheared[some]
-    if attraction is not None:
-        right -= C[rows] @ drop
-        own = np.arange(rows.size - attracted.size, rows.size)
-        matrix[own, own] -= 1.0 / attraction.negative_stiffness[attracted]
-        right[own] += attraction.reference_gap[attracted]
-    if problem.cohesion is not None:
-        shear = np.concatenate([np.zeros(k), problem.cohesion * against])
-        right -= C[rows] @ shear
-        known = drop + shear
+        matrix[pressed, pressed] += problem.give[place[pressed]]
+    if steady.any():
+        right -= rows @ steady
+    if attracted.size:
+        assert problem.attraction is not None
+        matrix[own, own] -= 1.0 / problem.attraction.negative_stiffness[attracted]
+        right[own] += problem.attraction.reference_gap[attracted]
     if extra is not None:
-        row = extra.rows[:, rows]
-        row[:, : active.size] *= 1.0 - gain
-        row[:, : active.size] += extra.rows[:, k + active] * sheared
-        matrix = np.block([[matrix, extra.columns[rows]], [row, extra.pivot]])
-        right = np.append(right, extra.right - extra.rows @ known)
-    try:
-        x = np.linalg.solve(matrix, right)
-    except np.linalg.LinAlgError as error:
-        raise ContactNotSolved(str(error), status) from error
-    force = np.zeros(2 * k)
-    contact = rows.size - attracted.size
-    force[rows[:contact]] = x[:contact]
-    drop[attracted] += x[contact : rows.size]
-    drop[np.append(active, k + active)] -= np.append(gain, aside) * np.tile(x[: active.size], 2)
-    force[k:] += ratio * force[:k]
-    if problem.cohesion is not None:
-        force[k:] += problem.cohesion * against
-    return force, drop, x[rows.size :]
+        moved, balance = unknowns.rows(extra.columns), unknowns.columns(extra.rows)
+        matrix = np.block([[matrix, moved], [balance, extra.pivot]])
+        right = np.append(right, extra.right - extra.rows @ steady)
+    x: Any = np.linalg.solve(matrix, right)
+    pressing = np.zeros((k, 1))
+    pressing[closed, 0] = x[: closed.size]
+    force, drop = known.shear + pressing * known.sheared, known.drop - pressing * known.gain
+    force.ravel()[place[closed.size : pressed.size]] = x[closed.size : pressed.size]
+    force[unknowns.turned, 1:] += x[last, None] * unknowns.aside.reshape(-1, n - 1)
+    drop[attracted, 0] += x[own]
+    return Forces(force.ravel(), drop.ravel(), x[place.size + last.size :])
 
 
-def _next_statuses(
-    problem: ContactProblem, status: Ints, force: Floats, state: Floats
-) -> tuple[Ints, Floats]:
-    """Statuses that the solution asks for, and how far each node violates its own."""
-    k, resists = problem.size, problem.resists
-    normal, shear, gap, slip = force[:k], force[k:], state[:k], state[k:]
-    own_compliance = np.maximum(np.abs(np.diagonal(problem.under_forces)[:k]), 1e-300)
-    scale = max(np.abs(normal).max(initial=0.0), np.abs(gap / own_compliance).max(initial=0.0) * 1e-3, 1e-300)
-    noise = ROUNDING * scale
-    violation = np.zeros(k)
-    wanted = status.copy()
-
-    def change(where: Floats, to: Ints, amount: Floats) -> None:
-        wanted[where] = to[where]
-        violation[where] = amount[where]
-
-    entering = np.where(resists & (slip == 0.0), STICK, np.where(slip < 0, BACKWARD, FORWARD))
-    change((status == OPEN) & (gap / own_compliance < -noise), entering, -gap / own_compliance)
-    beyond = np.abs(shear) - problem.limit(normal)
-    change((status == STICK) & (beyond > noise), np.where(shear < 0, FORWARD, BACKWARD), beyond)
-    along = np.where(status == BACKWARD, slip, -slip) / own_compliance
-    change((status >= FORWARD) & resists & (along > noise), np.full(k, STICK), along)
-    change((status >= FORWARD) & (normal < -noise), np.full(k, OPEN), -normal)
-    return wanted, violation
+def linearised(problem: ContactProblem, found: Projected) -> Forces:
+    """The forces that solve the equations linearised where the laws were projected."""
+    if problem.dim == 2:
+        against = np.subtract(found.status == BACKWARD, found.status == FORWARD, dtype=float)
+        return solve_statuses(problem, found.status, against[:, None])
+    size = np.maximum(sizes(found.z), 1e-200)
+    limit = np.where(found.status == SLIP, np.maximum(problem.limit(found.p), 0.0), 0.0)
+    return solve_statuses(problem, found.status, found.z / size[:, None], np.minimum(1.0, limit / size))

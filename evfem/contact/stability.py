@@ -27,9 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.contact.condensed import Candidates, LinearContactStep, y_before_x
+from evfem.contact.condensed import Candidates, LinearContactStep
 from evfem.contact.follower import local
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ExtraUnknowns
+from evfem.contact.signorini import FORWARD, OPEN, STICK, ExtraUnknowns
 
 #: the forces, by what they do
 SLOPES = "on the slopes of the profile the contact forces push the finger aside"
@@ -75,48 +75,44 @@ def verge(step: LinearContactStep) -> Verge:
 
 def _shear_ratio(step: LinearContactStep) -> Floats:
     """Shear force per pressing force of the candidates (c,): against the slip, 0 unless they slip."""
-    known = step.candidates
-    return known.friction * np.select([known.status == FORWARD, known.status == BACKWARD], [-1.0, 1.0], 0.0)
+    return step.candidates.friction * step.candidates.shear_direction[:, 0]
 
 
 def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
     """Compliance (f, f) of the slips and gaps of these nodes, with everything held that contact
     holds, and the bone free where a force on it is prescribed.
     """
-    known, size = step.candidates, step.candidates.status.size
+    known = step.candidates
     C, bone = _compliance(step), _bone(step)
     closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)
-    held, free = np.concatenate([closed, size + stick]), np.concatenate([size + slipping, opened])
+    held, free = np.append(2 * closed, 2 * stick + 1), np.append(2 * slipping + 1, 2 * opened)
     pushes, ratio = np.vstack([C, bone.rows])[:, held], _shear_ratio(step)[closed]
-    pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, size + closed] * ratio
-    matrix = np.block([[pushes[held], bone.columns[held]], [pushes[2 * size :], bone.pivot]])
+    pushes[:, : closed.size] += np.vstack([C, bone.rows])[:, 2 * closed + 1] * ratio
+    matrix = np.block([[pushes[held], bone.columns[held]], [pushes[len(C) :], bone.pivot]])
     moved = np.linalg.solve(matrix, np.vstack([C[np.ix_(held, free)], bone.rows[:, free]]))
     return C[np.ix_(free, free)] - np.hstack([pushes[free], bone.columns[free]]) @ moved
 
 
 def _compliance(step: LinearContactStep) -> Floats:
-    """Compliance of the candidates (2 c, 2 c) below a bone that stands still, normal then
-    tangential.
-    """
-    rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
-    C = step.body.compliance[np.ix_(rows, rows)]
+    """Compliance of the candidates (2 c, 2 c) below a bone that stands still, in their frames."""
+    axes, C = step.candidates.axes, step.body.among(np.arange(step.candidates.status.size))
     return local(axes, local(axes, C).T).T + np.diag(_yielding(step.candidates).ravel())
 
 
 def _yielding(known: Candidates) -> Floats:
-    """How the interface yields (2, c), normal then tangential. What turns with the profile, or falls along
+    """How the interface yields (c, 2), along normal and tangent. What turns with the profile, or falls along
     the way, follows the place of a slipping node, and its friction does not stretch the interface the more,
     the farther it goes; friction that falls with the speed of the slip does.
     """
-    give = np.where(known.status == OPEN, 0.0, known.interface_compliance.T)
+    give = np.where((known.status == OPEN)[:, None], 0.0, known.interface_compliance)
     falls = np.zeros(known.status.size) if known.slip_stiffness is None else known.slip_stiffness
-    give[1] = np.where((known.status >= FORWARD) & (falls >= 0.0), 0.0, give[1])
+    give[:, 1] = np.where((known.status >= FORWARD) & (falls >= 0.0), 0.0, give[:, 1])
     return give
 
 
 def _bone(step: LinearContactStep) -> ExtraUnknowns:
     """What the bone's travel under a prescribed force does, and the balance that settles it."""
-    rows, axes = y_before_x(np.arange(step.candidates.status.size)), step.candidates.axes
+    rows, axes = step.body.rows(np.arange(step.candidates.status.size)), step.candidates.axes
     if not step.unknowns:
         none = np.zeros((0, rows.size))
         return ExtraUnknowns(none.T, none, np.zeros((0, 0)), np.zeros(0))

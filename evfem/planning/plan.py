@@ -304,9 +304,7 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
     cells = "compiled" if loops() else "numpy (no C compiler was there at the installation)"
     lines = [
         f"one symmetric factorisation of the tissue, kept while it pays: {backend}; cell loops: {cells}",
-        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set"
-        if mesh.dim == 2
-        else "contact exact on the dense compliance of the candidates, Coulomb's disc, by sweeps and Newton",
+        f"contact {scene.solver.contact} on the dense compliance of the candidates, by active set",
     ]
     if mesh.dim == 3:
         lines.append(f"direct solver: {memory(mesh)}")

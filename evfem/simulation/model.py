@@ -27,7 +27,6 @@ from evfem.scene.terms import Boundary
 from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface, PenaltyInterface
-from evfem.solver.spatial import SkinInterface
 from evfem.solver.state import Limits
 from evfem.surface.friction import Coulomb
 from evfem.surface.pad import Pad, make_pad
@@ -117,10 +116,8 @@ def make_model(scene: Scene) -> Model:
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:
-    """What joins pad and surface: exact contact, in the plane or in three dimensions, or penalties."""
+    """What joins pad and surface: exact contact or penalties."""
     solver = scene.solver
-    if isinstance(pad, Skin):
-        return SkinInterface(pad, mesh.points, surface, solver.tolerance)
     if solver.contact == "exact":
         return Interface(pad, mesh.points, surface, solver.tolerance)
     interface = PenaltyInterface(pad, mesh.points, surface, solver.tolerance)

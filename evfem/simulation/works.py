@@ -89,7 +89,7 @@ from evfem.contact.charging import Charging, Flow
 from evfem.contact.signorini import BACKWARD, FORWARD, STICK
 from evfem.simulation.history import SUMS
 from evfem.simulation.model import Model
-from evfem.solver.spatial import SkinInterface, slipped
+from evfem.solver.interface import slipped
 from evfem.solver.state import State
 
 #: share of the work of the change of the internal forces that no small smooth part sets free
@@ -359,7 +359,7 @@ class Part:
     def slip_length(self) -> Floats:
         """How far the pad nodes (P,) slip, in mm."""
         interface = self.model.equilibrium.interface
-        if isinstance(interface, SkinInterface):
+        if interface.dim == 3:
             return np.asarray(np.hypot(*slipped(interface, self.old, self.new).T))
         return np.abs(self._slip)
 
@@ -405,7 +405,7 @@ class Part:
     def _with_slip(self, along: Floats) -> Floats:
         """The share (P,) of the way `along` (P, dim) that the pad nodes go the way they slip."""
         interface = self.model.equilibrium.interface
-        if isinstance(interface, SkinInterface):
+        if interface.dim == 3:
             slip = slipped(interface, self.old, self.new) / np.maximum(self.slip_length, 1e-300)[:, None]
             return np.asarray(np.sum(slip * along[:, ::2], axis=1))
         return np.sign(self._slip) * along[:, 0]

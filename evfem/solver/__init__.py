@@ -56,7 +56,7 @@ iterate, is condensed onto the nodes c that may touch and the bone (`linearisati
           S_{bc}\,\Delta u_c + S_{bb}\,\Delta b = g_b + F_b .
 
 Gaps and slips are then linear in the new forces :math:`\lambda^+`, and the laws of contact are
-solved exactly: an active set in the plane, projections and Newton's method in space [1]_ [2]_
+solved exactly by an active set, Newton's method on projections [1]_ [2]_
 (`evfem.contact.condensed`). Unknown travel of the bone, and a voltage that a friction force, a charge
 or a gap asks for (`control`), are solved along::
 

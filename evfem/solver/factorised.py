@@ -263,7 +263,7 @@ class FactorisedBody:
         known = self.interface.candidates(old, state, c, weakening, gain)
         if rough is not None:
             known = replace(known, roughness=rough.of(c))
-        return self.interface.contact_step(
+        return LinearContactStep(
             body=linearisation.tangent,
             candidates=known,
             residual=residual,

@@ -1,9 +1,10 @@
-"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys
+r"""Where pad and surface meet: gaps, slips and friction of the pad nodes, and whether a state obeys
 their laws.
 
-Contact forces of a state are along the profile's normal and tangent at the node's x. Slip is
-counted along the profile from the last accepted x, or from the jump of friction that holds the
-node (`Pins`). With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
+Contact forces of a state are along the profile's normal and tangent at the node's x, in three dimensions
+along z too. Slip is counted along the profile, :math:`r\,\Delta x` with its stretch r, from the last accepted
+x, or from the jump of friction that holds the node (`Pins`), and along z. A slipping node's shear force is
+against its slip. With penalties the interface has a compliance of its own, g + lam_n / (p_n A) = 0
 and s + (lam_t - lam_t0) / (p_t A) = 0 instead of g = 0 and s = 0.
 """
 
@@ -24,13 +25,14 @@ from evfem.common.constants import (
     SHORTEST_LENGTH,
     SMALLEST_FORCE,
 )
-from evfem.contact.condensed import Candidates, LinearContactStep
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK
+from evfem.contact.condensed import Candidates
+from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw
 from evfem.solver.slipping import Returned
 from evfem.solver.state import State
 from evfem.surface.friction import Slipping, with_core
-from evfem.surface.pad import Pad, SurfaceState, fold, surface_state
+from evfem.surface.pad import Pad, SurfaceState, surface_state
+from evfem.surface.skin import Skin
 
 
 class Pins:
@@ -115,26 +117,25 @@ def nothing_restored(voltage: float) -> None:
 
 
 class Interface:
-    """The pad of a body and the surface below it; `points` (N, 2) of the undeformed mesh.
+    """The pad of a body and the surface below it; `points` (N, dim) of the undeformed mesh.
 
-    `contact_step` is the linear step in which its contact is solved; nodes with a gap below
-    `neighbourhood` (mm) become candidates together. Where the candidates of an interface follow the
-    contact, those of the last step that are far by now are let go.
+    Nodes with a gap below `neighbourhood` (mm) become candidates together. In three dimensions, where each
+    has three unknowns in a dense compliance, the candidates follow the contact: those of the last step that
+    are far by now are let go.
     """
 
-    contact_step = LinearContactStep
-    follows = False
-    pad: Any
     _seen: tuple[tuple[Floats, SurfaceState], ...] = ()
 
-    def __init__(self, pad: Pad, points: Floats, surface: Any, tolerance: float) -> None:
+    def __init__(self, pad: Pad | Skin, points: Floats, surface: Any, tolerance: float) -> None:
         self.pad, self.surface, self.tolerance = pad, surface, tolerance
         self.points = points[pad.nodes]
-        ends = self.points[pad.edges[:, :2]]
-        self.length = float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
-        self._segments = pad.segments
-        self._down = np.diff(self.points[self._segments, 0], axis=1)[:, 0] > 0.0
-        self.pins = Pins(steps_of_friction(surface, SHORT_RAMP * self.length), pad.nodes.size)
+        self.dim = points.shape[1]
+        self.follows = self.dim == 3
+        self.length = pad.spacing(self.points)
+        self._down = pad.facing(self.points)
+        # coefficients of friction may change over x in three dimensions, but not jump
+        jumps = np.zeros((0, 3)) if self.follows else steps_of_friction(surface, SHORT_RAMP * self.length)
+        self.pins = Pins(jumps, pad.nodes.size)
         self.law: FrictionLaw | None = None
         self.restored: Restored = nothing_restored
         self._returned = Returned(pad.nodes.size)
@@ -148,7 +149,7 @@ class Interface:
         self.duration = duration
 
     def positions(self, u: Floats) -> Floats:
-        """Current positions of the pad nodes (P, 2) for displacements u (N, 2)."""
+        """Current positions of the pad nodes (P, dim) for displacements u (N, dim)."""
         return self.points + u[self.pad.nodes]
 
     def surface_at(self, state: State) -> SurfaceState:
@@ -163,7 +164,7 @@ class Interface:
         return found
 
     def resting(self, state: State) -> Floats:
-        """Current positions of the pad nodes (P, 2), the touching ones exactly on the surface:
+        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface:
         below a thin insulator the rounding of their gaps would be a force.
         """
         position = self.positions(state.u)
@@ -172,13 +173,20 @@ class Interface:
         return position
 
     def contact_forces(self, state: State) -> Floats:
-        """Contact forces on the pad nodes in the laboratory frame (P, 2)."""
+        """Contact forces on the pad nodes in the laboratory frame (P, dim)."""
         surface = self.surface_at(state)
-        normal, shear = state.contact_force.T
-        slope, force = surface.slope, np.empty_like(state.contact_force)
+        slope, force = surface.slope, state.contact_force.copy()
+        normal, shear = state.contact_force[:, :2].T
         force[:, 0], force[:, 1] = shear - slope * normal, normal + slope * shear
-        force /= surface.stretch[:, None]
+        force[:, :2] /= surface.stretch[:, None]
         return force
+
+    def slip(self, old: State, state: State) -> Floats:
+        """Slips of the pad nodes (P, dim - 1) in mm, along the profile and along z."""
+        position = self.positions(state.u)
+        moved = (position - self.positions(old.u))[:, ::2]
+        moved[:, 0] = self.surface_at(state).stretch * (position[:, 0] - self._origin(old))
+        return moved
 
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
@@ -188,9 +196,8 @@ class Interface:
         """
         position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
-        origin = self._origin(old)[c]
-        slip = surface.stretch * (position[:, 0] - origin) - compliance[:, 1] * old.contact_force[c, 1]
-        friction = self.friction(old, c, np.where(self.pins.held[c], origin, position[:, 0]))
+        slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
+        friction = self.friction(old, c, np.where(self.pins.held[c], self.pins.x[c], position[:, 0]))
         known = Candidates(
             surface=surface,
             slip=slip,
@@ -212,22 +219,27 @@ class Interface:
         interface in series. The contact problem knows the part of F that does not grow with dx; seen
         with that, slip and yielding are (1 + K C) times as large.
         """
-        slips, give = known.status >= FORWARD, known.interface_compliance[:, 1]
-        slip = np.where(slips, known.slip + give * known.force[:, 1], 0.0)
+        give, shear = known.interface_compliance[:, 1], sizes(known.force[:, 1:])
+        way = sizes(known.slip + give[:, None] * known.force[:, 1:])
+        slip = np.where(known.status >= FORWARD, way, 0.0)
         moving = self._slipping(old, state, c, known.friction, slip)
-        found = self._returned.linearised(law, moving, c, known.status, np.abs(known.force[:, 1]))
+        if self.dim == 2:
+            found = self._returned.linearised(law, moving, c, known.status, shear)
+        else:  # the direction of a slip turns: the law by the speed of the iterate
+            found = replace(moving.linearised(law), by_speed=np.zeros_like(slip))
         by_speed = np.where(known.status == OPEN, 0.0, found.by_speed)
         by_slip = by_speed / self.duration if self.duration > 0.0 else np.zeros_like(slip)
         yielding = np.maximum(by_slip, 0.0) * give
         series = 1.0 / (1.0 + yielding)
         normal = np.maximum(known.force[:, 0], 0.0)
         by_place = np.where(normal > 0.0, found.by_mu / np.where(normal > 0.0, normal, 1.0), 0.0)
+        along_normal, along_tangents = np.split(known.interface_compliance, [1], axis=1)
         return replace(
             known,
-            slip=known.slip / series,
-            interface_compliance=known.interface_compliance / np.column_stack([np.ones_like(series), series]),
+            slip=known.slip / series[:, None],
+            interface_compliance=np.hstack([along_normal, along_tangents / series[:, None]]),
             friction=series * found.slope,
-            cohesion=series * (found.offset + yielding * np.abs(known.force[:, 1])),
+            cohesion=series * (found.offset + yielding * shear),
             slip_stiffness=series * by_slip if self.duration > 0.0 else None,
             friction_slope=series * known.friction_slope * by_place,
         )
@@ -251,17 +263,25 @@ class Interface:
         pressure = np.maximum(state.contact_force[:, 0], 0.0) / share
         return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
-    def lengths(self, x: Floats) -> Floats:
-        """Tributary lengths of the pad nodes (P,) at x (P,), nowhere quite nothing, in mm."""
-        return np.maximum(self.pad.length(x), SHORTEST_LENGTH * self.length)
+    def lengths(self, position: Floats) -> Floats:
+        """What of the pad its nodes at positions (P, dim) stand for (P,): lengths in the plane, mm, areas in
+        three dimensions, mm2; nowhere quite nothing.
+        """
+        least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
+        return np.maximum(self.pad.tributary(position), least)
 
     def shares(self, state: State) -> Floats:
-        """What of the pad its nodes stand for (P,): lengths in the plane, mm."""
-        return self.lengths(self.positions(state.u)[:, 0])
+        """The same of a state."""
+        return self.lengths(self.positions(state.u))
 
     def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
-        """The same where the nodes are at x (P,), on a part of a run between two states."""
-        return self.lengths(x)
+        """The same where the nodes are at x (P,), on a part of a run between two states; in three
+        dimensions its mean over the part.
+        """
+        if self.dim == 2:
+            return self.lengths(x[:, None])
+        old, new = part
+        return 0.5 * (self.shares(old) + self.shares(new))
 
     def age(self, old: State) -> Floats:
         """How long every pad node has touched at the end of the step from `old` (P,) in s."""
@@ -291,7 +311,7 @@ class Interface:
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, 2) along normal and tangent in mm per N/mm: 0, contact
+        """Compliance of the interface (P, dim) along normal and tangent in mm per N/mm: 0, contact
         is exact.
         """
         return np.zeros_like(old.contact_force)
@@ -304,8 +324,8 @@ class Interface:
         return np.broadcast_to(np.asarray(self.surface.friction_coefficient(x), dtype=float), x.shape)
 
     def fold(self, state: State) -> float | None:
-        """x (mm) where the outline crosses itself, or None."""
-        return fold(self.positions(state.u), self._segments, state.touching, self._down)
+        """x (mm) where the pad has folded, or None."""
+        return self.pad.fold(self.positions(state.u), state.touching, self._down)
 
     def shallowest_penetration(self, state: State) -> float | None:
         """Gap (mm) of the shallowest open node that has sunk in, or None if none has."""
@@ -321,7 +341,7 @@ class Interface:
         pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
         here, slips = self.friction(old, nodes, x), state.status >= FORWARD
         yielded = np.abs(x - self.pins.x) > self.tolerance * self.length
-        beyond = np.abs(state.contact_force[:, 1]) > self._resting_limit(old, state, here) + self._weak(state)
+        beyond = sizes(state.contact_force[:, 1:]) > self._resting_limit(old, state, here) + self._weak(state)
         return self.pins.held & (pinned != here) & (slips | (yielded & beyond))
 
     def _weak(self, state: State) -> float:
@@ -335,30 +355,28 @@ class Interface:
         active = state.status != OPEN
         weak = self._weak(state)
         lower = self._resting_limit(old, state, self.pins.lower)
-        if self.pins.release(lower, state.contact_force[:, 1], weak):
+        if self.pins.release(lower, sizes(state.contact_force[:, 1:]), weak):
             return False
         if self.pins.let_go(self._strayed(old, state, position[:, 0])):
             return False
-        normal, shear = state.contact_force[active].T
-        slip = (surface.stretch * (position[:, 0] - self._origin(old)))[active]
+        normal, shear = state.contact_force[active, 0], state.contact_force[active, 1:]
         compliance = self.compliance(old)[active]
-        slip = slip + compliance[:, 1] * (shear - old.contact_force[active, 1])
+        slip = self.slip(old, state)[active] + compliance[:, 1:] * (shear - old.contact_force[active, 1:])
         x = np.where(self.pins.held, self.pins.x, position[:, 0])[active]
         status, nodes = state.status[active], np.flatnonzero(active)
-        limit = self.friction(old, nodes, x) * normal
+        way, size = sizes(slip), sizes(shear)
+        limit = (mu := self.friction(old, nodes, x)) * normal
         if self.law is not None:
-            moving = np.where(status == STICK, 0.0, slip)
-            limit = self._slipping(old, state, nodes, self.friction(old, nodes, x), moving).bound(self.law)
-        sign = np.select([status == FORWARD, status == BACKWARD], [1.0, -1.0], 0.0)
-        sticks = (status != STICK) | ((np.abs(slip) <= short) & (np.abs(shear) <= limit + weak))
-        slips = (
-            (status == STICK)
-            | ((sign * slip >= -short) & (np.abs(shear + sign * limit) <= weak))
-            | (limit == 0.0)
-        )
+            moving = np.where(status == STICK, 0.0, way)
+            limit = self._slipping(old, state, nodes, mu, moving).bound(self.law)
+        sticks = (way <= short) & (size <= limit + weak)
+        # a slip is known to `short`, and its direction accordingly
+        against = sizes(shear + (limit / np.maximum(way, 1e-300))[:, None] * slip)
+        astray = np.where(way > short, against - limit * short / np.maximum(way, short), 0.0)
+        slips = (limit == 0.0) | ((np.abs(size - limit) <= weak) & (astray <= weak))
         gap = surface.normal_gap[active] + compliance[:, 0] * normal
         closed = (np.abs(gap) <= short) & (normal >= -weak)
-        return bool((closed & sticks & slips).all())
+        return bool((closed & np.where(status == STICK, sticks, slips)).all())
 
     def _resting_limit(self, old: State, state: State, mu: Floats) -> Floats:
         """Shear forces (P,) that hold pad nodes with the coefficients mu (P,)."""
@@ -378,5 +396,10 @@ class PenaltyInterface(Interface):
         """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last
         step.
         """
-        length = np.maximum(self.pad.length(self.positions(old.u)[:, 0]), SHORTEST_LENGTH * self.length)
-        return 1.0 / np.outer(length, self.penalties)
+        return 1.0 / np.outer(self.shares(old), self.penalties)
+
+
+def slipped(interface: Interface, old: State, new: State) -> Floats:
+    """Slips (P, 2) in mm, in three dimensions, of nodes that slip at the end, or did so before they left."""
+    status = np.where(new.touching | (old.status == STICK), new.status, old.status)
+    return np.where((status >= FORWARD)[:, None], interface.slip(old, new), 0.0)

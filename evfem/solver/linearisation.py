@@ -297,15 +297,15 @@ class Linearisation:
         factor = attraction.tangent_factor(place, state.voltage, self.touching, pressing)
         lost = factor * (unpressed - pressed)
         surface = self.interface.surface_at(state)
-        along = np.stack([1.0 / surface.stretch, surface.slope / surface.stretch])
+        along = np.zeros_like(state.contact_force)
+        along[:, :2] = np.stack([np.ones_like(lost), surface.slope], axis=1) / surface.stretch[:, None]
         if attraction.direction == "normal":
-            along = np.stack([surface.stretch, np.zeros_like(surface.slope)])
-        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)
-        gain = gain * along
+            along[:, 0], along[:, 1] = surface.stretch, 0.0
+        gain = attraction.gain_on_pressing(place, state.voltage, self.touching, pressing)[:, None] * along
         # whole, it could pull a node on a slope in again by more than the steadied gain leaves to hold it
-        gain[1] = np.where(gain[0] > STABLE, 0.0, gain[1])
-        gain[0] = steadied(gain[0])
-        return Roughness(gain.ravel(), (lost * along).ravel(), pressing)
+        gain[:, 1] = np.where(gain[:, 0] > STABLE, 0.0, gain[:, 1])
+        gain[:, 0] = steadied(gain[:, 0])
+        return Roughness(gain, lost[:, None] * along, pressing)
 
     def _coupling(self, state: State) -> Floats | None:
         """The attraction's stiffness on the candidates but for the weakening with a node's own

@@ -40,7 +40,7 @@ class Pad:
     edges: Ints
     free: Any
 
-    @property
+    @cached_property
     def segments(self) -> Ints:
         """Pairs (S, 2) of neighbouring nodes along the outline, as indices into `nodes`."""
         line = self.edges[:, [0, *range(2, self.edges.shape[1]), 1]]
@@ -50,6 +50,19 @@ class Pad:
     def shares(self) -> Floats:
         """Part of an edge's projected length that each of its nodes carries."""
         return SHARES[self.edges.shape[1]]
+
+    def spacing(self, points: Floats) -> float:
+        """Median length (mm) of the edges; points (P, 2)."""
+        ends = points[self.edges[:, :2]]
+        return float(np.median(np.hypot(*(ends[:, 0] - ends[:, 1]).T)))
+
+    def facing(self, position: Floats) -> Any:
+        """Which segments (S,) look down."""
+        return np.diff(position[self.segments, 0], axis=1)[:, 0] > 0.0
+
+    def fold(self, position: Floats, touching: Any, down: Any) -> float | None:
+        """`fold` of nodes at (P, 2)."""
+        return fold(position, self.segments, touching, down)
 
     def length(self, x: Floats) -> Floats:
         """Tributary length of every node projected on x, where the outline faces down, in mm: (...,

@@ -158,6 +158,11 @@ class Skin:
         first, second = (np.einsum("kma,m->ka", flat, slope[0, :, i]) for i in (0, 1))
         return first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]
 
+    def fold(self, position: Floats, touching: Any, down: Any) -> float | None:
+        """x (mm) of a face that touches and has turned up although it faced `down` (K,); None without."""
+        turned = np.flatnonzero(down & touching[self.faces].all(axis=1) & ~self.facing(position))
+        return float(position[self.faces[turned[0]], 0].mean()) if turned.size else None
+
 
 def _cross(a: Floats, b: Floats) -> Floats:
     """a x b (...) of vectors (..., c) by their first two components."""

@@ -101,7 +101,8 @@ def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
     """The ways, each with its scene."""
-    twice = tuple(replace(motion, steps=2 * motion.steps) for motion in scene.motion)
+    each: Any
+    twice = tuple(replace(each, steps=2 * each.steps) for each in scene.motion)
     yield "twice the steps", replace(scene, motion=twice)
     strategy = scene.solver.strategy
     for share in HOLDS if own.provenance["solver"]["barriers"] else ():

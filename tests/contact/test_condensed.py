@@ -36,7 +36,7 @@ def candidates(rng, curved, **changes):
     zero = np.zeros(K)
     known = Candidates(
         surface=surface,
-        slip=np.choose(status, [0.0, 0.0, 0.2, -0.2]),
+        slip=np.choose(status, [0.0, 0.0, 0.2, -0.2])[:, None],
         force=force,
         status=status,
         friction=mu,
@@ -95,7 +95,11 @@ def laws(step, found):
     moved = found.moved.reshape(-1, 2)
     gap = known.surface.normal_gap + np.sum(normal * moved, axis=1)
     gap = gap + known.interface_compliance[:, 0] * found.force[:, 0]
-    slip = known.slip + np.sum(tangent * moved, axis=1) + known.interface_compliance[:, 1] * found.force[:, 1]
+    slip = (
+        known.slip[:, 0]
+        + np.sum(tangent * moved, axis=1)
+        + known.interface_compliance[:, 1] * found.force[:, 1]
+    )
     pressing, shear = found.force.T
     limit = known.friction * pressing
     rougher = known.friction_slope * moved[:, 0] * known.force[:, 0]
@@ -168,10 +172,10 @@ def test_friction_that_rises_with_the_slip_holds_whatever_the_own_compliance(own
     """
     step, *_ = step_of(np.random.default_rng(0), 0.0, 0.0)
     rising = replace(step.candidates, status=np.full(K, FORWARD), slip_stiffness=np.full(K, 0.5))
-    np.testing.assert_allclose(rising.follower_rate(np.full(K, own))[:, 0], -0.5, rtol=1e-14)
+    np.testing.assert_allclose(rising.follower_rate(np.full(K, own))[:, 1], -0.5, rtol=1e-14)
     falling = replace(rising, slip_stiffness=np.full(K, -0.5))
     left = 0.0 if own > 0.0 else 0.5
-    np.testing.assert_allclose(falling.follower_rate(np.full(K, own))[:, 0], left, rtol=1e-14)
+    np.testing.assert_allclose(falling.follower_rate(np.full(K, own))[:, 1], left, rtol=1e-14)
 
 
 def test_steep_friction_of_soft_tissue_balances_near_the_equilibrium():
@@ -188,7 +192,7 @@ def test_steep_friction_of_soft_tissue_balances_near_the_equilibrium():
         surface=SurfaceState(np.zeros(K), np.zeros(K), np.zeros(K)),
         status=status,
         force=1e-3 * np.stack([np.ones(K), shear], axis=1),
-        slip=np.where(status == FORWARD, 1e-3, 0.0),
+        slip=np.where(status == FORWARD, 1e-3, 0.0)[:, None],
         slip_stiffness=np.where(status == FORWARD, 1e3, 0.0),
         cohesion=np.zeros(K),
     )
@@ -256,7 +260,7 @@ def test_crests_that_push_harder_than_the_body_holds_have_no_solution(seed):
 def test_a_body_that_nothing_holds_falls_under_its_load_whatever_the_rounding(rounding):
     """Its row of the balance is zero in exact numbers; one that is held keeps its own."""
     body = CondensedTangent.make(np.eye(4), None)
-    step = SimpleNamespace(body=body, unknowns=[SimpleNamespace(axis=1)])
+    step = SimpleNamespace(body=body, unknowns=[SimpleNamespace(axis=1, condition=None)])
     free = np.ones((2, 2))
     body.schur[-1, :2] = 0.5
     (loose,), (held,) = (LinearContactStep._held(step, np.array([[own]]), free)[0] for own in (rounding, 2.0))

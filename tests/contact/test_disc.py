@@ -1,4 +1,4 @@
-"""Coulomb's disc in three dimensions: the laws themselves, closed forms, sweeps, and turned frames."""
+"""Coulomb's disc in three dimensions: the laws themselves, closed forms, and turned frames."""
 
 from dataclasses import replace
 
@@ -6,18 +6,30 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from evfem.common.constants import DISC_NEWTON
-from evfem.contact.coulomb import SLIP, DiscProblem, Forces
-from evfem.contact.disc import solve_attracted_disc, solve_disc
-from evfem.contact.signorini import OPEN, STICK, AttractionStiffness, ContactNotSolved, ExtraUnknowns
-from evfem.contact.sweeps import sweeps
+from evfem.contact.signorini import (
+    OPEN,
+    SLIP,
+    STICK,
+    AttractionStiffness,
+    ContactNotSolved,
+    ContactProblem,
+    ExtraUnknowns,
+)
+from evfem.contact.solve import solve_contact, solve_with_attraction
+
+
+def solved(problem, force):
+    """From contact forces, and sticking where they are in the cone."""
+    normal, *shear = force.reshape(-1, 3).T
+    slips = np.hypot(*shear) >= problem.friction * normal
+    return solve_contact(problem, np.where(normal > 0.0, np.where(slips, SLIP, STICK), OPEN), force)
 
 
 def random_problem(seed, k, friction):
     """A random SPD compliance with strong coupling of neighbours and of all directions."""
     rng = np.random.default_rng(seed)
     A = rng.normal(size=(3 * k, 3 * k))
-    return DiscProblem(rng.normal(size=3 * k), np.eye(3 * k) + 0.6 * A @ A.T / k, np.full(k, friction))
+    return ContactProblem(rng.normal(size=3 * k), np.eye(3 * k) + 0.6 * A @ A.T / k, np.full(k, friction))
 
 
 def half_space(n, friction, shift=(0.0, 0.0), twist=0.0, push=0.3, nu=0.45):
@@ -39,7 +51,7 @@ def half_space(n, friction, shift=(0.0, 0.0), twist=0.0, push=0.3, nu=0.45):
     start = np.zeros((k, 3))
     start[:, 0] = 0.5 * (place**2).sum(axis=1) - push
     start[:, 1:] = shift + twist * np.column_stack([-place[:, 1], place[:, 0]])
-    return DiscProblem(start.ravel(), C.reshape(3 * k, 3 * k) / (2 * np.pi), np.full(k, friction)), place
+    return ContactProblem(start.ravel(), C.reshape(3 * k, 3 * k) / (2 * np.pi), np.full(k, friction)), place
 
 
 def squeezed(seed, n, friction=0.7, pressure=100.0):
@@ -57,7 +69,7 @@ def squeezed(seed, n, friction=0.7, pressure=100.0):
     rng = np.random.default_rng(seed)
     held = np.column_stack([np.ones(k), 0.5 * friction * rng.uniform(-1, 1, (k, 2))])
     held *= pressure * spacing**2 * rng.uniform(0.5, 1.5, (k, 1))
-    return DiscProblem(-C @ held.ravel(), C, plane.friction), held
+    return ContactProblem(-C @ held.ravel(), C, plane.friction), held
 
 
 def missed(problem, found):
@@ -77,7 +89,7 @@ def missed(problem, found):
 def test_one_node_sticks_below_the_cone_and_slips_against_its_motion_beyond():
     """Unit compliance, 1 mm deep: it presses with 1 and holds slips of 0.3; (3, 4) pulls it along."""
     for slip, force, status in (([0.0, 0.29], [0.0, -0.29], STICK), ([3.0, 4.0], [-0.18, -0.24], SLIP)):
-        found = solve_disc(DiscProblem(np.array([-1.0, *slip]), np.eye(3), np.array([0.3])), np.zeros(3))
+        found = solved(ContactProblem(np.array([-1.0, *slip]), np.eye(3), np.array([0.3])), np.zeros(3))
         assert found.status.tolist() == [status]
         assert_allclose(found.force, [1.0, *force], atol=1e-12)
 
@@ -89,21 +101,19 @@ def test_cohesion_widens_the_disc_of_what_touches():
     cohesion, start = np.full(3, 0.2), np.array([-1.0, 0.0, 0.49, -1.0, 3.0, 4.0, 1.0, 3.0, 4.0])
     for friction, held in ((0.3, 0.5), (0.0, 0.2)):
         start[2] = held - 0.01
-        problem = DiscProblem(start, np.eye(9), np.full(3, friction), cohesion=cohesion)
-        found = solve_disc(problem, np.zeros(9))
+        problem = ContactProblem(start, np.eye(9), np.full(3, friction), cohesion=cohesion)
+        found = solved(problem, np.zeros(9))
         assert found.status.tolist() == [STICK, SLIP, OPEN]
         expected = [1.0, 0.0, 0.01 - held, 1.0, -0.6 * held, -0.8 * held, 0.0, 0.0, 0.0]
         assert_allclose(found.force, expected, atol=1e-12)
 
 
 def test_cohesion_of_nodes_that_feel_each_other():
-    """Newton's method ends in its first round."""
     problem, _ = half_space(10, 0.2, (0.03, -0.02), 0.2)
     problem = replace(problem, cohesion=np.full(problem.size, 2e-3))
-    found = solve_disc(problem, np.zeros(3 * problem.size))
+    found = solved(problem, np.zeros(3 * problem.size))
     force, slips = found.force.reshape(-1, 3), found.status == SLIP
     assert slips.sum() > 5
-    assert found.solves < DISC_NEWTON
     assert_allclose(np.hypot(*force[slips, 1:].T), 0.2 * force[slips, 0] + 2e-3, rtol=1e-9)
     way = found.state.reshape(-1, 3)[slips, 1:]
     along = (force[slips, 1:] * way).sum(axis=1)
@@ -115,8 +125,8 @@ def test_cohesion_of_nodes_that_feel_each_other():
 def test_random_problems_are_solved_from_nothing_and_from_anything(k, friction):
     for seed in range(8):
         problem = random_problem(seed, k, friction)
-        cold = solve_disc(problem, np.zeros(3 * k))
-        warm = solve_disc(problem, np.random.default_rng(seed + 100).normal(size=3 * k))
+        cold = solved(problem, np.zeros(3 * k))
+        warm = solved(problem, np.random.default_rng(seed + 100).normal(size=3 * k))
         for found in (cold, warm):
             assert missed(problem, found) < 1e-9
             assert_allclose(found.state, problem.start + problem.compliance @ found.force, atol=1e-12)
@@ -128,20 +138,10 @@ def test_random_problems_are_solved_from_nothing_and_from_anything(k, friction):
 @pytest.mark.parametrize("motion", [((0.02, 0.0), 0.0), ((0.05, -0.05), 0.3), ((0.0, 0.0), 0.1)])
 def test_a_sphere_that_slides_and_turns_has_stick_and_slip_in_all_directions(friction, motion):
     problem, _ = half_space(14, friction, *motion)
-    found = solve_disc(problem, np.zeros(3 * problem.size))
+    found = solved(problem, np.zeros(3 * problem.size))
     assert missed(problem, found) < 1e-10
     assert set(found.status.tolist()) > {OPEN}
     assert (found.status != OPEN).sum() > 20
-
-
-@pytest.mark.parametrize("cohesion", [None, 2e-3])
-def test_sweeps_alone_come_to_the_same_forces(cohesion):
-    problem, _ = half_space(8, 0.3, (0.03, 0.02), 0.1)
-    if cohesion is not None:
-        problem = replace(problem, cohesion=np.full(problem.size, cohesion))
-    nothing = np.zeros(3 * problem.size)
-    swept = sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 400)
-    assert_allclose(swept.contact, solve_disc(problem, nothing).force, atol=1e-9)
 
 
 @pytest.mark.parametrize("n", [4, 6])
@@ -154,17 +154,17 @@ def test_areas_that_follow_the_nodes_under_a_strong_attraction(seed, n):
     assert np.diagonal(problem.compliance)[::3].min() < 0.0
     before = np.zeros_like(held)
     before[:, 0] = np.where(np.random.default_rng(seed).uniform(size=n * n) < 0.5, held[:, 0], 0.0)
-    assert missed(problem, solve_disc(problem, before.ravel())) < 1e-11 * held.max()
+    assert missed(problem, solved(problem, before.ravel())) < 1e-11 * held.max()
 
 
-def test_statuses_at_hand_are_taken_first_where_compliances_are_negative():
+def test_statuses_at_hand_are_taken_first():
     """All nodes stuck, and stick again: one solve."""
     for seed in range(6):
         problem, held = squeezed(seed, 6)
-        assert solve_disc(problem, 0.9 * held.ravel()).solves == 1
+        assert solved(problem, 0.9 * held.ravel()).solves == 1
 
 
-def test_where_sweeps_cannot_begin_shortened_steps_follow_at_once():
+def test_from_slips_that_lead_nowhere_all_nodes_that_touched_stick_first():
     """Forces beyond what friction holds, from nodes that touched without it."""
     problem, held = squeezed(17, 5, 0.3, 30.0)
     assert np.diagonal(problem.compliance).min() < 0.0
@@ -173,9 +173,7 @@ def test_where_sweeps_cannot_begin_shortened_steps_follow_at_once():
     problem = replace(problem, start=-problem.compliance @ pushed.ravel())
     before = np.zeros_like(held)
     before[:, 0] = np.where(rng.uniform(size=25) < 0.5, held[:, 0], 0.0)
-    found = solve_disc(problem, before.ravel())
-    assert missed(problem, found) < 1e-11 * held.max()
-    assert 3 * DISC_NEWTON < found.solves < 5 * DISC_NEWTON
+    assert missed(problem, solved(problem, before.ravel())) < 1e-11 * held.max()
 
 
 def test_nodes_of_no_compliance_of_their_own_are_closed_to_rounding():
@@ -186,36 +184,23 @@ def test_nodes_of_no_compliance_of_their_own_are_closed_to_rounding():
     C, normal, held = np.eye(27), rng.normal(size=(8, 8)), np.zeros(27)
     C[:24:3, :24:3] = normal - normal.T + 1e-9 * np.eye(8)
     held[::3] = rng.uniform(1.0, 2.0, 9)
-    found = solve_disc(DiscProblem(-C @ held, C, np.full(9, 0.3)), 0.9 * held)
+    found = solved(ContactProblem(-C @ held, C, np.full(9, 0.3)), 0.9 * held)
     assert found.status.tolist() == [STICK] * 9
     assert_allclose(found.force, held, atol=1e-12)
-
-
-def test_sweeps_say_where_they_lead_nowhere():
-    """Two nodes, of which each closes the other's gap more than it opens its own; and one that comes
-    when it is pressed.
-    """
-    nothing = np.zeros(6)
-    for normal, reason in (([[1.0, -3.0], [-3.0, 1.0]], "diverge"), ([[-1.0, 0.0], [0.0, 1.0]], "give way")):
-        C = np.eye(6)
-        C[np.ix_([0, 3], [0, 3])] = normal
-        problem = DiscProblem(np.array([-1.0, 0.0, 0.0, -1.0, 0.0, 0.0]), C, np.zeros(2))
-        with pytest.raises(ContactNotSolved, match=reason):
-            sweeps(problem, Forces(nothing, nothing, np.zeros(0)), 100)
 
 
 def test_turned_tangents_turn_the_answer():
     problem, _ = half_space(8, 0.3, (0.04, 0.03), 0.2)
     c, s = np.cos(0.7), np.sin(0.7)
     R = np.kron(np.eye(problem.size), [[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-    turned = DiscProblem(R @ problem.start, R @ problem.compliance @ R.T, problem.friction)
-    found, expected = (solve_disc(one, np.zeros(3 * problem.size)) for one in (turned, problem))
+    turned = ContactProblem(R @ problem.start, R @ problem.compliance @ R.T, problem.friction)
+    found, expected = (solved(one, np.zeros(3 * problem.size)) for one in (turned, problem))
     assert_allclose(found.force, R @ expected.force, atol=1e-10)
 
 
 def test_without_friction_normal_forces_alone_act():
     problem, _ = half_space(8, 0.0, (0.04, 0.03))
-    found = solve_disc(problem, np.zeros(3 * problem.size))
+    found = solved(problem, np.zeros(3 * problem.size))
     assert not found.force.reshape(-1, 3)[:, 1:].any()
     assert missed(problem, found) < 1e-12
 
@@ -225,11 +210,11 @@ def test_a_prescribed_force_finds_the_travel_of_the_bone():
     problem, _ = half_space(10, 0.3, (0.02, 0.05), push=0.0)
     down = np.tile([-1.0, 0.0, 0.0], problem.size)[:, None]
     held = ExtraUnknowns(down, -down.T, np.full((1, 1), 1e-9), np.array([1.5]))
-    free = DiscProblem(problem.start, problem.compliance, problem.friction, held)
-    found = solve_disc(free, np.zeros(3 * problem.size))
+    free = ContactProblem(problem.start, problem.compliance, problem.friction, held)
+    found = solved(free, np.zeros(3 * problem.size))
     assert_allclose(found.force[::3].sum(), 1.5, rtol=1e-8)
-    at = DiscProblem(problem.start + down[:, 0] * found.extra[0], problem.compliance, problem.friction)
-    assert_allclose(solve_disc(at, np.zeros(3 * problem.size)).force, found.force, atol=1e-8)
+    at = ContactProblem(problem.start + down[:, 0] * found.extra[0], problem.compliance, problem.friction)
+    assert_allclose(solved(at, np.zeros(3 * problem.size)).force, found.force, atol=1e-8)
 
 
 def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
@@ -238,8 +223,8 @@ def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
     """
     start = np.array([0.5, 0.0, 0.0, -1.0, 0.0, 0.0])
     pull = AttractionStiffness(np.array([0.2, 0.2]), np.array([0.4, 0.4]), np.array([0.1, 0.3]))
-    problem = DiscProblem(start, np.eye(6), np.full(2, 0.3))
-    found = solve_attracted_disc(problem, pull, np.array([OPEN, OPEN]), np.zeros(6))
+    problem = ContactProblem(start, np.eye(6), np.full(2, 0.3))
+    found = solve_with_attraction(problem, pull, np.array([OPEN, OPEN]), np.zeros(6))
     assert found.status.tolist() == [OPEN, STICK]
     assert not found.reduced
     assert_allclose(found.state[::3], [0.525, 0.0], atol=1e-12)
@@ -247,48 +232,19 @@ def test_attraction_of_an_open_node_weakens_and_of_a_closed_one_has_gained():
     assert_allclose(found.attraction_drop[::3], [0.025, -0.3], atol=1e-12)
 
 
-def test_sweeps_let_the_attraction_of_an_open_node_weaken():
-    """Unit compliance, open at 0.5: g = 0.5 + 0.2 (g - 0.4) gives g = 0.525 and a drop of 0.025."""
-    pull = AttractionStiffness(np.array([0.2]), np.array([0.4]), np.array([0.1]))
-    problem = DiscProblem(np.array([0.5, 0.0, 0.0]), np.eye(3), np.array([0.3]), attraction=pull)
-    swept = sweeps(problem, Forces(np.zeros(3), np.zeros(3), np.zeros(0)), 1)
-    assert_allclose(swept.drop[0], 0.025, rtol=1e-12)
-    assert not swept.contact.any()
-
-
-def test_sweeps_of_a_node_whose_shear_lifts_it_off():
-    """A node that sticks: its three forces close the gap and hold both slips."""
-    compliance = np.array([[1.0, 0.3, -0.4], [0.3, 1.5, 0.1], [-0.4, 0.1, 2.0]])
-    start = np.array([-1.0, 0.2, 0.3])
-    problem = DiscProblem(start, compliance, np.array([5.0]))
-    swept = sweeps(problem, Forces(np.zeros(3), np.zeros(3), np.zeros(0)), 40)
-    assert_allclose(swept.contact, np.linalg.solve(compliance, -start), rtol=1e-9)
-
-
-def test_an_attraction_stiffer_than_the_tissue_is_scaled_down():
-    """Compliance 2 and a negative stiffness of 0.8, a feedback of 1.6: scaled to 0.9 of what is held, the
-    node moves ten times its free way of -0.02.
-    """
-    problem = DiscProblem(np.array([0.48, 0.0, 0.0]), 2.0 * np.eye(3), np.array([0.3]))
-    pull = AttractionStiffness(np.array([0.8]), np.array([0.5]), np.array([0.0]))
-    found = solve_attracted_disc(problem, pull, np.array([OPEN]), np.zeros(3))
-    assert found.reduced
-    assert_allclose(found.state[0], 0.5 - 0.02 / (1.0 - 0.9), rtol=1e-12)
-
-
 def test_an_attraction_is_scaled_for_nodes_that_open_as_well_as_for_those_that_are_held():
     """The plane's example: closed, node 0 holds its neighbour at 30 (0.1 - 0.09^2 / 0.1) = 0.57, but lets
     go; two open nodes have 30 (0.1 + 0.09) = 5.7 and move, scaled to 0.9, ten times their way of 0.02.
     """
     compliance = np.kron([[0.1, 0.09], [0.09, 0.1]], np.diag([1.0, 0.0, 0.0])) + np.diag(2 * [0.0, 0.1, 0.1])
-    problem = DiscProblem(np.array(2 * [1.02, 0.0, 0.0]), compliance, np.zeros(2))
+    problem = ContactProblem(np.array(2 * [1.02, 0.0, 0.0]), compliance, np.zeros(2))
     pull = AttractionStiffness(np.full(2, 30.0), np.ones(2), np.zeros(2))
-    found = solve_attracted_disc(problem, pull, np.array([STICK, OPEN]), np.zeros(6))
+    found = solve_with_attraction(problem, pull, np.array([STICK, OPEN]), np.zeros(6))
     assert found.reduced
     assert_allclose(found.state[::3], 1.0 + 0.02 / (1.0 - 0.9), rtol=1e-12)
 
 
 def test_what_has_no_solution_is_said_not_to_be_solved():
     """A body that gives way the more, the more it is pressed."""
-    with pytest.raises(ContactNotSolved, match="miss the laws"):
-        solve_disc(DiscProblem(np.array([-1.0, 0.0, 0.0]), -np.eye(3), np.array([0.3])), np.zeros(3))
+    with pytest.raises(ContactNotSolved, match="1 of 1 nodes keep changing"):
+        solved(ContactProblem(np.array([-1.0, 0.0, 0.0]), -np.eye(3), np.array([0.3])), np.zeros(3))

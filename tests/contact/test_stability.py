@@ -22,7 +22,7 @@ def point(status, slope=0.0, curvature=0.0, friction=0.0, friction_slope=0.0, we
     shear = {FORWARD: -friction, BACKWARD: friction}.get(status, 0.0) * LOAD
     known = Candidates(
         surface=SurfaceState(*(np.array([value]) for value in (0.0, slope, curvature))),
-        slip=np.zeros(1),
+        slip=np.zeros((1, 1)),
         force=np.array([[LOAD, shear]]) * (status != OPEN),
         status=np.array([status]),
         friction=np.array([friction]),

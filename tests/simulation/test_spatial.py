@@ -8,7 +8,7 @@ from tools.domes import DISPLAY, Dome, dome, dome_scene
 import evfem as ev
 from evfem import plotting
 from evfem.common.constants import SMALLEST_J
-from evfem.contact.coulomb import SLIP
+from evfem.contact.signorini import SLIP
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import SPATIAL, WIDTHS
 from evfem.simulation.result import load

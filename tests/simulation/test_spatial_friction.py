@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from tools.domes import dome_scene
 
 import evfem as ev
-from evfem.contact.coulomb import SLIP
+from evfem.contact.signorini import SLIP
 from evfem.simulation.run import simulate
 
 PRESS = ev.Press(indentation=0.3, steps=2, speed=1.0)

@@ -23,7 +23,6 @@ from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.simulation.works import Part
 from evfem.solver.control import GivenVoltage, Indentation, Target
-from evfem.solver.spatial import SkinInterface
 from evfem.surface.surfaces import Display, Flat, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
@@ -291,8 +290,7 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     """By hand: 3 and 4 mm of slip along x and z, on a way of 1 and 2 mm; then 2 mm back along z."""
     slips = np.array([[3.0, 4.0], [0.0, -2.0]])
     monkeypatch.setattr(works, "slipped", lambda *_: slips)
-    interface = object.__new__(SkinInterface)
-    model = SimpleNamespace(equilibrium=SimpleNamespace(interface=interface))
+    model = SimpleNamespace(equilibrium=SimpleNamespace(interface=SimpleNamespace(dim=3)))
     part = SimpleNamespace(model=model, old=None, new=None, slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
     np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)

@@ -260,7 +260,7 @@ def test_a_yielding_interface_and_a_law_of_speed_are_in_series():
     at = force(0.0)
     assert held == pytest.approx(at, abs=0.2 * abs(abs(shear) - at))
     # the motion by which the contact problem has the node at rest, and its whole force then
-    dx = -(found.slip[k] - found.interface_compliance[k, 1] * held)
+    dx = -(found.slip[k, 0] - found.interface_compliance[k, 1] * held)
     assert held + series * dx == pytest.approx(bound(slip) - steep * slip, rel=1e-4)
 
 
@@ -287,7 +287,7 @@ def test_a_node_that_sticks_again_yields_and_slips_in_series():
     # the force before is such that it sticks under these penalties
     before = np.zeros_like(old.contact_force)
     old = replace(old, age=nothing, contact_force=before)
-    before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k] / give
+    before[k, 1] = shear + interface.candidates(old, new, every, nothing, nothing).slip[k, 0] / give
     interface.law, interface.duration, steep = law, 2e-3, 0.7 / give
     interface._returned.nodes[k], interface._returned._slope[k] = True, steep * interface.duration
     found = interface.candidates(old, new, every, nothing, nothing)
@@ -298,7 +298,7 @@ def test_a_node_that_sticks_again_yields_and_slips_in_series():
     for slip, force in ((0.0, 0.9 * rest), (1e-4, rest + 1e-4 * steep)):
         dx = way * slip - give * (-way * force - shear)
         taken = -way * force + growth * dx  # what of the force is left to the contact problem
-        seen = found.slip[k] + dx + found.interface_compliance[k, 1] * taken
+        seen = found.slip[k, 0] + dx + found.interface_compliance[k, 1] * taken
         assert seen == pytest.approx(1.7 * way * slip, abs=1e-12)
         assert (abs(taken) == pytest.approx(limit, rel=1e-9)) == (slip > 0.0)
         assert abs(taken) <= limit * (1.0 + 1e-9)

@@ -125,7 +125,7 @@ def test_contact_takes_a_pinned_node_at_its_jump(table):
     c, nothing = np.arange(x.size), np.zeros(x.size)
     known = interface.candidates(old, replace(old, u=u), c, nothing, nothing)
     others = c != node
-    assert known.slip[node] == pytest.approx(x[node] + 0.25 - place, abs=1e-12)
+    assert known.slip[node, 0] == pytest.approx(x[node] + 0.25 - place, abs=1e-12)
     np.testing.assert_allclose(known.slip[others], 0.25, atol=1e-12)
     assert known.friction[node] == 0.6
     expected = interface.surface.friction_coefficient(x + 0.25)

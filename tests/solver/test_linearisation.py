@@ -291,7 +291,7 @@ def test_between_rough_faces_the_attraction_grows_with_what_presses_along_both_a
     def pull(pressed):
         x, y = model.attraction.forces(place, 60.0, linear.touching, pressed).T
         along_normal, along_tangent = y - surface.slope * x, x + surface.slope * y
-        return np.concatenate([along_normal, along_tangent]) / np.tile(surface.stretch, 2)
+        return np.stack([along_normal, along_tangent], axis=1) / surface.stretch[:, None]
 
     found, h = linear.roughness(state), 1e-6
     assert np.abs(surface.slope).max() > 0.1
@@ -335,7 +335,7 @@ def test_on_slopes_a_node_beyond_a_fold_is_not_pulled_sideways_by_what_presses_i
     state = replace(state, status=np.full_like(state.status, STICK), contact_force=force)
     place, slope = linear.interface.resting(state), linear.interface.surface_at(state).slope
     whole = linear.attraction.gain_on_pressing(place, 1200.0, linear.touching, pressing)
-    normal, tangent = linear.roughness(state).gain.reshape(2, -1)
+    normal, tangent = linear.roughness(state).gain.T
     folded = whole > STABLE * np.hypot(1.0, slope)
     assert folded.any()
     assert (slope[folded] != 0.0).all()

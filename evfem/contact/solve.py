@@ -1,0 +1,188 @@
+r"""Signorini and Coulomb on a dense compliance, solved exactly, in the plane and in three dimensions, and
+under an attraction that weakens with the gap (`evfem.contact.signorini`).
+
+Newton's method on the laws as projections, a primal-dual active set::
+
+    status <- that of the last iteration
+    repeat
+        solve the equations of `status` (one dense linear system) for forces and extra unknowns
+        wanted, z <- the status and direction that the laws make of each node's forces, gap and slip
+        if wanted = status, and slips go along z: done
+        change all violated nodes; from the first statuses on that have been met before, the worst one
+            alone; give up where these go round in a circle
+
+No constant has to be chosen. What has not converged is never used. In three dimensions it begins again from
+what the laws make of the last iteration's forces after the motion, then with the nodes that touched, and
+with all nodes, sticking: slips found by chance may drive it about, but nothing changes for nodes that stick.
+
+If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
+solution, or the wrong one; its negative stiffness is then scaled to 0.9 of the critical value
+(`solve_with_attraction`).
+
+Sources: P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
+doi:10.1016/0045-7825(91)90022-X (projections and their linearisation); S. Hueeber, G. Stadler and
+B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572,
+doi:10.1137/060671061 (primal-dual active set).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from evfem.common.arrays import Floats, Ints
+from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
+from evfem.contact.attracted import AttractionStiffness, feedback
+from evfem.contact.signorini import (
+    BACKWARD,
+    FORWARD,
+    OPEN,
+    SLIP,
+    STICK,
+    ContactNotSolved,
+    ContactProblem,
+    ContactSolution,
+    Forces,
+    Projected,
+    linearised,
+)
+
+#: how often the attraction's stiffness is scaled down, by at least which factor, before that of a pad
+#: without closed nodes decides
+SCALINGS, SOFTER = 2, 1.1
+
+
+def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = None) -> ContactSolution:
+    """Signorini and Coulomb, started from `status` (k,) and, in three dimensions, contact forces (m,); raises
+    `ContactNotSolved` where no start ends.
+    """
+    total, softest = 0, status
+    for start in _starts(problem, status, np.zeros(problem.start.size) if force is None else force):
+        forces, found, solves, softest = _newton(problem, start)
+        total += solves
+        if forces is not None:
+            return ContactSolution.of(problem, forces, found.status, total)
+    keep = int((found.miss > ROUNDING).sum())
+    raise ContactNotSolved(f"{keep} of {problem.size} nodes keep changing", softest)
+
+
+def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Projected]:
+    """What Newton's method starts from, one after the other until it ends."""
+    held, slip = problem.resists, FORWARD if problem.dim == 2 else SLIP
+    pressing, shear = np.split(force.reshape(problem.size, -1), [1], axis=1)
+    none, touched = np.zeros(problem.size), status != OPEN
+    present = np.where(touched & ~held, slip, status)
+    if problem.dim == 2 or touched.any():
+        yield Projected(pressing[:, 0], shear, present, none)
+    if problem.dim == 2:
+        return
+    count = 0 if problem.extra_unknowns is None else problem.extra_unknowns.right.size
+    yield Projected.of(problem, Forces(force, np.zeros_like(force), np.zeros(count)))
+    for closed in ([touched] if touched.any() else []) + [np.ones_like(touched)]:
+        sticking = np.where(closed, np.where(held, STICK, slip), OPEN)
+        yield Projected(none, np.zeros_like(shear), sticking, none)
+
+
+def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, Projected, int, Ints]:
+    """The forces, or None where it does not end within `ACTIVE_SET_LIMIT` solves, what the laws make of
+    them, the number of solves, and the last statuses (k,) where those that keep changing are open.
+    """
+    met, alone, late, softest = set[bytes](), set[bytes](), False, found.status
+    for solves in range(1, ACTIVE_SET_LIMIT + 1):
+        try:
+            forces = linearised(problem, found)
+        except np.linalg.LinAlgError:
+            break
+        after = _passing(found, Projected.of(problem, forces))
+        changed = after.status != found.status
+        rest = changed if problem.dim == 2 else changed | (after.status == SLIP)
+        if not np.isfinite(after.miss).all():
+            break
+        if not (after.miss[rest] > ROUNDING).any():
+            return forces, found, solves, softest
+        if changed.any():
+            key, softest = found.status.tobytes(), np.where(changed, OPEN, found.status)
+            late = late or key in met
+            if key in alone:
+                break
+            if late:
+                worst = np.where(changed, after.miss, -1.0).argmax()
+                status = found.status.copy()
+                status[worst] = after.status[worst]
+                after = replace(after, status=status)
+            (alone if late else met).add(key)
+        found = after
+    return None, found, solves, softest
+
+
+def solve_with_attraction(
+    problem: ContactProblem, attraction: AttractionStiffness, status: Ints, force: Floats | None = None
+) -> ContactSolution:
+    """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
+
+    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
+    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
+    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
+    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
+    one without them. The law of friction is taken by its tangents first, then by its chords: the
+    tangent of one that levels off soon grows so fast that there may be no solution.
+    """
+    laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
+    if not attraction.negative_stiffness.any() and attraction.roughness is None:
+        return _first(laws, status, force)
+    root, n = np.sqrt(attraction.negative_stiffness), problem.dim
+    gain = root[:, None] * problem.compliance[::n, ::n] * root
+    if np.abs(gain).sum(axis=1).max() < STABLE:
+        return _first([replace(law, attraction=attraction) for law in laws], status, force)
+
+    def scaled(most: float) -> AttractionStiffness:
+        return replace(attraction, negative_stiffness=STABLE / most * attraction.negative_stiffness)
+
+    most = _feedback(problem, attraction, status)
+    for law in (*laws, *[laws[-1]] * SCALINGS):
+        pulled = scaled(most) if most >= 1.0 else attraction
+        try:
+            found = solve_contact(replace(law, attraction=pulled), status, force)
+            softest = found.status
+            if _feedback(problem, pulled, softest) < 1.0:
+                return replace(found, reduced=most >= 1.0)
+        except ContactNotSolved as error:
+            softest = error.softest
+        most = max(SOFTER * most, float(law is laws[-1]), _feedback(problem, attraction, softest))
+    most = max(most, _feedback(problem, attraction, np.full(problem.size, OPEN)))
+    last = [replace(law, attraction=scaled(most)) for law in laws]
+    return replace(_first(last, status, force), reduced=True)
+
+
+def _first(problems: Sequence[ContactProblem], status: Ints, force: Floats | None) -> ContactSolution:
+    """The solution of the first of these problems that has one."""
+    for problem in problems[:-1]:
+        with suppress(ContactNotSolved):
+            return solve_contact(problem, status, force)
+    return solve_contact(problems[-1], status, force)
+
+
+def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: Ints) -> float:
+    """`feedback` where the nodes have these statuses (k,)."""
+    stiffness, opened, n = attraction.negative_stiffness, status == OPEN, problem.dim
+    gaps, stick = np.flatnonzero(opened & (stiffness > 0.0)), np.flatnonzero(status == STICK)
+    held = np.concatenate([n * np.flatnonzero(~opened), *(n * stick + a for a in range(1, n))])
+    taken: Any = 0.0 if problem.extra_unknowns is None else problem.extra_unknowns.followed
+    return feedback(problem.compliance - taken, problem.under_forces - taken, n * gaps, held, stiffness[gaps])
+
+
+def _passing(before: Projected, after: Projected) -> Projected:
+    """The same, in the plane with nodes that pass through slip as they close, one that sticks beside a
+    pulling shear force would seem to open, and through stick from one slip to the other.
+    """
+    if after.z.shape[1] == 2:
+        return after
+    way = after.z[:, 0]
+    enters = (before.status == OPEN) & (after.status == STICK) & (way != 0.0)
+    turns = (before.status >= SLIP) & (after.status >= SLIP) & (before.status != after.status)
+    slip = np.where(way < 0.0, FORWARD, BACKWARD)
+    return replace(after, status=np.where(enters, slip, np.where(turns, STICK, after.status)))
