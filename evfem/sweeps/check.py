@@ -101,8 +101,8 @@ def _ended(way: str, scene: Scene, own: Result) -> dict[str, Any]:
 
 def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
     """The ways, each with its scene."""
-    each: Any
-    twice = tuple(replace(each, steps=2 * each.steps) for each in scene.motion)
+
+    twice = [_in_twice(motion) for motion in scene.motion]
     yield "twice the steps", replace(scene, motion=twice)
     strategy = scene.solver.strategy
     for share in HOLDS if own.provenance["solver"]["barriers"] else ():
@@ -113,6 +113,11 @@ def _others(scene: Scene, own: Result) -> Iterator[tuple[str, Scene]]:
             yield f"sparse solver {name}", scene
     if (changed := _changed(scene)) is not None:
         yield f"an input changed by {HAIR:g}", changed
+
+
+def _in_twice(motion: Any) -> Any:
+    """The motion in twice the steps."""
+    return replace(motion, steps=2 * motion.steps)
 
 
 def _changed(scene: Scene) -> Scene | None:
