@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tools.builders import benchmark_finger, coarse_pad
+from tools.scenes import PRESS, head
 
 from evfem.contact.attraction import Attraction
 from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
@@ -158,21 +159,7 @@ def test_a_constant_gap_is_a_thicker_layer_of_air():
         np.testing.assert_allclose(rough[name], air[name], rtol=1e-7, atol=1e-9)
 
 
-TABLE = """
-version = 1
-[finger]
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "kaczmarek"
-voltage = 100.0
-insulator = "touchscreen"
-ROUGH
-[[motion]]
-kind = "press"
-force = 0.05
-"""
+TABLE = head('law = "kaczmarek"\nvoltage = 100.0\ninsulator = "touchscreen"\nROUGH') + PRESS
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from scipy.io import wavfile
+from tools.scenes import PRESS, head
 
 from evfem import cli
 from evfem.electrostatics import signalfile
@@ -375,18 +376,8 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
 
 # -- as a scene's voltage
 
-WITH_WAV = """version = 1
-[surface]
-kind = "flat"
-[electrostatics]
-law = "kaczmarek"
-voltage_file = "voltage.wav"
-insulator_thickness = 0.09
-insulator_eps_r = 3.35
-[[motion]]
-kind = "press"
-force = 0.05
-"""
+KEYS = 'law = "kaczmarek"\nvoltage_file = "voltage.wav"\ninsulator_thickness = 0.09\ninsulator_eps_r = 3.35'
+WITH_WAV = head(KEYS) + PRESS
 
 
 def test_a_voltage_file_may_be_a_wav(tmp_path):

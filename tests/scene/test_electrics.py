@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.scenes import HOVER, WAIT, head
 
 import evfem as ev
 from evfem.errors import InputError
@@ -15,19 +16,7 @@ def thin(scene):
     return scene.electrics.of_skin(0.3)
 
 
-HEAD = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "strong_troxel"
-insulator = "touchscreen"
-"""
-HOVER = '[[motion]]\nkind = "hover"\ngap = 0.5\n'
-WAIT = '[[motion]]\nkind = "wait"\nduration = 0.1\nsteps = 200\n'
+HEAD = head('law = "strong_troxel"\ninsulator = "touchscreen"')
 MEAN = 'amplitude = 100.0\nfrequency = 250.0\nskin = "gabriel_dry"\ngap_conductivity = 1e-8\n'
 
 

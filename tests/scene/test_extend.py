@@ -5,6 +5,7 @@ from typing import Annotated
 
 import numpy as np
 import pytest
+from tools.scenes import HOVER, head
 
 import evfem as ev
 from evfem.common.checks import Within, number, plain
@@ -15,23 +16,8 @@ from evfem.errors import InputError
 from evfem.scene.file import dump, loads
 from evfem.scene.schema import schema
 
-TEXT = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "softened"
-softening = 0.02
-gap_eps_r = 2.0
-insulator = "film"
-voltage = 100.0
-[[motion]]
-kind = "hover"
-gap = 0.2
-"""
+KEYS = 'law = "softened"\nsoftening = 0.02\ngap_eps_r = 2.0\ninsulator = "film"\nvoltage = 100.0'
+TEXT = head(KEYS) + HOVER
 
 
 @pytest.fixture
