@@ -4,7 +4,7 @@ in time.
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, fine_points, rectangle, solve, tangent_of
+from tools.grids import CELLS, rectangle, solve, tangent_of
 
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
@@ -152,18 +152,6 @@ def test_mass_holds_area_momentum_and_energy(element):
     spin = 7.0 * X @ np.array([[0.0, 1.0], [-1.0, 0.0]])
     polar = 3.0 * 2.0 * (3.0**2 + 2.0**2) / 3.0  # int x^2 + y^2 over 3 x 2 from its corner
     assert term.kinetic_energy(spin) == pytest.approx(0.5 * density * 49.0 * polar, rel=1e-12)
-
-
-@every_element
-def test_mass_matrices_equal_finer_quadrature(element):
-    """int N_a N_b with many more points, on straight cells."""
-    space = rectangle(element, (2, 2), jitter=0.2)
-    _, dx, value, _, nodes = fine_points(space, 12)
-    ours, theirs = np.zeros((2, space.size, space.size))
-    for e, cell in enumerate(mass_matrices(space)):
-        ours[np.ix_(space.nodes[e], space.nodes[e])] += cell
-        theirs[np.ix_(nodes[e], nodes[e])] += np.einsum("aq,bq,q->ab", value[:, e], value[:, e], dx[e])
-    np.testing.assert_allclose(ours, theirs, atol=1e-14)
 
 
 def test_free_fall():

@@ -12,11 +12,9 @@ from tools.laws import StressOnly, neo_hookean_stress
 from tools.solids import box
 
 from evfem.tensor import det
-from evfem.tissue.body import Body
-from evfem.tissue.dynamics import Dynamics, mass_matrices
+from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.splitlaw import embed
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
@@ -110,25 +108,6 @@ def test_patch(element, law, shape):
     sigma = P if law == "linear_elastic" else P @ F.T / J
     expected = np.tile(sigma[[0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]], (len(stress), 1))
     np.testing.assert_allclose(stress, expected, atol=1e-12)
-
-
-def test_patch_sees_the_centroid():
-    """ln J at the centroid, as on quads, fails: what the mean deformation gradient is for."""
-    from dataclasses import replace
-
-    import skfem
-
-    from evfem.tissue.space import _gradients, scikit_mesh, shape_functions
-
-    space = box("hex8", (3, 3, 3), jitter=0.25)
-    centre = np.full((3, 1), 0.5)
-    grid = scikit_mesh(space.mesh)
-    assert isinstance(grid, skfem.MeshHex)
-    sampled = _gradients(shape_functions("hexahedron"), grid.mapping(), centre)
-    inner = np.setdiff1d(np.arange(space.size), space.mesh.node_sets["outside"])
-    u = space.mesh.points @ STRETCH.T
-    forces = Tissue(replace(space, sampled=sampled), {"lower": LAWS["yeoh"]}).forces(u)
-    assert np.abs(forces[inner]).max() > 1e-5
 
 
 # -- derivatives ----------------------------------------------------------------------------------------
@@ -323,33 +302,7 @@ def test_strip_between_fixed_sides_is_plane_strain(element):
     assert sorted(J) == pytest.approx(sorted(tissue2.cell_stress(u2)[1]), rel=1e-10)
 
 
-@pytest.mark.parametrize("law", ["neo_hookean", "yeoh", "ogden"])
-def test_laws_of_the_plane_are_those_of_space_in_plane_strain(law):
-    """W, S and q of F in the plane are those of the same F embedded (laws of a user, whose stress
-    is split by the dimension, are so only where theta = ln J)."""
-    flat = np.array([[1.1, 0.2], [-0.1, 0.9]])
-    theta = np.array(0.03)
-    W, (S, q) = LAWS[law].split_energy(flat, theta), LAWS[law].split_stress(flat, theta)
-    in_space = LAWS[law].split_stress(embed(flat), theta)
-    assert LAWS[law].split_energy(embed(flat), theta) == pytest.approx(W, rel=1e-13)
-    np.testing.assert_allclose(in_space[0][:2, :2], S, rtol=1e-12)
-    assert in_space[1] == pytest.approx(q, rel=1e-12)
-
-
 # -- time, user's forms, the body ------------------------------------------------------------------------
-
-
-@every_element
-def test_mass_and_momentum(element):
-    """Cell masses add up to the volume; a body that moves as a whole has mass times velocity."""
-    space = box(element, (2, 2, 2), warp=bend)
-    assert mass_matrices(space).sum() == pytest.approx(space.weight.sum(), rel=1e-13)
-    term = Dynamics(space, None, np.full(len(space.nodes), 2.0))
-    velocity = np.broadcast_to([1.0, 2.0, -2.0], (space.size, 3)).copy()
-    assert term.kinetic_energy(velocity) == pytest.approx(9.0 * space.weight.sum(), rel=1e-13)
-    term.begin(np.zeros_like(velocity), np.zeros_like(velocity), 0.5)
-    forces = term.forces(0.5 * velocity)
-    np.testing.assert_allclose(forces.sum(axis=0), 4.0 * space.weight.sum() * velocity[0], rtol=1e-12)
 
 
 @every_element
@@ -395,28 +348,3 @@ def test_traction_on_a_boundary_is_force_per_area(element):
     assert np.abs(closed).max() > 1e-2
     # the area vectors of quadratic faces are of higher degree than the quadrature
     np.testing.assert_allclose(closed.sum(axis=0), 0.0, atol=1e-14 if element == "hex8" else 1e-5)
-
-
-@every_element
-def test_the_bone_translates_as_a_whole(element):
-    """Three unknowns at the end, x, y, z; a shift of the body needs no force, a pull gives one
-    reaction."""
-    space = box(element, (2, 2, 1), jitter=0.2)
-    mesh = space.mesh
-    mesh.node_sets["bone"] = mesh.node_sets["top"]
-    body = Body(space, {"lower": NeoHookean(E=0.05, nu=0.48)})
-    reduced = np.zeros(body.size)
-    reduced[body.bone] = moved = [0.02, -0.04, 0.06]
-    u = body.expand(reduced)
-    bone = u[mesh.node_sets["bone"]]
-    np.testing.assert_array_equal(bone, np.broadcast_to(moved, bone.shape))
-    assert np.flatnonzero(u[:, 1]).tolist() == mesh.node_sets["bone"].tolist()
-    forces = body.forces(u)
-    np.testing.assert_allclose(body.reduce(forces)[body.bone], forces[mesh.node_sets["bone"]].sum(axis=0))
-    K = body.pattern.full(body.tangent(u))
-    direction = np.random.default_rng(3).normal(size=body.size)
-    h = 1e-5
-    ends = [body.reduce(body.forces(body.expand(reduced + s * h * direction))) for s in (1, -1)]
-    np.testing.assert_allclose(K @ direction, (ends[0] - ends[1]) / (2 * h), atol=1e-7 * abs(K).max())
-    shift = np.tile([1.0, 2.0, 3.0], (body.size // 3, 1))
-    assert np.abs(body.forces(body.expand(shift.ravel()))).max() < 1e-14
