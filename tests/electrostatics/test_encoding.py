@@ -32,25 +32,6 @@ def test_voltage_of_the_friction_step():
     assert round(display(0.38).voltage_for_friction(0.6), 1) == 2266.5
 
 
-def test_voltage_of_the_captured_instant():
-    # notes, 3.3.2: 1911.12 V is mu_rs / mu_hd = 1.2314, that is 0.0887 over 0.072
-    ratio = 1.0 + display().attraction(1.0, 1911.12)
-    assert round(ratio, 4) == 1.2314
-    assert round(0.072 * ratio, 4) == 0.0887
-    assert display(friction=0.072).voltage_for_friction(0.072 * ratio) == pytest.approx(1911.12, rel=1e-12)
-
-
-def test_normal_force_cancels_only_with_a_linear_area_law():
-    forces = np.array([0.01, 0.2, 1.0])
-    linear = display().voltage_for_friction(0.6, forces)
-    np.testing.assert_allclose(linear, linear[0], rtol=1e-14)
-    curved = Encoding(Kaczmarek(), display().layers, AreaLaw(63.0, 0.68), 0.5).voltage_for_friction(
-        0.6, forces
-    )
-    # (19): U ~ F^((1 - m)/2)
-    np.testing.assert_allclose(curved / curved[2], forces**0.16, rtol=1e-13)
-
-
 @pytest.mark.parametrize("law", LAWS)
 def test_rendering_and_encoding_are_inverse(law):
     wanted = np.linspace(0.5, 1.4, 7)

@@ -81,25 +81,3 @@ def test_a_strip_over_a_slab(width, height, slab):
     exact = with_force(lambda h: strip(width, h, slab), height)
     solved = rigid_field([0.0, width], [height, height], slab=slab, periodic=False)
     assert numbers(solved) == pytest.approx(exact, rel=1e-5)
-
-
-def modes(gap, slab, number=24):
-    """C / eps_0 of one period 0.5 of two harmonics, neither of them even, by modes of slab and air."""
-    x = np.arange(8 * number) / (16 * number)
-    height = gap + 0.04 + 0.03 * (1.0 - np.cos(4.0 * np.pi * x)) + 0.01 * np.sin(8.0 * np.pi * x)
-    parts = [height + slab.thickness / slab.eps_r]
-    for k in 4.0 * np.pi * np.arange(1, number):
-        up = np.sinh(k * height) + np.cosh(k * height) * np.tanh(k * slab.thickness) / slab.eps_r
-        parts += [up / np.cosh(k * height.max()) * wave(k * x) for wave in (np.cos, np.sin)]
-    matrix = np.stack(parts, axis=1)
-    share = np.linalg.lstsq(matrix, np.ones(x.size), rcond=1e-15)[0]
-    assert np.abs(matrix @ share - 1.0).max() < 1e-5
-    return 0.5 * share[0]
-
-
-@pytest.mark.parametrize(("gap", "slab"), [(0.05, FILM), (0.05, GLASS), (0.4, FILM)])
-def test_a_profile_of_two_harmonics(gap, slab):
-    x = np.linspace(0.0, 0.5, 101)
-    height = gap + 0.04 + 0.03 * (1.0 - np.cos(4.0 * np.pi * x)) + 0.01 * np.sin(8.0 * np.pi * x)
-    exact = with_force(lambda g: modes(g, slab), gap)
-    assert numbers(rigid_field(x, height, slab=slab)) == pytest.approx(exact, rel=1e-5)

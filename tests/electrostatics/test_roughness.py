@@ -8,7 +8,7 @@ from tools.builders import benchmark_finger, coarse_pad
 from tools.scenes import PRESS, head
 
 from evfem.contact.attraction import Attraction
-from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.laws import TOUCHSCREEN, Layer, Layers, StrongTroxel
 from evfem.electrostatics.roughness import (
     ConstantRoughness,
     ExponentialRoughness,
@@ -85,17 +85,6 @@ def row_of_nodes(rough):
     pad = Pad(nodes, np.column_stack([nodes[:-1], nodes[1:]]), np.ones(4, dtype=bool))
     position = np.column_stack([0.5 * nodes, [0.0, 0.0, 0.0, 0.003]])
     return Attraction(StrongTroxel(), Layers.of(TOUCHSCREEN), pad, Flat(y=0.0), roughness=rough), position
-
-
-def test_the_law_sees_the_gap_and_the_separation_of_each_nodes_own_pressure():
-    attraction, position = row_of_nodes(POWER)
-    pressing = np.array([0.0, 0.002, 0.01, 0.0])
-    length = np.array([0.25, 0.5, 0.5, 0.25])
-    apart = position[:, 1] + POWER.separation(pressing / length)
-    expected = -StrongTroxel().traction(apart, 100.0, Layers.of(TOUCHSCREEN)) * length
-    found = attraction.forces(position, 100.0, np.ones(4, dtype=bool), pressing)
-    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-14)
-    assert not found[:, 0].any()
 
 
 def test_the_gain_on_pressing_is_the_derivative_of_the_force():
@@ -199,11 +188,3 @@ def test_mistakes_in_a_file_are_one_sentence(text, said):
     with pytest.raises(InputError) as caught:
         loads(TABLE.replace("ROUGH", text))
     assert said in str(caught.value)
-
-
-def test_the_force_of_kaczmareks_law_falls_with_roughness():
-    """Strong-Troxel falls more: its pressure goes with the square of the short length."""
-    layers = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
-    share = [law.traction(0.001, 100.0, layers) / law.traction(0.0, 100.0, layers)
-             for law in (StrongTroxel(), Kaczmarek())]  # fmt: skip
-    assert share[0] < share[1] < 1.0
