@@ -138,11 +138,6 @@ def test_the_plan_warns_of_a_mean_that_the_tissue_would_follow():
     assert "swings" not in str(ev.plan(replace(slow, drive=ev.Drive(500.0))).warning)
 
 
-def test_a_resolved_drive_is_told_to_take_short_steps():
-    scene = loads(HEAD + MEAN + 'drive = "resolved"\n' + HOVER + WAIT)
-    assert "8 steps in a period of the voltage (250 Hz)" in str(ev.plan(scene).warning)
-
-
 def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():
     """A sine with a bias: no steps in time, the fundamental for the dielectrics, and both swings."""
     text = HEAD + 'signal = {kind = "sine", frequency = 75.0, amplitude = 100.0, bias = 60.0}\n'

@@ -60,11 +60,6 @@ def test_samples_come_from_files(tmp_path):
     assert loads(dump(scene_of(table, tmp_path))).voltage.voltage.tolist() == [0.0, 120.0, -120.0]
 
 
-def test_voltage_files_over_the_position_are_read_as_ever(tmp_path):
-    ev.VoltageProfile([0.0, 1.0], [5.0, 6.0]).to_csv(tmp_path / "voltage.csv")
-    assert isinstance(scene_of('voltage_file = "voltage.csv"\n', tmp_path).voltage, ev.VoltageProfile)
-
-
 @pytest.mark.parametrize(
     ("signal", "old", "new", "key"),
     [
@@ -146,18 +141,3 @@ def test_steps_that_cannot_follow_a_signal_are_warned_of():
     assert warned(ev.Sine(50.0, 10.0), slide, ev.Wait(0.1, steps=99)).startswith("motion 2 has")
     assert warned(ev.Sine(51.0, 10.0), slide).startswith("motion 1 has 19.6 steps")
     assert warned(ev.Sine(51.0, 10.0), ev.Wait(1e-4), ev.Slide(1.0, steps=1)) == ""
-
-
-def test_a_carrier_is_told_of_its_mean():
-    envelope = ev.Sine(50.0, 5.0, 10.0)
-    wait = ev.Wait(0.1, steps=100)
-    assert warned(ev.Carrier(10_000.0, envelope), wait).endswith(
-        "20100 steps in all, or resolved=False for the mean over the carrier's cycles"
-    )
-    assert warned(ev.Carrier(10_000.0, envelope, resolved=False), wait) == ""
-
-
-def test_the_plan_names_the_signal():
-    text = " ".join(str(plan(scene_of(SINE))).split())
-    assert "monolithic coupling, voltage over time to 50 Hz" in text
-    assert "- time quasi-static, the clock sets the voltage alone" in text
