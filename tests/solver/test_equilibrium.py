@@ -19,7 +19,7 @@ from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
-from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
 GENTLE = Sinusoid(friction=0.3, terms=[[0.02, 2.0, 0.4]], insulator=INSULATOR)
@@ -166,34 +166,6 @@ def test_unloading_leaves_nothing_behind(friction):
     assert abs(result.stored_energy[-1]) < 1e-12
     assert (result.contact_width[-1], result.real_contact_width[-1]) == (0.0, 0.0)
     assert result.min_gap[-1] == pytest.approx(0.05, rel=1e-6)
-
-
-TIP = finger(block(2, 2, width=2.0, height=2.0, sag=0.7), E=10.0, nu=0.3)
-HILLS = [
-    Sinusoid(friction=0.25, terms=[[0.05, 4.0, 0.3]]),
-    Profile(np.linspace(-3.0, 3.0, 9), 0.04 * np.array([0, 1, 0, 1.2, 0.3, 1.5, 0, 1, 0]), friction=0.25),
-]
-
-
-@pytest.mark.filterwarnings("ignore:the surface is sharper")  # only one node touches
-@pytest.mark.parametrize("distance", [1.5, -1.5])
-@pytest.mark.parametrize("surface", HILLS, ids=["sinusoid", "profile"])
-def test_a_point_on_a_profile_has_the_exact_apparent_friction(surface, distance):
-    # balance of a point that slides up a slope y': F_t / F_n = (mu + y') / (1 - mu y'), mu -> -mu backwards
-    result = run(surface, Press(indentation=0.15, steps=1), Slide(distance, steps=12), body=TIP)
-    mu = 0.25 * np.sign(distance)
-    slopes = []
-    for row, frame in enumerate(result.frames[1:], start=1):
-        touching = np.flatnonzero(frame.contact_status)
-        assert touching.size == 1
-        x = result.mesh.points[touching, 0] + frame.displacement[touching, 0]
-        slope = surface.slope(x)[0]
-        ratio = result.tangential_force[row] / result.normal_force[row]
-        if frame.contact_status[touching] == 2:
-            assert ratio == pytest.approx((mu + slope) / (1.0 - mu * slope), abs=1e-7)
-            slopes.append(slope)
-    assert len(slopes) > 8
-    assert np.ptp(slopes) > 0.1
 
 
 def test_frozen_attraction_is_used_as_given():
