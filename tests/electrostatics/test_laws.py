@@ -52,16 +52,6 @@ def test_attraction_is_the_derivative_of_the_potential(law):
         np.testing.assert_allclose(sum(pairs) / (60 * h), law.traction(GAPS, 700.0, layers), rtol=1e-8)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_hand_written_derivative_is_the_complex_step(law):
-    class Bare:
-        traction = staticmethod(law.traction)
-
-    by_hand = traction_derivative(law, GAPS, 1e3, TABLE_2)
-    np.testing.assert_allclose(by_hand, traction_derivative(Bare(), GAPS, 1e3, TABLE_2), rtol=1e-14)
-    assert (by_hand < 0).all()
-
-
 def test_potential_is_smooth_where_thickness_meets_reduced_thickness():
     # series and logarithm meet at D - s = 1e-3 (g + s); ln(1 + r) / r in 40 decimal digits
     reference = {

@@ -40,20 +40,6 @@ def test_every_kind_of_mesh_survives_a_file(kind, ending, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
-def test_foreign_gmsh_file_with_numbers_that_repeat_per_dimension(tmp_path):
-    # gmsh numbers physical lines and surfaces apart: number 1 is a line here and a surface there
-    path = tmp_path / "foreign.msh"
-    path.write_text(
-        '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 "pad"\n1 2 "bone"\n2 1 "soft tissue"\n'
-        "$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 2 0 0\n3 2 2 0\n4 0 2 0\n$EndNodes\n"
-        "$Elements\n3\n1 1 2 1 1 1 2\n2 1 2 2 3 3 4\n3 3 2 1 1 1 2 3 4\n$EndElements\n"
-    )
-    mesh = meshfile.read(path)
-    assert mesh.region_names == {"soft tissue": 1}
-    assert sorted(mesh.node_sets) == ["bone", "pad"]
-    assert [mesh.node_sets[name].tolist() for name in ("pad", "bone")] == [[0, 1], [2, 3]]
-
-
 def test_version_four_gmsh_file_is_read(tmp_path):
     mesh = half_finger()
     meshfile.write(mesh, tmp_path / "two.msh")
@@ -94,15 +80,6 @@ def version_four(file, names):
     text += ["$Nodes", f"1 {len(nodes)} 1 {len(nodes)}", f"2 1 0 {len(nodes)}", *numbers, *nodes, "$EndNodes"]
     text += ["$Elements", f"4 {count} 1 {count}", *blocks, "$EndElements", ""]
     return "\n".join(text)
-
-
-def test_lines_and_vertices_only_carry_names(tmp_path):
-    parts = raw()
-    region = parts["cell_data"]["region"][0]
-    parts["cells"] = [("line", [[0, 1], [1, 2]]), *parts["cells"], ("vertex", [[4]])]
-    parts["cell_data"] = {"region": [np.zeros(2, int), region, np.zeros(1, int)]}
-    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
-    same(meshfile.read(tmp_path / "mesh.vtu", REGIONS), half_finger())
 
 
 def test_clockwise_meshes_are_turned_round(tmp_path):

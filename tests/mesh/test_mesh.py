@@ -46,17 +46,6 @@ def test_outer_edges_run_around_the_body_with_the_body_on_the_left():
         assert 0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]) == pytest.approx(12.0)
 
 
-def test_raised_mesh_has_straight_edges_and_middles():
-    mesh, old = strip(order=2), strip()
-    corner = mesh.points[mesh.cells[:, :4]]
-    assert mesh.kind == "quad9"
-    assert len(mesh.points) == 5 * 9  # (2 * 4 + 1) x (2 * 2 + 1) nodes, none twice
-    np.testing.assert_allclose(mesh.points[mesh.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1)))
-    np.testing.assert_allclose(mesh.points[mesh.cells[:, 8]], corner.mean(axis=1))
-    np.testing.assert_array_equal(mesh.points[: len(old.points)], old.points)
-    assert raised(mesh) is mesh
-
-
 def test_new_nodes_join_the_sets_of_their_outer_edge_only():
     mesh = strip(order=2)
     np.testing.assert_allclose(mesh.points[mesh.node_sets["top"], 1], 3.0)

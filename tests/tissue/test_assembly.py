@@ -2,8 +2,6 @@
 fast ways.
 """
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from tools.grids import CELLS, rectangle, tangent_of
@@ -11,18 +9,9 @@ from tools.grids import CELLS, rectangle, tangent_of
 import evfem as ev
 from evfem.errors import InputError
 from evfem.tissue.dynamics import Dynamics
-from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
 from evfem.tissue.userforms import make_term, tried
-from evfem.tissue.weakform import Tissue
 
 MU, LMBDA = 0.7, 1.9
-NEO_HOOKEAN = NeoHookean(E=MU * (3 * LMBDA + 2 * MU) / (LMBDA + MU), nu=LMBDA / (2 * (LMBDA + MU)))
-LAWS = {
-    "neo_hookean": NEO_HOOKEAN,
-    "yeoh": Yeoh(c1=0.35, c2=0.1, c3=0.02, nu=0.4),
-    "ogden": Ogden(mu=[0.9, -0.2], alpha=[2.5, -1.5], bulk=2.0),
-    "linear_elastic": LinearElastic(E=0.8, nu=0.3),
-}
 every_element = pytest.mark.parametrize("element", list(CELLS))
 
 
@@ -37,25 +26,7 @@ def wavy(points, size=0.08):
     return size * np.column_stack([np.sin(2 * x + y) + y * y, np.cos(3 * x - y) + x * y])
 
 
-def region(element, law):
-    """The integral that a tissue of one law is, on bent cells, and displacements."""
-    space = rectangle(element, (3, 2), warp=bend)
-    tissue = Tissue(space, {"lower": law})
-    tissue.loops = None
-    ((_, integral),) = tissue.regions
-    return tissue, integral, wavy(space.mesh.points)
-
-
 # -- fast ways and forms ---------------------------------------------------------------------------------
-
-
-@every_element
-@pytest.mark.parametrize("law", list(LAWS))
-def test_moduli_written_by_hand_are_the_complex_steps_of_the_form(element, law):
-    _, integral, u = region(element, LAWS[law])
-    assert integral.moduli is not None
-    stepped = replace(integral, moduli=None).cell_tangents(u)
-    np.testing.assert_allclose(integral.cell_tangents(u), stepped, atol=1e-12 * np.abs(stepped).max())
 
 
 @every_element
@@ -76,27 +47,6 @@ def test_compiled_loops_are_the_form_of_the_viscosity(element):
 
 
 # -- theta in a user's form ------------------------------------------------------------------------------
-
-
-@ev.form
-def tissue_by_theta(u, v, w):
-    F = ev.grad(u) + np.eye(2)[:, :, None, None]
-    return w.law.mu * ev.ddot(F, ev.grad(v)) + (w.law.lmbda * u.theta - w.law.mu) * v.theta
-
-
-@every_element
-def test_default_tissue_as_a_users_form_over_regions(element):
-    """theta is the element's own measure, w.law the region's law: forces and tangents of two
-    tissues.
-    """
-    space = rectangle(element, (4, 4), warp=bend, split=lambda x, y: x + y > 1.0)
-    laws = {"lower": NEO_HOOKEAN, "upper": NeoHookean(E=3.0, nu=0.49)}
-    u = wavy(space.mesh.points)
-    tissue = Tissue(space, laws)
-    terms = [make_term(space, tissue_by_theta, name, False, law) for name, law in laws.items()]
-    K = tangent_of(space, u, tissue).toarray()
-    np.testing.assert_allclose(sum(term.forces(u) for term in terms), tissue.forces(u), atol=1e-14)
-    np.testing.assert_allclose(tangent_of(space, u, *terms).toarray(), K, atol=1e-12 * np.abs(K).max())
 
 
 def test_theta_is_refused_where_it_has_no_meaning():
@@ -161,19 +111,6 @@ def test_a_form_that_no_run_could_use_is_refused_with_one_sentence(kind):
         tried(rectangle("q1", (3, 2), warp=bend).mesh, ev.form(integrand), "lower", boundary=False)
     assert str(caught.value).startswith("form <lambda>: given ")
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    "integrand",
-    [
-        lambda u, v, w: 0.0 * v[0],
-        lambda u, v, w: 10.0 * ev.positive_part(-u[1]) * v[1],
-        lambda u, v, w: 1e-9 * ev.ddot(ev.grad(u), ev.grad(v)),
-        lambda u, v, w: (1.0 + ev.dot(u, u)) ** 2 * ev.dot(u, v) + 1e6 * u.theta * v.theta,
-    ],
-)
-def test_a_form_without_mistakes_is_taken(integrand):
-    tried(rectangle("q1", (3, 2), warp=bend).mesh, ev.form(integrand), "lower", boundary=False)
 
 
 def test_trial_sees_places_and_outward_normals():

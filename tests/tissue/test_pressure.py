@@ -68,13 +68,6 @@ def mixed_forces(tissue, u, q):
     return tissue.forces(u) - tissue.pressure_forces(u, tissue.pressure(u) - q)
 
 
-def theta(space, u):
-    """Pi ln J from the arrays of the space alone."""
-    F = np.eye(2) + np.einsum("eni,esnj->esij", u[space.nodes], space.sample)
-    log_J = np.log(np.linalg.det(F))
-    return log_J if space.projection is None else np.einsum("eqs,es->eq", space.projection, log_J)
-
-
 @every_law
 @every_element
 def test_the_change_of_the_pressure_is_its_derivative(element, law):
@@ -82,14 +75,6 @@ def test_the_change_of_the_pressure_is_its_derivative(element, law):
     expected = slope(tissue.pressure, u, du)
     found = tissue.pressure_change(u, du)
     np.testing.assert_allclose(found, expected, atol=3e-8 * np.abs(expected).max())
-
-
-@every_element
-def test_forces_of_a_pressure_are_those_of_its_work(element):
-    """The sum of w q theta(u), differenced."""
-    tissue, u, du, q = deformed(element, "neo_hookean")
-    work = slope(lambda u: np.sum(tissue.space.weight * q * theta(tissue.space, u)), u, du)
-    assert np.sum(tissue.pressure_forces(u, q) * du) == pytest.approx(work, rel=1e-7)
 
 
 @every_law

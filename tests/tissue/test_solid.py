@@ -134,24 +134,6 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
     assert np.abs(cells - np.swapaxes(cells, 1, 2)).max() < 1e-9 * np.abs(cells).max()
 
 
-@every_element
-def test_rigid_motion_costs_nothing(element):
-    """A turn by 50 degrees about an oblique axis and a shift: no energy, no forces."""
-    space = box(element, (2, 2, 1), warp=bend)
-    axis, angle = np.array([1.0, -2.0, 2.0]) / 3.0, 0.87
-    K = np.cross(np.eye(3), -axis)
-    R = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-15)
-    u = space.mesh.points @ (R - np.eye(3)).T + [0.3, -2.0, 1.0]
-    for law in ("neo_hookean", "yeoh", "ogden", "psi_only", "P_only", "form"):
-        tissue = Tissue(space, {"lower": LAWS[law]})
-        assert np.abs(tissue.forces(u)).max() < 1e-13
-        assert abs(tissue.energy(u)) < 1e-13
-        stress, J = tissue.cell_stress(u)
-        assert np.abs(stress).max() < 1e-13
-        np.testing.assert_allclose(J, 1.0, rtol=1e-13)
-
-
 # -- compiled loops --------------------------------------------------------------------------------------
 
 
@@ -303,28 +285,6 @@ def test_strip_between_fixed_sides_is_plane_strain(element):
 
 
 # -- time, user's forms, the body ------------------------------------------------------------------------
-
-
-@every_element
-def test_viscosity_dissipates_and_does_not_resist_rotation(element):
-    """Tangent by differences; power of the viscous force at rest's metric; a turn feels nothing."""
-    space = box(element, (2, 1, 1), warp=bend)
-    term = Dynamics(space, np.linspace(0.1, 0.3, len(space.nodes)), None)
-    start = wavy(space.mesh.points)
-    term.begin(start, 0 * start, 2e-3)
-    R = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-    turned = (space.mesh.points + start) @ R.T - space.mesh.points
-    assert np.abs(term.forces(turned)).max() < 1e-11
-    u = wavy(space.mesh.points, 0.08)
-    direction = np.random.default_rng(3).normal(size=u.shape)
-    h = 1e-4
-    ends = [term.forces(u + s * h * direction) for s in (1, -1, 2, -2)]
-    slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
-    K = tangent_of(space, u, term)
-    np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=1e-8 * abs(K).max())
-    small = start + 1e-6 * (u - start)
-    power = np.sum(term.forces(small) * (small - start))
-    assert term.dissipation(small) == pytest.approx(power, rel=1e-4)
 
 
 @every_element
