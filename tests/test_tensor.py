@@ -1,6 +1,4 @@
-"""Pointwise algebra against numpy.linalg on single points, and the complex step against known
-derivatives.
-"""
+"""Powers of symmetric tensors: their derivatives where eigenvalues meet, and the plane beside space."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""Checkpoints: every part of what a run takes with it comes back, and what does not fit is
-refused.
-"""
+"""Checkpoints: what does not fit is refused by its name."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Scenes with a voltage: couplings, hovering, ramps and profiles, force laws in whole runs."""
+"""Scenes with a voltage: couplings, hovering, ramps and profiles."""
 
 import numpy as np
 import pytest

@@ -1,6 +1,4 @@
-"""Equilibrium steps: balance, tangent, cut and failed steps, force control, exact statements on
-profiles.
-"""
+"""Equilibrium steps: balance, tangent, cut and failed steps, force control."""
 
 import re
 from dataclasses import replace

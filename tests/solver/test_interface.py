@@ -1,6 +1,4 @@
-"""Where pad and surface meet: touching nodes rest on the surface, forces follow its normal and
-tangent.
-"""
+"""Jumps of friction where pad and surface meet: who keeps crossing one is pinned to its rougher side."""
 
 from dataclasses import replace
 

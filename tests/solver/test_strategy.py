@@ -1,4 +1,4 @@
-"""How hard steps are tried: limits of the numbers, and what each of them changes."""
+"""How hard steps are tried: parts, releases and rounds, and what a number of the strategy changes."""
 
 from dataclasses import dataclass, field
 from types import SimpleNamespace
