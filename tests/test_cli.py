@@ -11,8 +11,6 @@ import time
 from contextlib import suppress
 from xml.etree import ElementTree
 
-import meshio
-import numpy as np
 import pytest
 from tools.commands import called, process_of, run_process
 from tools.fakes import SQUARE_SCENE
@@ -120,29 +118,6 @@ def test_a_load_that_drifts_is_told_after_the_run(place):
     assert (
         f'the load drifted by {drift:.1%} at a held indentation; hold = "force" keeps it' in out.splitlines()
     )
-
-
-def test_the_summary_agrees_with_the_history(finished):
-    results = finished[0] / "square-out"
-    summary = json.loads((results / "summary.json").read_text())
-    last = history(results)[-1]
-    assert summary["complete"] is True
-    assert all(float(last[name]) == summary["last"][name] for name in COLUMNS if name != "motion")
-    assert summary["provenance"]["versions"]["evfem"] == evfem.__version__
-    assert (
-        "[[motion]]" in summary["provenance"]["parameters"]
-        or "motion = " in summary["provenance"]["parameters"]
-    )
-    assert len(summary["provenance"]["mesh"]["digest"]) == 64
-
-
-def test_the_fields_are_those_of_the_history(finished):
-    results = finished[0] / "square-out"
-    read = meshio.read(results / "fields_00005.vtu")
-    assert set(read.point_data) >= {"displacement", "gap", "contact_pressure", "contact_status"}
-    bone = square_mesh("quad9").node_sets["bone"]
-    moved = read.point_data["displacement"][bone]
-    np.testing.assert_allclose(moved, np.tile([0.5, -0.2, 0.0], (len(bone), 1)), atol=1e-12)
 
 
 def contents(folder):
@@ -471,23 +446,6 @@ def test_a_folder_that_cannot_be_made_is_exit_status_4(place):
     assert "Traceback" not in err
 
 
-def test_a_disk_that_fills_up_is_exit_status_4_and_what_was_written_is_whole(place):
-    code = (
-        "import resource, sys\n"
-        f"sys.path[:0] = {sys.path!r}\n"
-        "from evfem.cli import main\n"
-        "resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))\n"
-        "sys.exit(main(['run', 'square.toml', '--no-plots', '--no-fields']))"
-    )
-    (place / "square.toml").write_text(MANY_STEPS)
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=place, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 4
-    assert "File too large" in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-
-
 def interrupted(place, number):
     """Start the long scene, send a signal after some steps; returns exit status and standard
     error.
@@ -555,28 +513,6 @@ def test_an_interruption_that_is_dropped_ends_the_run_with_the_step(place, monke
     assert status == 130
     assert "3 steps are in" in err
     assert len(history(place / "square-out")) == 3
-
-
-def test_a_checkpoint_of_another_scene_is_refused(place):
-    assert called(place, "run", "square.toml", "--no-fields", "--no-plots")[0] == 0
-    before = {name: (place / "square-out" / name).read_bytes() for name in files(place / "square-out")}
-    (place / "square.toml").write_text(SCENE.replace("friction = 0.2", "friction = 0.25"))
-    status, _, err = called(place, "run", "square.toml", "--resume")
-    assert status == 2
-    assert err == (
-        "evfem: --resume: given square-out, a run of another scene; allowed: the run of this scene\n"
-    )
-    assert {
-        name: (place / "square-out" / name).read_bytes() for name in files(place / "square-out")
-    } == before
-
-
-def test_plan_says_what_a_scene_needs_and_computes_nothing(place):
-    before = files(place)
-    status, out, err = run_process(place, "plan", "square.toml")
-    assert (status, err) == (0, "")
-    assert "friction" in out
-    assert files(place) == before
 
 
 @pytest.mark.parametrize(("element", "kind"), [("q2p1", "quad9"), ("q1", "quad")])

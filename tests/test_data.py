@@ -32,15 +32,6 @@ def test_participants_reproduce_the_printed_statistics():
     assert round(means[2] * np.cos(np.radians(30.0)), 2) == 22.56
 
 
-def test_values_by_symbol():
-    table = data.load("table2")
-    assert table.value("eps_i") == 3.35
-    assert table.value("E_hd") == 0.034
-    assert data.load("area_laws").value("ridge", "m") == 0.68
-    assert data.load("meyer").value("F_e") == 0.25
-    assert data.load("thresholds").value("d_i3") == pytest.approx(0.0254)
-
-
 def test_unknown_names_list_what_exists():
     with pytest.raises(InputError, match="table1, table2"):
         data.load("table3")

@@ -6,7 +6,6 @@ import errno
 import json
 import os
 import shutil
-import subprocess
 import time
 from pathlib import Path
 from random import Random
@@ -14,11 +13,9 @@ from random import Random
 import numpy as np
 import pytest
 from tools import kills
-from tools.commands import called, process_of, run_process
+from tools.commands import called, run_process
 
-import evfem
-from evfem import export, runfolder
-from evfem.common import storage
+from evfem import runfolder
 from evfem.common.storage import load_arrays, save_arrays
 from evfem.scene.file import load
 from evfem.simulation.checkpoint import CHECKPOINT_FORMAT
@@ -185,14 +182,6 @@ def test_a_checkpoint_that_cannot_be_used_is_one_sentence_and_nothing_is_touched
     assert contents(place / "stopped") == before
 
 
-def test_a_whole_checkpoint_is_used(place):
-    status, error = run(place, "--resume")
-    assert status == 0, error
-    assert kills.broken(place / "stopped") == []
-    assert len(kills.history(place / "stopped")["step"]) == 20
-    assert len(list((place / "stopped").glob("fields_*.vtu"))) == 20
-
-
 @pytest.mark.parametrize("more", [(), ("--resume",)])
 @pytest.mark.parametrize("written", [[], ["history.csv"], ["history.csv", "fields_00001.vtu"]])
 def test_a_run_killed_before_its_first_step_was_stored_begins_again(place, written, more):
@@ -219,19 +208,6 @@ def test_a_history_without_its_checkpoint_is_not_overwritten(place):
         assert status == 2
         assert words in error
         assert contents(place / "stopped") == before
-
-
-def test_a_run_killed_after_its_last_step_is_not_yet_complete(place):
-    """What comes at the end, summary and picture, is written by a run that goes on."""
-    assert run(place, "--resume")[0] == 0
-    summary = (place / "stopped" / "summary.json").read_text()
-    (place / "stopped" / "summary.json").write_text(summary.replace('"complete": true', '"complete": false'))
-    status, error = run(place)
-    assert status == 2
-    assert "where 20 of 20 steps of this scene are done; allowed: --resume to go on there" in error
-    assert run(place, "--resume")[0] == 0
-    assert '"complete": true' in (place / "stopped" / "summary.json").read_text()
-    assert "is complete" in run(place)[1]
 
 
 def test_what_a_killed_run_was_writing_is_removed_by_the_next_and_nothing_else(place):
@@ -301,38 +277,3 @@ def test_a_disk_that_is_full_at_any_write_is_exit_status_4_and_the_run_goes_on_l
     assert run(place, "--resume")[0] == 0
     # the last digits may differ: PARDISO's depend on where its memory lies
     assert kills.difference(place / "stopped", whole) < 1e-12
-
-
-def test_a_folder_that_cannot_be_written_is_exit_status_4(place, monkeypatch):
-    before = contents(place / "stopped")
-
-    def refuse(*arguments, **more):
-        raise PermissionError(errno.EACCES, "Permission denied")
-
-    for name in ("open", "replace"):
-        monkeypatch.setattr(
-            f"{storage.__name__}.{'os.replace' if name == 'replace' else 'open'}", refuse, raising=False
-        )
-    monkeypatch.setattr(Path, "write_text", refuse)
-    status, error = run(place, "--overwrite")
-    monkeypatch.undo()
-    assert status == 4
-    assert "Permission denied" in error.splitlines()[-1]
-    assert set(contents(place / "stopped")) <= set(before)
-
-
-def test_output_that_cannot_be_printed_is_exit_status_4(tmp_path):
-    kills.prepare(tmp_path, "force")
-    command, environment = process_of("plan", "force.toml")
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            command, stdout=full, stderr=subprocess.PIPE, cwd=tmp_path, env=environment, text=True
-        )
-    assert done.returncode == 4
-    assert done.stderr.count("\n") <= 1
-
-
-def test_the_version_is_in_the_checkpoint(interrupted):
-    arrays = load_arrays(interrupted / "stopped" / "checkpoint.npz", "checkpoint", CHECKPOINT_FORMAT)
-    assert str(arrays["version"]) == evfem.__version__
-    assert export.__name__  # fields are written by the module whose writer the tests above replace

@@ -4,7 +4,6 @@ protocols.
 
 import inspect
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -127,31 +126,11 @@ def test_own_law_pulls_with_its_traction_on_the_projected_width() -> None:
     assert np.ptp(x) == pytest.approx(4.0, rel=0.05)
 
 
-@pytest.mark.parametrize("material", [Tissue(), StressedTissue()])
-def test_own_material_is_the_built_in_one(material: Any) -> None:
-    # on q2 the volume change is that of the displacement, however a law splits it
-    q2 = ev.Solver(element="q2")
-    scenes = [ev.Scene(pad(m), FLAT, motion=[PRESS, SLIDE], solver=q2) for m in (None, material)]
-    ours, own = map(ev.simulate, scenes)
-    np.testing.assert_allclose(own.applied_force, ours.applied_force, rtol=1e-6)
-    np.testing.assert_allclose(
-        own.applied_tangential_force, ours.applied_tangential_force, rtol=1e-6, atol=1e-9
-    )
-
-
 def test_own_surface_is_the_built_in_one() -> None:
     sine = ev.Sinusoid(friction=0.2, terms=[[0.02, 6.0, 0.0]])
     ours, own = (ev.simulate(ev.Scene(pad(), surface, motion=[PRESS, SLIDE])) for surface in (sine, Waves()))
     np.testing.assert_allclose(own.normal_force, ours.normal_force, rtol=1e-7)
     np.testing.assert_allclose(own.tangential_force, ours.tangential_force, rtol=1e-6, atol=1e-9)
-
-
-def test_own_form_hangs_on_the_bone() -> None:
-    """Hovering, the bone carries the weight of the undeformed area: nothing else holds the pad."""
-    scene = ev.Scene(pad(), FLAT, motion=ev.Hover(gap=1.0)).with_term(weight, on=ev.Region("tissue"))
-    area = 4.0 * (2.0 - 0.3 / 3.0)  # 8 columns of straight edges follow the parabola from outside
-    result = ev.simulate(scene)
-    assert result.applied_force[0] == pytest.approx(-1e-3 * area, rel=5e-3)
 
 
 def test_progress_and_live_plot_see_every_step(tmp_path: Path) -> None:
@@ -274,10 +253,6 @@ def test_own_friction_and_derivatives_are_used() -> None:
     assert (told.y, told.insulator) == (-0.25, INSULATOR)
 
 
-def test_a_complete_surface_stays_itself() -> None:
-    assert completed(FLAT) is FLAT
-
-
 def test_objects_that_are_no_surface() -> None:
     class Rough(Waves):
         friction = -1.0
@@ -292,9 +267,3 @@ def test_objects_that_are_no_surface() -> None:
             ev.Scene(pad(), kind, motion=[PRESS])
     with pytest.raises(InputError, match=r"surface\.friction: given -1\.0"):
         ev.Scene(pad(), Rough(), motion=[PRESS])
-
-
-def test_own_surfaces_count_in_the_fingerprint() -> None:
-    scene = ev.Scene(pad(), Waves(), motion=[PRESS])
-    assert scene.digest() == replace(scene, surface=Waves()).digest()
-    assert scene.digest() != replace(scene, surface=RealWaves()).digest()

@@ -40,13 +40,6 @@ def test_hertz_load_is_the_integral_of_its_pressure():
     assert HERTZ.pressure(np.array([0.0, a, 2.0 * a])).tolist() == [HERTZ.peak_pressure, 0.0, 0.0]
 
 
-def test_hertz_by_hand():
-    # Johnson (4.45): p0 = sqrt(P' E* / (pi R)), and p0 = E* a / (2 R)
-    assert HERTZ.peak_pressure == pytest.approx(math.sqrt(0.05 * HERTZ.modulus / (math.pi * 8.34)), rel=1e-14)
-    assert HERTZ.peak_pressure == pytest.approx(HERTZ.modulus * HERTZ.half_width / (2 * 8.34), rel=1e-14)
-    assert plane_modulus(0.91, 0.3) == pytest.approx(1.0)
-
-
 def test_hertz_from_its_half_width():
     again = HertzLine.from_half_width(HERTZ.half_width, HERTZ.radius, HERTZ.modulus)
     assert again.load == pytest.approx(HERTZ.load, rel=1e-14)
@@ -63,45 +56,11 @@ def test_stick_zone_carries_the_tangential_load_within_the_cone():
     np.testing.assert_allclose(room[np.abs(x) > c], 0.0, atol=1e-17)
 
 
-def test_stick_zone_moves_as_one_piece():
-    # tangential strain of a half-plane's surface: -(2/(pi E*)) times the principal value of the integral of
-    # q(t)/(x - t), by the midpoint rule with x on the edges of its cells; none in the stick zone
-    contact = CattaneoMindlin(HERTZ, 0.4, 0.015)
-    a, c = HERTZ.half_width, contact.stick_half_width
-    edges = np.linspace(-a, a, 100_001)
-    t, q = 0.5 * (edges[1:] + edges[:-1]), contact.shear(0.5 * (edges[1:] + edges[:-1]))
-    places = np.interp([-0.9 * c, 0.3 * c, 0.9 * c, 1.2 * c], edges, np.arange(len(edges))).astype(int)
-    strain = np.array([np.sum(q / (edges[i] - t)) * (t[1] - t[0]) for i in places]) / (
-        0.4 * HERTZ.peak_pressure
-    )
-    assert np.abs(strain[:3]).max() < 1e-4
-    assert np.abs(strain[3]) > 0.1
-
-
 def test_bonded_layer_has_the_printed_numbers():
     layer = BondedLayer(half_width=0.7, thickness=0.7, radius=8.0, E=0.05, nu=0.3)
     modulus = plane_modulus(0.05, 0.3)
     assert layer.load * 8.0 / (modulus * 0.7**2) == pytest.approx(1.221797, abs=5e-7)
     assert layer.indentation * 8.0 / 0.7**2 == pytest.approx(0.653997, abs=5e-7)
-
-
-def test_deep_bonded_layer_is_the_half_space():
-    # the base changes the contact by terms of order (a/h)^2: 1/1600 here
-    layer = BondedLayer(half_width=1.0, thickness=40.0, radius=50.0, E=0.91, nu=0.3)
-    hertz = HertzLine.from_half_width(1.0, 50.0, 1.0)
-    assert layer.load == pytest.approx(hertz.load, rel=1e-3)
-    np.testing.assert_allclose(layer.pressure(np.array([0.0, 0.5])), hertz.pressure([0.0, 0.5]), rtol=1e-3)
-
-
-def test_shallow_compressible_layer_is_a_bed_of_springs():
-    # p = K (a^2 - x^2)/(2R), K = E (1 - nu)/((1 + nu)(1 - 2 nu) h): delta = a^2/(2R), P' = 2 K a^3/(3 R);
-    # the edges change that by terms of order h/a = 1/20
-    a, h, R, E, nu = 1.0, 0.05, 50.0, 1.0, 0.3
-    layer = BondedLayer(a, h, R, E, nu)
-    K = E * (1 - nu) / ((1 + nu) * (1 - 2 * nu) * h)
-    assert layer.indentation == pytest.approx(a * a / (2 * R), rel=0.06)
-    assert layer.load == pytest.approx(2 * K * a**3 / (3 * R), rel=0.06)
-    assert layer.pressure(0.5) == pytest.approx(K * 0.375 / R, rel=0.06)
 
 
 @pytest.mark.parametrize(("ratio", "nu"), [(0.3, 0.3), (1.0, 0.3), (1.0, 0.5), (3.0, 0.45), (0.1, 0.4)])
@@ -116,24 +75,6 @@ def test_bonded_layer_load_is_the_slope_of_its_energy(ratio, nu):
     assert (U2 - U1) / (d2 - d1) == pytest.approx(layer.load, rel=1e-4)
     assert integral(layer.pressure, -1.0, 1.0) == pytest.approx(layer.load, rel=1e-4)
     assert (layer.pressure(np.linspace(-0.999, 0.999, 99)) > 0.0).all()
-
-
-def test_bonded_layer_pressure_moves_the_surface_onto_the_cylinder():
-    # the same compliance applied by FFT on a long period to the pressure: u = delta - x^2/2R in contact
-    layer = BondedLayer(half_width=1.0, thickness=1.0, radius=20.0, E=0.91, nu=0.3)
-    n, period = 2**15, 64.0
-    x = (np.arange(n) - n // 2) * period / n
-    k = 2.0 * math.pi * np.fft.rfftfreq(n, period / n)
-    compliance = 2.0 * layer._stiffening(k[1:]) / k[1:]
-    compliance = np.concatenate([[oedometric(1.0, 0.91, 0.3)], compliance])
-    u = np.fft.irfft(np.fft.rfft(layer.pressure(x)) * compliance)
-    inside = np.abs(x) < 0.95
-    np.testing.assert_allclose(u[inside], (layer.indentation - x**2 / 40.0)[inside], rtol=2e-4)
-
-
-def oedometric(h, E, nu):
-    """Displacement of a laterally held layer per pressure."""
-    return h * (1 + nu) * (1 - 2 * nu) / (E * (1 - nu))
 
 
 @pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
@@ -171,20 +112,6 @@ def test_bonded_layer_from_its_load():
 def test_tube_has_the_printed_number_and_rests_without_pressure():
     assert tube_pressure(1.5, 1.0, 2.0, 1.0) == pytest.approx(0.4282284091, abs=5e-11)
     assert tube_pressure(1.0, 1.0, 2.0, 1.0) == 0.0
-
-
-def test_tube_pressure_is_the_slope_of_the_stored_energy():
-    # per depth: W = integral over the wall of mu/2 (l^2 + l^-2 - 2) 2 pi R dR, work p d(pi a^2)
-    def energy(a):
-        def density(R):
-            stretch = np.sqrt(1.0 + (a * a - 1.0) / R**2)
-            return 0.5 * 0.3 * (stretch**2 + stretch**-2 - 2.0) * 2.0 * math.pi * R
-
-        return integral(density, 1.0, 2.0, 20000)
-
-    a, h = 1.4, 1e-3
-    slope = (energy(a + h) - energy(a - h)) / (math.pi * ((a + h) ** 2 - (a - h) ** 2))
-    assert tube_pressure(a, 1.0, 2.0, 0.3) == pytest.approx(slope, rel=1e-5)
 
 
 def test_tube_widens_like_a_linear_one_at_first():

@@ -47,7 +47,3 @@ def test_the_last_row_of_each_motion_is_shown():
         assert picked == sorted(set(picked))
         assert len(picked) <= 12
     assert chosen([], 12) == []
-
-
-def test_many_motions_show_one_row_each():
-    assert chosen(rows(*[2] * 20), 12) == list(range(1, 40, 2))

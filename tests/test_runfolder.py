@@ -21,7 +21,6 @@ from evfem.finger.fingerpad import FingerPad
 from evfem.runfolder import RunFolder, saved
 from evfem.scene.scene import Output, default_scene
 from evfem.simulation.checkpoint import Checkpoint
-from evfem.simulation.history import csv_line
 from evfem.simulation.result import Result
 from evfem.sweeps import folder
 
@@ -52,20 +51,6 @@ def steps_on_disk(path):
     point = Checkpoint(path / "checkpoint.npz").read(SCENE.digest())
     assert point.arrays["u"].tolist() == [float(len(point.rows))] * 3
     return rows, series, index, [row["step"] for row in point.rows]
-
-
-def test_nothing_is_written_before_the_first_step(tmp_path):
-    started(tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_everything_is_there_after_each_step(tmp_path):
-    folder = started(tmp_path)
-    for step in (1, 2, 3):
-        take(folder, step)
-        assert steps_on_disk(tmp_path) == (list(range(1, step + 1)),) * 4
-    assert (tmp_path / "history.csv").read_text().endswith(csv_line(fake_row(3)))
-    assert not (tmp_path / "summary.json").exists()
 
 
 @pytest.mark.parametrize("place", ["frame", "checkpoint", "history", "index"])
@@ -104,20 +89,6 @@ def test_an_interruption_in_the_very_first_step_loses_nothing(tmp_path, monkeypa
     assert steps_on_disk(tmp_path) == ([1],) * 4
 
 
-def test_a_run_goes_on_from_its_checkpoint(tmp_path):
-    take(started(tmp_path), 1, 2)
-    found = saved(tmp_path, SCENE)
-    assert [row["step"] for row in found.rows] == [1, 2]
-    again = started(tmp_path, resume=found)
-    take(again, 3)
-    assert steps_on_disk(tmp_path) == ([1, 2, 3],) * 4
-
-
-def test_a_folder_without_a_checkpoint_cannot_be_resumed(tmp_path):
-    with pytest.raises(InputError, match=r"--resume.*checkpoint\.npz"):
-        saved(tmp_path, SCENE)
-
-
 def test_a_new_run_removes_what_evfem_wrote_and_nothing_else(tmp_path):
     take(started(tmp_path), 1, 2, 3)
     (tmp_path / "fields_0004.vtu.bak").write_text("mine")
@@ -125,13 +96,6 @@ def test_a_new_run_removes_what_evfem_wrote_and_nothing_else(tmp_path):
     take(started(tmp_path), 1)
     assert steps_on_disk(tmp_path) == ([1],) * 4
     assert {"fields_0004.vtu.bak", "notes.md"} <= {p.name for p in tmp_path.iterdir()}
-
-
-def test_files_of_others_with_our_names_stop_the_run(tmp_path):
-    take(started(tmp_path), 1)
-    (tmp_path / ".evfem-files").unlink()
-    with pytest.raises(InputError, match=r"checkpoint\.npz was not written by evfem"):
-        started(tmp_path)
 
 
 @pytest.mark.parametrize("name", ["forces.png", "fields.pvd", "fields_00004.vtu", "summary.json"])
@@ -206,19 +170,6 @@ def test_whenever_a_kill_comes_it_is_known_whose_a_file_is(tmp_path, monkeypatch
     take(started(out, plots=False), 1)
     assert steps_on_disk(out) == ([1],) * 4
     assert not list(out.glob(".*.tmp"))
-
-
-def test_a_file_that_could_not_be_written_is_not_listed(tmp_path, monkeypatch):
-    folder = started(tmp_path, fields=False)
-    take(folder, 1)
-    monkeypatch.setattr("evfem.runfolder._picture", lambda result, path: path.with_name("none").stat())
-    with pytest.raises(FileNotFoundError):
-        folder.close(None)
-    monkeypatch.undo()
-    assert listed(tmp_path) == ["checkpoint.npz", "history.csv", "summary.json"]
-    (tmp_path / "forces.png").write_text("mine")
-    with pytest.raises(InputError, match=r"forces\.png was not written by evfem"):
-        started(tmp_path)
 
 
 def test_a_list_from_anywhere_names_no_file_of_others(tmp_path):

@@ -238,11 +238,6 @@ def test_an_interrupted_fit_goes_on_where_it_was(path, exact, tmp_path, monkeypa
         ev.fit(path, data, {E: (0.02, 0.4)}, out=out, workers=1)
 
 
-@pytest.mark.slow
-def test_processes_find_the_same(path, exact):
-    assert ev.fit(path, measured(path), BOUNDS, workers=2).values == exact.values
-
-
 def test_a_broken_pool_is_opened_again(path, tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "work", die_once)
     monkeypatch.setenv("DIE_ONCE", str(tmp_path / "died"))

@@ -14,7 +14,6 @@ from tools.fakes import fake_result
 import evfem as ev
 from evfem.common.checks import keys_of
 from evfem.estimate.rendering import ApparentFriction, Comparison
-from evfem.scene import file as scenefile
 from evfem.simulation.result import Result
 
 NAIL = ev.NeoHookean(E=20.0, nu=0.3)
@@ -132,20 +131,6 @@ def test_text_of_others_is_escaped():
         rows(page)
 
 
-def test_provenance_of_a_scene_that_no_file_can_hold_is_complete():
-    class Law:
-        def traction(self, gap, voltage, layers):
-            return 0.0 * gap
-
-    from evfem.simulation.result import provenance
-
-    scene = replace(ev.default_scene(), law=Law(), finger=ev.FingerPad(nail_width=10.5))
-    text = provenance(scene, fake_result().mesh, {})["parameters"]
-    for part in ("nail_width=10.5", "friction=0.3", "Slide(distance=5.0, steps=100", "tolerance=1e-08"):
-        assert part in text
-    assert scenefile.loads(provenance(ev.default_scene(), fake_result().mesh, {})["parameters"])
-
-
 def test_help_says_every_parameter_with_its_meaning_and_range():
     said = pydoc.plain(pydoc.render_doc(ev.Slide))
     assert "\n |  Slide(distance: float, steps: int = 100" in said
@@ -180,10 +165,3 @@ def test_meshes_frames_and_forces_show_their_size_not_their_numbers():
     assert repr(found) == (
         "Comparison(3 positions: pearson 0.99, relative L2 error 0.01, at most 0.001 N/mm and 0 V apart)"
     )
-
-
-def test_no_minus_zero_is_shown():
-    row = dict(fake_result().rows[-1]) | {"tangential_force": -1e-17, "position": -0.0}
-    result = Result.from_rows([row], [], fake_result().mesh, {})
-    assert "-0 " not in repr(result)
-    assert "tangential force 0 N/mm" in repr(result)

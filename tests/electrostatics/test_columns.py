@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from evfem import FILM
-from evfem.electrostatics import eps_0, rigid_field
-from evfem.field.bounds import columns_sum, least_upper_sum, upper_sum
+from evfem.electrostatics import eps_0
+from evfem.field.bounds import upper_sum
 from evfem.field.columns import Columns
 
 ROWS = np.linspace(0.0, 1.0, 5)
@@ -68,24 +67,6 @@ def test_moving_everything_changes_nothing():
     size = np.abs(found.by_level).sum()
     assert abs(found.by_level.sum()) < 1e-13 * size
     assert abs(found.by_x.sum()) < 1e-13 * size
-
-
-def test_columns_agree_with_the_field_of_the_same_polyline():
-    """Other elements on another mesh: `rigid_field` of one period."""
-    half, levels = wave(65, 0.02)
-    x = np.append(half, 0.5 - half[-2::-1])
-    height = np.append(levels[2], levels[2][-2::-1])
-    full = rigid_field(x, height, slab=FILM)
-    found = FILM_AND_AIR.solve(half, levels)
-    assert 2e-3 * found.value == pytest.approx(full.capacitance, rel=5e-4)
-    assert -found.by_level[2].sum() == pytest.approx(full.force, rel=1e-3)
-
-
-def test_a_capacitance_is_above_the_columns_and_below_the_vertical_field():
-    x, levels = wave(33, 0.001)
-    value = FILM_AND_AIR.solve(x, levels).value / eps_0
-    low = columns_sum(x, levels[2] + 0.09 / 3.35)
-    assert low < value < least_upper_sum(x, levels[2], 0.09, 3.35)
 
 
 @pytest.mark.parametrize("rise", [0.3, -0.3])
@@ -163,23 +144,6 @@ def test_derivatives_with_electrodes_that_end(floating):
     quotients = [energy(k * step) - energy(-k * step) for k in (1, 2, 3)]
     slope = (45.0 * quotients[0] - 9.0 * quotients[1] + quotients[2]) / (60.0 * step)
     assert found.by_x @ dx + np.sum(found.by_level * rise) == pytest.approx(slope, rel=1e-7)
-
-
-def test_a_body_without_charge_takes_the_mean_of_the_voltages():
-    x, levels = np.linspace(-1.0, 1.25, 46), np.repeat([[-0.09], [0.0], [0.05]], 46, axis=1)
-    alone = FILM_AND_AIR.solve(x, levels, np.array([[-9.0, 9.0, 1.0]]), floating=True)
-    assert abs(alone.value) < 1e-9 * eps_0
-    two = FILM_AND_AIR.solve(x, levels, halves(0.0), floating=True)
-    grounded = FILM_AND_AIR.solve(x, levels, halves(0.0))
-    assert two.phi[0, -1] == pytest.approx(0.5, abs=0.01)
-    assert two.by_level[2].sum() == pytest.approx(0.5 * grounded.by_level[2].sum(), rel=0.06)
-
-
-def test_an_electrode_without_end_is_one_that_reaches_beyond():
-    x, levels = wave(17, 0.05)
-    whole = FILM_AND_AIR.solve(x, levels)
-    far = FILM_AND_AIR.solve(x, levels, np.array([[-9.0, 9.0, 1.0]]))
-    assert far.value == pytest.approx(whole.value, rel=1e-4)
 
 
 def test_from_nearby_a_field_is_exact_to_the_second_order():

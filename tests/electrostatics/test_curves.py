@@ -54,12 +54,6 @@ def test_ridges_in_few_points(outline, slab, expected):
     assert numbers(rigid_field(*outline, slab=slab)) == pytest.approx(expected, rel=3e-5)
 
 
-def test_a_period_may_begin_anywhere():
-    x = np.linspace(0.0, 0.5, 101)
-    turned = rigid_field(x, 0.1 + 0.075 * (1.0 - np.cos(4.0 * np.pi * x - 1.0)))
-    assert numbers(turned) == pytest.approx((3.468324849, 12.394429099), rel=3e-5)
-
-
 @pytest.mark.parametrize(
     "points",
     [

@@ -35,12 +35,6 @@ def test_permittivity_is_the_sum_written_out():
     assert type(cole.permittivity(50.0)) is complex
 
 
-def test_a_single_debye_pole_has_half_its_step_and_its_peak_at_its_own_frequency():
-    tau = 1e-3
-    value = ev.Dielectric(2.0, [(10.0, tau, 0.0)]).permittivity(1.0 / (2.0 * np.pi * tau))
-    assert value == pytest.approx(7.0 - 5.0j, rel=1e-13)
-
-
 @pytest.mark.parametrize("name", [*AT_1_KHZ])
 @pytest.mark.parametrize("tolerance", [2e-2, 2e-3, 1e-4])
 def test_debye_poles_follow_a_skin_over_its_band(name, tolerance):
@@ -50,13 +44,6 @@ def test_debye_poles_follow_a_skin_over_its_band(name, tolerance):
     assert all(len(pole) == 3 and pole[0] > 0.0 and pole[2] == 0.0 for pole in found.poles)
     if tolerance == 2e-3:
         assert len(found.poles) <= 12
-
-
-def test_debye_poles_find_a_pole_that_is_there():
-    own = ev.Dielectric(5.0, [(100.0, 1e-3 / (2.0 * np.pi), 0.0)], 1e-6)
-    f = np.geomspace(10.0, 1e5, 50)
-    again = own.debye(10.0, 1e5, 1e-9)
-    np.testing.assert_allclose(again.permittivity(f), own.permittivity(f), rtol=1e-8)
 
 
 def test_no_debye_poles_for_what_is_not_passive():

@@ -30,13 +30,6 @@ def test_the_mean_law_of_a_square_wave_is_its_closed_form(frequency, error):
     assert law.traction(1e-3, drive.peak(100.0), layers) == pytest.approx(exact, rel=error)
 
 
-def test_harmonics_are_those_of_a_square_wave():
-    order, weight = ev.Square.harmonics()
-    np.testing.assert_allclose(weight[:5], 8.0 / (np.pi * np.array([1, 3, 5, 7, 9])) ** 2, rtol=1e-14)
-    assert weight.sum() == pytest.approx(1.0, abs=1e-14)
-    assert (np.diff(order) > 0.0).all()
-
-
 @pytest.mark.parametrize("law", [ev.StrongTroxel(), ev.Kaczmarek()])
 def test_the_mean_over_harmonics_has_its_own_potential_and_derivative(law):
     drive = ev.Drive(frequency=60.0, waveform="square", gap_conductivity=1e-8)
@@ -51,19 +44,6 @@ def test_the_mean_over_harmonics_has_its_own_potential_and_derivative(law):
     )
     slope = mean.traction(GAPS + 1j * step, 70.0, layers).imag / step
     np.testing.assert_allclose(mean.traction_derivative(GAPS, 70.0, layers), slope, rtol=1e-10)
-
-
-def test_amplitude_modulation_of_the_mean():
-    """p / p0 = 1 + m^2/2 + 2 m cos W t + (m^2/2) cos 2 W t, with the carrier's mean."""
-    m, low, U = 0.5, 5.0, 100.0
-    envelope = ev.Sine(low, m * U, bias=U, phase=np.pi / 2.0)
-    carrier = ev.Carrier(10_000.0, envelope, resolved=False)
-    t = np.linspace(0.0, 0.4, 37)
-    p0 = ev.StrongTroxel().traction(1e-3, U / np.sqrt(2.0), ev.Layers.of(ev.TOUCHSCREEN))
-    found = ev.StrongTroxel().traction(1e-3, carrier(t), ev.Layers.of(ev.TOUCHSCREEN)) / p0
-    wt = 2.0 * np.pi * low * t
-    expected = 1.0 + m**2 / 2.0 + 2.0 * m * np.cos(wt) + m**2 / 2.0 * np.cos(2.0 * wt)
-    np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
 @pytest.mark.parametrize("leak", [0.0, 1e-8])

@@ -77,30 +77,6 @@ def test_one_batched_rule_is_the_adaptive_integral(law, over, gap, layers):
     assert pad_force(law, PAD, gap, 1000.0, layers, over) == pytest.approx(expected, rel=1e-10, abs=0)
 
 
-def test_nearly_touching_pads_keep_the_accuracy(monkeypatch):
-    # sixteen orders of thickness: the rule with twice the points agrees to 1e-10
-    layers = Layers(np.logspace(-6, 2, 17), np.logspace(-5.5, 2.5, 17))
-    coarse = [pad_force(law, PAD, 0.0, 1e3, layers, "ellipse") for law in (StrongTroxel(), Kaczmarek())]
-    monkeypatch.setattr("evfem.electrostatics.forces._POINTS", 56)
-    fine = [pad_force(law, PAD, 0.0, 1e3, layers, "ellipse") for law in (StrongTroxel(), Kaczmarek())]
-    np.testing.assert_allclose(coarse, fine, rtol=1e-10)
-
-
-def test_limits_of_the_pad_force():
-    # very far away: area times the pressure at that distance; rectangle 2a x 2c
-    far = pad_force(StrongTroxel(), PAD, 1e6, 1e3, TABLE_2)
-    assert far == pytest.approx(16.70 * 22.5 * eps_0 * 1e6 / (2 * 1e12), rel=5e-5, abs=0)
-    # very flat pad: parallel plates, ellipse area pi a c
-    flat = EllipsoidalPad(10.0, 1e-7, 20.0)
-    expected = np.pi * 5.0 * 10.0 * Kaczmarek().traction(0.1, 1e3, TABLE_2)
-    assert pad_force(Kaczmarek(), flat, 0.1, 1e3, TABLE_2, "ellipse") == pytest.approx(
-        expected, rel=1e-5, abs=0
-    )
-    # nearly touching, no layers: paraboloid of curvatures b/a^2 and b/c^2, F -> pi eps_0 U^2 a c / (b g)
-    near = pad_force(StrongTroxel(), PAD, 1e-6, 1.0, Layers.of())
-    assert near == pytest.approx(np.pi * eps_0 * 8.35 * 11.25 / (6.4 * 1e-6), rel=1e-5, abs=0)
-
-
 def test_two_dimensional_hover_forces():
     # design notes: 0.20172 / 0.40356 / 0.19761 mN/mm at LVLD / HVLD / HVHD; 2 x 8.34 and 2 x 6.395 mm
     pad = EllipsoidalPad(16.68, 12.79, 1.0)
@@ -143,25 +119,6 @@ def test_plates_follow_equations_2_to_7():
     assert plate_force(StrongTroxel(), 100.0, 0.0, 140.0, one) == pytest.approx(
         5.0 * capacitor_force(100, 140, 0.2, 5), rel=1e-14
     )
-
-
-def test_arguments_broadcast_and_scalars_give_floats():
-    pad = EllipsoidalPad(np.array([16.0, 17.0]), 12.8, np.array([22.0, 23.0]))
-    forces = pad_force(Kaczmarek(), pad, np.array([[0.25], [0.5], [0.75]]), 2000.0, TABLE_2)
-    assert forces.shape == (3, 2)
-    single = pad_force(Kaczmarek(), EllipsoidalPad(17.0, 12.8, 23.0), 0.75, 2000.0, TABLE_2)
-    assert type(single) is float
-    assert forces[2, 1] == pytest.approx(single, rel=1e-14, abs=0)
-    assert pad_force(Kaczmarek(), PAD, np.linspace(0.1, 0.7, 600), 1e3, TABLE_2).shape == (
-        600,
-    )  # several batches
-    assert pad_force(Kaczmarek(), PAD, np.zeros((0, 3)), 1e3, TABLE_2).shape == (0, 3)
-
-
-def test_pad_force_is_safe_for_complex_steps():
-    slope = pad_force(Kaczmarek(), PAD, 0.25 + 1e-30j, 2000.0, TABLE_2).imag / 1e-30
-    ends = pad_force(Kaczmarek(), PAD, np.array([0.2501, 0.2499]), 2000.0, TABLE_2)
-    assert slope == pytest.approx((ends[0] - ends[1]) / 2e-4, rel=1e-5, abs=0)
 
 
 def test_thickness_from_thresholds():

@@ -5,10 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from evfem import cli
 from evfem.electrostatics import signalfile
 from evfem.electrostatics.encoding import AreaLaw, Encoding
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
@@ -164,36 +161,6 @@ def test_the_coefficient_at_full_scale_comes_from_an_encoding():
     assert mu[0] == pytest.approx(0.5, rel=1e-9)
 
 
-@settings(max_examples=80, deadline=None)
-@given(
-    rows=st.lists(st.tuples(st.floats(0.0, 20.0), st.floats(-1.0, 1.0)), min_size=2, max_size=15),
-    speed=st.floats(0.05, 5000.0),
-    start=st.floats(-100.0, 100.0),
-)
-def test_any_signal_has_the_published_structure(rows, speed, start):
-    x = start + np.cumsum([gap for gap, _ in rows])
-    if not np.ptp(x) > 1.0:
-        return
-    profile = VoltageProfile(x, 300.0 * np.array([u for _, u in rows]))
-    try:
-        file = signalfile.haptics(profile, 300.0, speed, (0.2, 0.9))
-    except InputError:
-        assert np.ptp(x) / speed > 100.0  # seconds: whole ticks a second were more than 1 % off
-        return
-    check_structure(json.loads(json.dumps(file, allow_nan=False)))
-    time, place, mu = curve_of(file)
-    assert place[-1] == pytest.approx(np.ptp(x), abs=place[-1] / time[-1] / file["timescale"] * 1.02)
-    np.testing.assert_allclose(time * speed, place, rtol=0.0102)  # ticks per second are whole
-    # at its own keyframes the curve is the friction of some place at most a tick away
-    tick = 10.0 ** (file["perceptions"][0]["unit_exponent"] + 3)
-    for at, value in zip(x[0] + place, mu, strict=True):
-        rows_there = profile.voltage[np.abs(x - at) <= 1.000001 * tick]
-        volts = np.concatenate([rows_there, profile(np.array([at - tick, at + tick]))])
-        lowest = 0.0 if volts.min() <= 0.0 <= volts.max() else np.abs(volts).min()
-        share = (np.array([lowest, np.abs(volts).max()]) / 300.0) ** 2
-        assert 0.2 + 0.7 * share[0] - 1e-6 <= value <= 0.2 + 0.7 * share[1] + 1e-6
-
-
 def test_ticks_are_the_finest_that_fit():
     assert signalfile.ticks(10.0, 20.0) == (-6, 20_000)
     assert signalfile.ticks(10.0, 48.1) == (-5, 4810)  # 48100 micrometres a second are more than 48000
@@ -201,15 +168,6 @@ def test_ticks_are_the_finest_that_fit():
     assert signalfile.ticks(10.0, 12.34567) == (-6, 12_346)
     with pytest.raises(InputError, match=r"speed: given 0.014 mm/s over 500 mm"):
         signalfile.ticks(500.0, 0.014)
-
-
-def test_the_command_writes_the_same_file(tmp_path):
-    source, out, direct = tmp_path / "v.csv", tmp_path / "tone.hjif", tmp_path / "direct.hjif"
-    write_signal(source, JUMP)
-    write_signal(direct, JUMP, DEVICE)
-    scale = ["--full-scale", "2000", "--speed", "20", "--friction", "0.5", "0.6"]
-    assert cli.main(["signal", str(source), "--out", str(out), *scale]) == 0
-    assert json.loads(out.read_text()) == json.loads(direct.read_text())
 
 
 def test_the_carrier_stands_in_the_description():

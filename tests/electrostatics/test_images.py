@@ -1,4 +1,4 @@
-"""Bodies and strips over a slab on an electrode, by line charges and their images."""
+"""Strips over a slab on an electrode, by line charges and their images."""
 
 import numpy as np
 import pytest
@@ -20,35 +20,6 @@ def images(slab):
     return charge, np.append(0.0, 2.0 * n * slab.thickness)
 
 
-def potential(at, source, slab):
-    """2 pi eps_0 times the potential (m, n) at places (2, m) of unit line charges at (2, n)."""
-    across = at[0][:, None] - source[0]
-    down = at[1][:, None] + source[1]
-    total = -np.log(np.hypot(across, at[1][:, None] - source[1]))
-    for charge, depth in zip(*images(slab), strict=True):
-        total -= charge * np.log(np.hypot(across, down + depth))
-    return total
-
-
-def ellipse(a, b, gap, slab):
-    """C / eps_0 of an elliptical cylinder by charges inside it (a circle: a = b)."""
-    t, s = (2.0 * np.pi * np.arange(n) / n for n in (200, 90))
-    face = np.stack([a * np.cos(t), gap + b + b * np.sin(t)])
-    residuals, found = [], []
-    for share in (0.6, 0.75):
-        inner = (share * a, share * b)
-        if a > b:  # confocal
-            focus, level = np.sqrt(a * a - b * b), share * np.arctanh(b / a)
-            inner = (focus * np.cosh(level), focus * np.sinh(level))
-        source = np.stack([inner[0] * np.cos(s), gap + b + inner[1] * np.sin(s)])
-        matrix = potential(face, source, slab)
-        charge = np.linalg.lstsq(matrix, np.ones(t.size), rcond=1e-15)[0]
-        residuals.append(np.abs(matrix @ charge - 1.0).max())
-        found.append(2.0 * np.pi * charge.sum())
-    assert min(residuals) < 1e-8
-    return found[int(np.argmin(residuals))]
-
-
 def strip(width, height, slab, order=40):
     """C / eps_0 of a thin strip: its charge is a series of Chebyshev polynomials over sqrt(1 - x^2)."""
     angle, m = (np.arange(order) + 0.5) * np.pi / order, np.arange(order)
@@ -68,38 +39,8 @@ def with_force(capacitance, gap):
     return at[2], -0.5 * (at[0] - 8.0 * at[1] + 8.0 * at[3] - at[4]) / (12.0 * step)
 
 
-@pytest.mark.parametrize(("a", "gap", "slab"), [(1.0, 0.1, FILM), (1.5, 0.3, GLASS)])
-def test_a_cylinder_over_a_slab(a, gap, slab):
-    angle = np.linspace(-np.pi / 2.0, np.pi / 2.0, 201)
-    outline = a * np.sin(angle), gap + 1.0 - np.cos(angle)
-    exact = with_force(lambda g: ellipse(a, 1.0, g, slab), gap)
-    assert numbers(rigid_field(*outline, slab=slab, periodic=False)) == pytest.approx(exact, rel=1e-5)
-
-
 @pytest.mark.parametrize(("width", "height", "slab"), [(1.0, 0.1, FILM), (0.2, 0.3, GLASS)])
 def test_a_strip_over_a_slab(width, height, slab):
     exact = with_force(lambda h: strip(width, h, slab), height)
     solved = rigid_field([0.0, width], [height, height], slab=slab, periodic=False)
     assert numbers(solved) == pytest.approx(exact, rel=1e-5)
-
-
-def modes(gap, slab, number=24):
-    """C / eps_0 of one period 0.5 of two harmonics, neither of them even, by modes of slab and air."""
-    x = np.arange(8 * number) / (16 * number)
-    height = gap + 0.04 + 0.03 * (1.0 - np.cos(4.0 * np.pi * x)) + 0.01 * np.sin(8.0 * np.pi * x)
-    parts = [height + slab.thickness / slab.eps_r]
-    for k in 4.0 * np.pi * np.arange(1, number):
-        up = np.sinh(k * height) + np.cosh(k * height) * np.tanh(k * slab.thickness) / slab.eps_r
-        parts += [up / np.cosh(k * height.max()) * wave(k * x) for wave in (np.cos, np.sin)]
-    matrix = np.stack(parts, axis=1)
-    share = np.linalg.lstsq(matrix, np.ones(x.size), rcond=1e-15)[0]
-    assert np.abs(matrix @ share - 1.0).max() < 1e-5
-    return 0.5 * share[0]
-
-
-@pytest.mark.parametrize(("gap", "slab"), [(0.05, FILM), (0.05, GLASS), (0.4, FILM)])
-def test_a_profile_of_two_harmonics(gap, slab):
-    x = np.linspace(0.0, 0.5, 101)
-    height = gap + 0.04 + 0.03 * (1.0 - np.cos(4.0 * np.pi * x)) + 0.01 * np.sin(8.0 * np.pi * x)
-    exact = with_force(lambda g: modes(g, slab), gap)
-    assert numbers(rigid_field(x, height, slab=slab)) == pytest.approx(exact, rel=1e-5)

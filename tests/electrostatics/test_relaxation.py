@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem.electrostatics import alternating_pressure, complex_length
+from evfem.electrostatics import alternating_pressure
 from evfem.electrostatics.dielectrics import debye_layer, seen_at
 from evfem.electrostatics.laws import eps_0
 from evfem.electrostatics.relaxation import stack_of
@@ -111,15 +111,6 @@ def test_time_domain_against_the_phasor(name, frequency):
     np.testing.assert_allclose(law, 0.5 * eps_0 * field**2, rtol=1e-10)
 
 
-def test_derivatives_by_the_gap_follow_charges_and_poles():
-    start = np.array([[4e3], [-9e2], [2e4], [-1e3], [5e2]]) * np.ones(2)
-    gaps = np.array([1e-3, 0.02])
-    seen = lambda g: STACK.effective(g, 60.0, STACK.after(g, start, 80.0, 60.0, 2e-4))  # noqa: E731
-    slope = seen(gaps + 1e-30j).imag / 1e-30
-    d = 1e-4 * gaps
-    np.testing.assert_allclose(slope, (seen(gaps + d) - seen(gaps - d)) / (2.0 * d), rtol=1e-6)
-
-
 def test_what_becomes_a_sum_of_debye_poles():
     dry = ev.Layer(0.30, ev.electrostatics.SKINS["gabriel_dry"])
     assert debye_layer(SKIN, 75.0) is SKIN
@@ -137,11 +128,3 @@ def test_what_becomes_a_sum_of_debye_poles():
 
     with pytest.raises(ev.InputError, match="a Dielectric or a DielectricTable"):
         debye_layer(ev.Layer(0.1, Own()), 75.0)
-
-
-def test_the_transform_on_the_imaginary_axis_is_the_complex_length():
-    """z_1 + z_3 of the contour at s = i w, times the gap's own permittivity."""
-    s = 2j * np.pi * 75.0
-    reduced = 0.30 / STACK.skin.admittance(s) + 0.001 / STACK.insulator.admittance(s)
-    expected = complex_length(75.0, skin=SKIN.eps_r, skin_thickness=0.30, insulator=FILM)
-    assert reduced == pytest.approx(expected, rel=1e-12)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
-from tools.fields import FILM, carter, cylinder, grooves, numbers, ridges, wave
+from tools.fields import FILM, carter, grooves, numbers, ridges, wave
 
 from evfem import EvfemError, InputError, Layer
 from evfem.electrostatics import eps_0, rigid_field
@@ -54,14 +54,6 @@ def test_ridges_of_two_shapes_agree_with_boundary_integrals(outline, slab, expec
     assert numbers(rigid_field(*outline, slab=slab)) == pytest.approx(expected, rel=3e-5)
 
 
-def test_half_a_cylinder_stands_for_a_cylinder():
-    angle = np.linspace(-np.pi / 2, np.pi / 2, 401)
-    x, height = 8.34 * np.sin(angle), 1.0 + 8.34 * (1.0 - np.cos(angle))
-    solved = rigid_field(x, height, voltage=2000.0, periodic=False)
-    assert 1e3 * solved.capacitance / eps_0 == pytest.approx(cylinder(8.34, 1.0)[0], rel=2e-5)
-    assert solved.force * 1e3 == pytest.approx(0.112524670, rel=1e-5)  # N per metre
-
-
 def test_a_flat_outline_that_ends_is_loves_strip():
     """Its edges pull too: the force is the derivative of Love's capacitance."""
     width, gap = 1.0, 0.1
@@ -92,40 +84,6 @@ def test_a_plate_over_a_slab_is_exact():
     assert solved.potential([0.2, 0.3], [[0.0], [0.05]]).shape == (2, 2)
 
 
-@pytest.mark.parametrize("gap", [1e-7, 1e-3])
-def test_the_smallest_gaps_need_no_small_cells(gap):
-    assert rigid_field([0.0, 0.5], [gap, gap]).force / eps_0 == pytest.approx(0.25 / gap**2, rel=1e-9)
-
-
-def test_the_force_grows_with_the_square_of_the_voltage():
-    force = [rigid_field([0.0, 0.2], [0.1, 0.2], voltage=voltage).force for voltage in (1.0, -3.0)]
-    assert force[1] == pytest.approx(9.0 * force[0], rel=1e-12)
-
-
-def test_touching_places_are_a_gap_in_series():
-    """Where all of the outline touches, the slab alone is left."""
-    solved = rigid_field([0.0, 1.0], [0.0, 0.0], slab=FILM)
-    s = 0.09 / 3.35
-    assert numbers(solved) == pytest.approx((1.0 / s, 1.0 / (2.0 * s**2)), rel=3e-6)
-
-
-def test_walls_up_and_down_in_any_order():
-    """A staircase is the same from the other side and from another start of its period."""
-    x, h = np.array([0, 1, 1, 2, 2, 3, 3, 5]) / 10.0, np.array([5, 5, 10, 10, 20, 20, 2, 2]) / 100.0
-    first = numbers(rigid_field(x, h))
-    assert numbers(rigid_field(0.5 - x[::-1], h[::-1])) == pytest.approx(first, rel=1e-5)
-    turned = np.array([0, 1, 1, 3, 3, 4, 4, 5]) / 10.0, np.array([20, 20, 2, 2, 5, 5, 10, 10]) / 100.0
-    assert numbers(rigid_field(*turned)) == pytest.approx(first, rel=1e-5)
-
-
-def test_coarse_points_are_solved_as_stated():
-    """Three points and the same polyline in many points are one outline."""
-    few = rigid_field([0.0, 0.25, 0.5], [0.2, 0.05, 0.2], slab=FILM)
-    x = np.linspace(0.0, 0.5, 21)
-    many = rigid_field(x, np.interp(x, [0.0, 0.25, 0.5], [0.2, 0.05, 0.2]), slab=FILM)
-    assert numbers(few) == pytest.approx(numbers(many), rel=1e-5)
-
-
 def refined(mesh):
     """Every cell cut into four."""
 
@@ -154,19 +112,6 @@ def discrete(x, height, slab=None, *, refine=0, order=3, growth=0.7):
     return mesh, Potential.of(Space(mesh, eps_r, order))
 
 
-def test_energy_and_force_converge_with_the_order_of_the_element():
-    """Twice the order: energy and virtual work are quadratic in the potential's error."""
-    case = (0.5, 0.2, 0.05)
-    errors = []
-    for refine in (0, 1):
-        _, solved = discrete(*grooves(*case), refine=refine, order=2)
-        found = np.array([solved.capacitance, -solved.force()]) / eps_0
-        errors.append(found / carter(*case) - 1.0)
-    assert np.all(errors[0][:1] > 0.0), "the energy comes from above"
-    rates = np.log2(np.abs(errors[0] / errors[1]))
-    assert np.all(rates > 3.5), f"order {rates} instead of 4"
-
-
 @pytest.mark.parametrize("slab", [None, FILM])
 def test_force_is_the_derivative_of_the_discrete_energy(slab):
     x, height = grooves(0.5, 0.2, 0.05)
@@ -179,14 +124,6 @@ def test_force_is_the_derivative_of_the_discrete_energy(slab):
     near, far = (energy(k * step) - energy(-k * step) for k in (1, 2))
     quotient = (8.0 * near - far) / (12.0 * step)
     assert solved.force() == pytest.approx(quotient, rel=1e-7)
-
-
-def test_newtons_third_law():
-    """Force on the body and force on slab and electrode cancel; nothing drives sideways."""
-    mesh, solved = discrete([0.0, 0.2, 0.2, 0.5], [0.05, 0.1, 0.3, 0.12], FILM)
-    force = solved.force()
-    assert abs(force + solved.force(1.0 - mesh.lift)) < 1e-14 * abs(force)
-    assert abs(solved.force(direction=0)) < 1e-5 * abs(force)
 
 
 def test_bounds_of_touching_ridges():
@@ -210,16 +147,6 @@ def test_any_outline_lies_between_its_bounds(seed):
     capacitance = Potential.of(Space(mesh, eps_r, 2)).capacitance
     assert low <= capacitance * (1.0 + 1e-12)
     assert capacitance <= high * 1.02  # a coarse mesh is above
-
-
-def test_a_wall_in_the_middle_of_its_run_and_at_the_end_of_a_period():
-    """Low at one end and high at the other: rows end in the middle, on a point or beside one."""
-    x, height = np.array([0.0, 0.1, 0.4, 0.7, 0.8 - 1e-16]), np.array([0.1, 0.9, 0.9, 0.3, 0.9])
-    first = numbers(rigid_field(x, height))
-    moved = rigid_field([0.0, 0.0, 0.1, 0.4, 0.7, 0.8, 0.8], [0.9, 0.1, 0.9, 0.9, 0.3, 0.9, 0.9])
-    assert numbers(moved) == pytest.approx(first, rel=1e-9)
-    reversed_ = rigid_field(0.8 - x[::-1], height[::-1])
-    assert numbers(reversed_) == pytest.approx(first, rel=1e-5)
 
 
 def test_a_capacitance_outside_its_bounds_is_an_error(monkeypatch):

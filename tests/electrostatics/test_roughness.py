@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tools.builders import benchmark_finger, coarse_pad
+from tools.scenes import PRESS, head
 
 from evfem.contact.attraction import Attraction
-from evfem.electrostatics.laws import TOUCHSCREEN, Kaczmarek, Layer, Layers, StrongTroxel
+from evfem.electrostatics.laws import TOUCHSCREEN, Layer, Layers, StrongTroxel
 from evfem.electrostatics.roughness import (
     ConstantRoughness,
     ExponentialRoughness,
@@ -86,17 +87,6 @@ def row_of_nodes(rough):
     return Attraction(StrongTroxel(), Layers.of(TOUCHSCREEN), pad, Flat(y=0.0), roughness=rough), position
 
 
-def test_the_law_sees_the_gap_and_the_separation_of_each_nodes_own_pressure():
-    attraction, position = row_of_nodes(POWER)
-    pressing = np.array([0.0, 0.002, 0.01, 0.0])
-    length = np.array([0.25, 0.5, 0.5, 0.25])
-    apart = position[:, 1] + POWER.separation(pressing / length)
-    expected = -StrongTroxel().traction(apart, 100.0, Layers.of(TOUCHSCREEN)) * length
-    found = attraction.forces(position, 100.0, np.ones(4, dtype=bool), pressing)
-    np.testing.assert_allclose(found[:, 1], expected, rtol=1e-14)
-    assert not found[:, 0].any()
-
-
 def test_the_gain_on_pressing_is_the_derivative_of_the_force():
     attraction, position = row_of_nodes(POWER)
     position[:, 1] = 0.0
@@ -158,21 +148,7 @@ def test_a_constant_gap_is_a_thicker_layer_of_air():
         np.testing.assert_allclose(rough[name], air[name], rtol=1e-7, atol=1e-9)
 
 
-TABLE = """
-version = 1
-[finger]
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "kaczmarek"
-voltage = 100.0
-insulator = "touchscreen"
-ROUGH
-[[motion]]
-kind = "press"
-force = 0.05
-"""
+TABLE = head('law = "kaczmarek"\nvoltage = 100.0\ninsulator = "touchscreen"\nROUGH') + PRESS
 
 
 @pytest.mark.parametrize(
@@ -212,11 +188,3 @@ def test_mistakes_in_a_file_are_one_sentence(text, said):
     with pytest.raises(InputError) as caught:
         loads(TABLE.replace("ROUGH", text))
     assert said in str(caught.value)
-
-
-def test_the_force_of_kaczmareks_law_falls_with_roughness():
-    """Strong-Troxel falls more: its pressure goes with the square of the short length."""
-    layers = Layers.of(Layer(0.38, 1650.0), TOUCHSCREEN)
-    share = [law.traction(0.001, 100.0, layers) / law.traction(0.0, 100.0, layers)
-             for law in (StrongTroxel(), Kaczmarek())]  # fmt: skip
-    assert share[0] < share[1] < 1.0

@@ -7,7 +7,7 @@ import pytest
 from scipy.io import wavfile
 
 from evfem.electrostatics.signalfile import Playback, write_signal
-from evfem.electrostatics.signals import FollowForce, VoltageProfile
+from evfem.electrostatics.signals import VoltageProfile
 from evfem.electrostatics.timesignals import Carrier, Sampled, Sine
 from evfem.errors import InputError
 from evfem.protocols import TimeSignal
@@ -24,13 +24,6 @@ def power_of(signal):
     turns = np.exp(-2j * np.pi * np.outer(np.arange(1, 1000), TIME))
     found = {0: square.mean()}
     return found | {n: 2.0 * abs(z) for n, z in enumerate(turns @ square / TIME.size, 1) if abs(z) > 1e-9}
-
-
-def test_the_square_of_a_sine_with_a_bias_has_its_frequency_and_twice_that():
-    found = power_of(Sine(20.0, amplitude=100.0, bias=10.0))
-    assert found == pytest.approx({0: 100.0 + 5000.0, 20: 2.0 * 100.0 * 10.0, 40: 5000.0}, rel=1e-9)
-    assert found[20] / found[40] == pytest.approx(4.0 * 10.0 / 100.0)
-    assert power_of(Sine(20.0, amplitude=100.0)) == pytest.approx({0: 5000.0, 40: 5000.0}, rel=1e-9)
 
 
 def test_amplitude_modulation_attracts_at_the_envelopes_frequency_and_twice_that():
@@ -75,11 +68,6 @@ def test_signals_say_how_large_and_how_fast_they_are(signal, largest, highest):
     assert values.shape == (7, 1)
     assert np.abs(values).max() <= largest * (1 + 1e-12)
     assert type(signal(0.1)) is float
-
-
-def test_profiles_over_the_position_are_no_signals_over_time():
-    assert not isinstance(VoltageProfile([0.0], [1.0]), TimeSignal)
-    assert not isinstance(FollowForce([0.0], [1.0]), TimeSignal)
 
 
 def test_samples_are_linear_in_between_and_constant_outside():

@@ -16,7 +16,6 @@ from evfem.estimate.rendering import (
     apparent_friction,
     compare,
     exact,
-    pearson,
     record,
     replay,
     voltage_for,
@@ -201,13 +200,6 @@ def test_exact_encoding_reproduces_a_texture(texture):
     assert found.scene.motion[1] == texture.scene.motion[1]
 
 
-def test_pearson_against_numpy_and_a_constant():
-    random = np.random.default_rng(1)
-    a, b = random.normal(size=(2, 30))
-    assert pearson(a, b) == pytest.approx(np.corrcoef(a, b)[0, 1], rel=1e-13)
-    assert np.isnan(pearson(a, np.ones(30)))
-
-
 def test_slides_that_cannot_be_rendered_are_refused(jump):
     pressed = record(Scene(PAD, Flat(), motion=MOTION[:1]))
     with pytest.raises(InputError, match="0 rows of slides"):
@@ -220,11 +212,3 @@ def test_slides_that_cannot_be_rendered_are_refused(jump):
         compare(jump.result, back.result)
     with pytest.raises(InputError, match="position up to 2 mm"):
         felt([0.1, 0.2, 0.3]).minimum(after=3.0)
-
-
-def test_a_position_that_rounding_left_short_is_there():
-    force = np.array([0.05, 0.05])
-    friction = ApparentFriction(np.array([0.0, 3 * 0.1 - 1e-15]), force, np.array([0.0, 0.01]))
-    assert friction.minimum(after=3 * 0.1) == pytest.approx(0.2)
-    with pytest.raises(InputError, match="above zero all along"):
-        felt([0.1, 0.1], force=-0.05)

@@ -2,23 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.sparse.linalg import spsolve
-from tools.grids import tangent_of
-from tools.solids import block as solid_block
 
 import evfem as ev
 from evfem.errors import InputError
 from evfem.finger import fingertip
-from evfem.finger.blocks import block
-from evfem.finger.fingerprint import PATTERNS, HeightMap, Print
+from evfem.finger.fingerprint import PATTERNS, HeightMap
 from evfem.finger.layers import LAYERS
-from evfem.finger.outline import Ridges
-from evfem.finger.solid import Ellipsoid, Grid, Solid
-from evfem.mesh.mesh import raised
 from evfem.mesh.quality import scaled_jacobian
-from evfem.tissue.laws import LinearElastic
 from evfem.tissue.space import make_space
-from evfem.tissue.weakform import Tissue
 
 ELEMENT = {1: "hex8", 2: "hex27p1"}
 
@@ -102,13 +93,6 @@ def test_surfaces_are_the_ellipsoids():
         assert np.abs(heights + 6.395 - depth).min() < 1e-12
 
 
-def test_smooth_pad_is_its_own_mirror_image():
-    points = tip().mesh().points
-    for mirror in ([-1, 1, 1], [1, 1, -1]):
-        same = np.sort(np.round(points * mirror, 9).view("f8,f8,f8"), axis=0)
-        np.testing.assert_array_equal(same, np.sort(np.round(points + 0.0, 9).view("f8,f8,f8"), axis=0))
-
-
 def test_posture_turns_the_tip_down():
     """About x, by its angle: a rigid turn, after which the tip is lower than the finger's other
     end.
@@ -126,61 +110,6 @@ def test_shape_of_the_cells(ridges, order):
     """The prototype of this mesh had .43 smooth, .22 merged and .33 with a whorl."""
     least = {"none": 0.39, "along": 0.36, "across": 0.27}.get(ridges, 0.26)
     assert scaled_jacobian(tip(ridges=ridges).mesh(order)).min() > least
-
-
-def test_scaled_jacobian_of_hexahedra():
-    """A cube has 1, a sheared one the sine of its angle, a flat one 0."""
-    mesh = raised(solid_block((1, 1, 1)))
-    for shear in (0.0, 0.5, 2.0):
-        mesh.points[:, 0] += shear * mesh.points[:, 1]
-        assert scaled_jacobian(mesh)[0] == pytest.approx(1.0 / np.hypot(1.0, shear), rel=1e-12)
-        mesh.points[:, 0] -= shear * mesh.points[:, 1]
-    mesh.points[:, 2] = mesh.points[:, 1]
-    assert abs(scaled_jacobian(mesh)[0]) < 1e-12
-
-
-# -- merged columns --------------------------------------------------------------------------------------
-
-
-def test_merged_columns_fill_the_block():
-    """Rows of 9, 3 and 1 columns across and 3 and 1 along: unit volume in each row, no crack."""
-    mesh = block((1, 2), 5, ((1, 2), (3,)), 1)
-    space = make_space(mesh, "hex8")
-    np.testing.assert_allclose(np.bincount(mesh.region, space.weight.sum(axis=1)), 1.0, rtol=1e-12)
-    outer = mesh.points[mesh.outer_faces]
-    on_side = [
-        (outer[..., k] == end).all(axis=1) for k, end in ((0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 5))
-    ]
-    assert np.array(on_side).any(axis=0).all()
-    with pytest.raises(ValueError, match="one direction"):
-        block((1, 1), 1, ((0,), (0,)), 1)
-
-
-def test_merged_and_unmerged_pads_agree():
-    """Reaction of the bone on a small pad whose lowest part is held: within 0.2 %."""
-    profile = Ridges(0.15, 1.2, 7.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-    reactions = []
-    for columns, merging in (((4, 3), ((1,), ())), ((12, 3), ((), ()))):
-        grid = Grid(columns, merging, 1, (-0.4, -0.4), (0.4, 0.4))
-        solid = Solid(
-            Ellipsoid(8.34, 6.395, 11.25), Ellipsoid(3.0, 2.5, 8.5, 1.0), LAYERS, (0.38, 0.47, 1.0),
-            (1, 1, 1, 1), grid, Print("along", profile),
-        )  # fmt: skip
-        mesh = solid.mesh(2)
-        tissue = Tissue(
-            make_space(mesh, "hex27p1"), {one.name: LinearElastic(E=0.1, nu=0.4) for one in LAYERS}
-        )
-        K = tangent_of(tissue.space, np.zeros_like(mesh.points), tissue).tocsc()
-        held, bone = np.zeros((len(mesh.points), 3), bool), np.zeros((len(mesh.points), 3), bool)
-        pad = mesh.points[mesh.node_sets["pad"]]
-        held[mesh.node_sets["pad"][np.hypot(pad[:, 0], pad[:, 2]) < 3.0]] = True
-        bone[mesh.node_sets["bone"], 1] = True
-        free = ~(held | bone).ravel()
-        free[np.repeat(mesh.node_sets["bone"] * 3, 2) + np.tile([0, 2], len(mesh.node_sets["bone"]))] = False
-        u = bone.ravel().astype(float)
-        u[free] = spsolve(K[free][:, free], -(K[free] @ u))
-        reactions.append((K @ u)[bone.ravel()].sum())
-    assert reactions[0] == pytest.approx(reactions[1], rel=2e-3)
 
 
 # -- ridges ----------------------------------------------------------------------------------------------
@@ -225,15 +154,6 @@ def test_patterns_are_one_pitch_from_crest_to_crest():
         np.testing.assert_allclose(slope, 1.0, atol=0.07 if name == "arch" else 1e-6)
     assert PATTERNS["loop"](0.0, 2.0) == pytest.approx(2.0)
     assert PATTERNS["loop"](np.sin(np.pi / 9), -np.cos(np.pi / 9)) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_ridges_fade_before_the_rectangle_ends():
-    mesh = tip(ridges="along").mesh()
-    pad = mesh.points[mesh.node_sets["pad"]]
-    inside = 1.0 - np.sqrt(np.sum((pad / [8.34, 6.395, 11.25]) ** 2, axis=1))
-    beyond = (np.abs(pad[:, 0]) > 0.66 * 8.34) | (np.abs(pad[:, 2]) > 0.66 * 11.25)
-    assert np.abs(inside[beyond]).max() < 1e-12
-    assert inside.max() > 0.01
 
 
 def test_prints_from_a_table_and_from_an_image(tmp_path):
@@ -313,12 +233,6 @@ def test_what_cannot_be_is_refused(own, key):
     with pytest.raises(InputError) as caught:
         tip(**own)
     assert caught.value.key == key
-
-
-def test_several_mistakes_are_told_at_once():
-    with pytest.raises(InputError) as caught:
-        tip(width=5.0, rim="loose")
-    assert [one.key for one in caught.value.mistakes] == ["finger.width", "finger.rim"]
 
 
 def test_prints_that_are_none_are_refused(tmp_path, monkeypatch):

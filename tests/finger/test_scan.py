@@ -57,15 +57,6 @@ def test_an_outline_is_measured_along_the_normals_of_the_ellipse():
     np.testing.assert_allclose(below, RIDGES.depth(X), atol=1e-9)
 
 
-def test_a_smooth_outline_of_another_curvature_is_depth():
-    """A circle of radius 8 inside an ellipse whose lowest point it touches."""
-    x = np.linspace(-1.0, 1.0, 201)
-    _, below = RidgeScan(x, y=-np.sqrt(64.0 - x**2)).depths(OUTER)
-    assert below[100] == pytest.approx(0.0, abs=1e-12)
-    # the ellipse's radius there is a^2 / b = 10.88: a circle's sagitta is x^2 / 2R
-    assert below[0] == pytest.approx(0.5 * (1 / 8.0 - 6.395 / 8.34**2), rel=0.02)
-
-
 def test_beyond_its_ends_a_scan_comes_back_to_the_crest_line():
     ridges = ScannedRidges(np.array([-1.0, 0.0, 1.0]), np.array([0.1, 0.0, 0.1]), 0.5, 6.0, 6.6)
     places = np.array([-1.25, -1.125, -1.0, 0.5, 1.0, 1.125, 1.25, 3.0])
@@ -91,16 +82,6 @@ def test_a_scene_with_a_scan_is_written_and_read_back(relief, tmp_path):
     touching = ev.simulate(scene)
     # crests touch, grooves do not
     assert touching.real_contact_width[-1] < 0.8 * touching.contact_width[-1]
-
-
-def test_both_headers_make_the_same_finger(relief, tmp_path):
-    points = outline(X)
-    np.savetxt(tmp_path / "outline.csv", points, delimiter=",", header="x,y", comments="", fmt="%.17g")
-    by_height, by_y = (
-        FingerPad(resolution="coarse", ridge_scan=path).mesh(1).points
-        for path in (relief, tmp_path / "outline.csv")
-    )
-    np.testing.assert_allclose(by_y, by_height, atol=1e-9)
 
 
 @pytest.mark.parametrize(

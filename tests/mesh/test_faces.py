@@ -31,13 +31,6 @@ def test_a_spherical_skin_is_as_thick_as_the_radii_differ(order, error):
     assert_allclose(layer_thickness(mesh, "upper", inner), 0.5, atol=error)
 
 
-def test_a_plane_skin_is_exactly_as_thick_as_it_is_and_more_where_it_is_slanted():
-    mesh = block((3, 2, 3), (3.0, 1.0, 3.0), split=lambda x, y, z: y < 0.5)
-    mesh.points[:, 1] += 0.75 * mesh.points[:, 0] * (mesh.points[:, 1] > 0.25)  # the interface, 3 : 4
-    middle = [n for n in mesh.node_sets["bottom"] if 0.9 < mesh.points[n, 0] < 1.1]
-    assert_allclose(layer_thickness(mesh, "upper", np.array(middle)), 1.25 * 0.8, rtol=1e-12)
-
-
 def test_a_region_that_is_not_there_or_alone_is_refused():
     mesh = block((1, 1, 1))
     with pytest.raises(InputError, match='region: given "bone"'):

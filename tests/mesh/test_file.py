@@ -7,11 +7,9 @@ from tools.mesh_parts import REGIONS, of_kind, raw
 from tools.meshes import half_finger
 
 from evfem.errors import InputError, StorageError
-from evfem.finger.fingerpad import FingerPad, MeshedFinger
 from evfem.mesh import file as meshfile
-from evfem.mesh.mesh import Mesh, raised
+from evfem.mesh.mesh import Mesh
 from evfem.mesh.quality import scaled_jacobian
-from evfem.tissue.laws import NeoHookean
 
 
 def stored(folder, **changes):
@@ -40,52 +38,6 @@ def test_every_kind_of_mesh_survives_a_file(kind, ending, tmp_path):
     meshfile.write(mesh, path)
     same(meshfile.read(path), mesh)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
-
-
-@pytest.mark.parametrize("ending", ["vtu", "msh"])
-@pytest.mark.parametrize("order", [1, 2])
-def test_finger_pad_survives_a_file_with_a_region_and_a_boundary_called_nail(ending, order, tmp_path):
-    mesh = FingerPad(resolution="coarse").mesh(order)
-    path = tmp_path / f"finger.{ending}"
-    meshfile.write(mesh, path)
-    same(meshfile.read(path), mesh)
-
-
-def test_vtu_is_in_the_encoding_of_the_contract(tmp_path):
-    path = tmp_path / "mesh.vtu"
-    meshfile.write(half_finger(), path)
-    file = meshio.read(path)
-    assert file.points.shape == (793, 3)
-    assert file.cell_data["region"][0].dtype.kind == "i"
-    for name in ("pad", "bone"):
-        assert set(np.unique(file.point_data[name])) == {0, 1}
-    assert b"compressor" not in path.read_bytes()
-
-
-def test_msh_has_named_physical_groups_of_lines_and_surfaces(tmp_path):
-    path = tmp_path / "mesh.msh"
-    meshfile.write(half_finger(), path)
-    text = path.read_text()
-    assert text.startswith("$MeshFormat\n2.2 0 8\n")
-    assert [
-        text.count(f'{d} {n} "{name}"') for d, n, name in [(2, 1, "tissue"), (2, 2, "skin"), (1, 3, "pad")]
-    ] == [1, 1, 1]
-    file = meshio.read(path)
-    assert {block.type: len(block.data) for block in file.cells} == {"quad": 720, "line": 60 + 84}
-
-
-def test_foreign_gmsh_file_with_numbers_that_repeat_per_dimension(tmp_path):
-    # gmsh numbers physical lines and surfaces apart: number 1 is a line here and a surface there
-    path = tmp_path / "foreign.msh"
-    path.write_text(
-        '$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$PhysicalNames\n3\n1 1 "pad"\n1 2 "bone"\n2 1 "soft tissue"\n'
-        "$EndPhysicalNames\n$Nodes\n4\n1 0 0 0\n2 2 0 0\n3 2 2 0\n4 0 2 0\n$EndNodes\n"
-        "$Elements\n3\n1 1 2 1 1 1 2\n2 1 2 2 3 3 4\n3 3 2 1 1 1 2 3 4\n$EndElements\n"
-    )
-    mesh = meshfile.read(path)
-    assert mesh.region_names == {"soft tissue": 1}
-    assert sorted(mesh.node_sets) == ["bone", "pad"]
-    assert [mesh.node_sets[name].tolist() for name in ("pad", "bone")] == [[0, 1], [2, 3]]
 
 
 def test_version_four_gmsh_file_is_read(tmp_path):
@@ -128,21 +80,6 @@ def version_four(file, names):
     text += ["$Nodes", f"1 {len(nodes)} 1 {len(nodes)}", f"2 1 0 {len(nodes)}", *numbers, *nodes, "$EndNodes"]
     text += ["$Elements", f"4 {count} 1 {count}", *blocks, "$EndElements", ""]
     return "\n".join(text)
-
-
-def test_lines_and_vertices_only_carry_names(tmp_path):
-    parts = raw()
-    region = parts["cell_data"]["region"][0]
-    parts["cells"] = [("line", [[0, 1], [1, 2]]), *parts["cells"], ("vertex", [[4]])]
-    parts["cell_data"] = {"region": [np.zeros(2, int), region, np.zeros(1, int)]}
-    meshio.Mesh(**parts).write(tmp_path / "mesh.vtu")
-    same(meshfile.read(tmp_path / "mesh.vtu", REGIONS), half_finger())
-
-
-def test_regions_may_be_named_by_the_user(tmp_path):
-    mesh = meshfile.read(stored(tmp_path), {"deep": 0, "outer": 1})
-    assert mesh.region_names == {"deep": 0, "outer": 1}
-    assert len(mesh.cells_of("outer")) == 120
 
 
 def test_clockwise_meshes_are_turned_round(tmp_path):
@@ -198,25 +135,6 @@ def test_unreadable_file_gets_a_sentence_and_a_clean_terminal(name, content, tmp
     assert capfd.readouterr() == ("", "")
 
 
-def test_truncated_files_get_a_sentence(tmp_path, capfd):
-    for ending in ("vtu", "msh"):
-        path = tmp_path / f"mesh.{ending}"
-        meshfile.write(half_finger(), path)
-        whole = path.read_bytes()
-        for share in (0.1, 0.5, 0.9):
-            path.write_bytes(whole[: int(share * len(whole))])
-            with pytest.raises(InputError, match=path.name):
-                meshfile.read(path)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(InputError, match="a mesh file that exists"):
-        meshfile.read(tmp_path / "nothing.vtu")
-    with pytest.raises(InputError, match="a mesh file that exists"):
-        meshfile.read(tmp_path)
-
-
 def test_cells_outside_every_physical_group_are_refused(tmp_path):
     path = tmp_path / "mesh.msh"
     meshfile.write(half_finger(), path)
@@ -258,10 +176,3 @@ def test_msh_cannot_carry_a_lonely_node(tmp_path):
         meshfile.write(
             Mesh(mesh.points, mesh.cells, "quad", mesh.region, mesh.region_names, sets), tmp_path / "m.msh"
         )
-
-
-def test_meshed_finger_reads_a_file(tmp_path):
-    laws = {"tissue": NeoHookean(E=0.05, nu=0.48), "skin": NeoHookean(E=1.0, nu=0.3)}
-    finger = MeshedFinger(stored(tmp_path), laws, regions=REGIONS)
-    same(finger.mesh(1), half_finger())
-    same(finger.mesh(2), raised(half_finger()))

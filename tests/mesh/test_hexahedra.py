@@ -10,35 +10,9 @@ from tools.solids import SIDES, block
 import evfem as ev
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.mesh.hexahedron import EDGES, FACES, MIRRORED, PLACES, face_nodes
+from evfem.mesh.hexahedron import EDGES, FACES, MIRRORED, PLACES
 from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import check
-
-
-def test_middles_lie_between_their_corners():
-    for places, corners in ((PLACES[8:20], EDGES), (PLACES[20:26], FACES)):
-        np.testing.assert_array_equal(places, PLACES[corners].mean(axis=1))
-    assert len({tuple(place) for place in PLACES.tolist()}) == 27
-    # VTK's order of the faces: -x, +x, -y, +y, -z, +z
-    assert [tuple(place) for place in PLACES[20:26].tolist()] == [
-        (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1)
-    ]  # fmt: skip
-
-
-def test_faces_are_seen_from_outside():
-    """The normal of each face, from its corners' order, is the place of its middle; middles of its
-    edges follow its corners.
-    """
-    x = PLACES[face_nodes(2)]
-    normal = np.cross(x[:, 1] - x[:, 0], x[:, 3] - x[:, 0]) // 4
-    np.testing.assert_array_equal(normal, PLACES[20:26])
-    np.testing.assert_array_equal(x[:, 4:8], (x[:, :4] + np.roll(x[:, :4], -1, axis=1)) / 2)
-    np.testing.assert_array_equal(face_nodes(1), face_nodes(2)[:, :4])
-
-
-def test_mirrored_cells_turn_the_other_way_round():
-    swapped = PLACES[MIRRORED][:, ::-1]
-    np.testing.assert_array_equal(swapped, PLACES)
 
 
 def test_outer_faces_of_a_block():

@@ -8,7 +8,7 @@ import pytest
 from evfem.errors import InputError
 from evfem.finger.fingerpad import FingerPad
 from evfem.mesh.faces import layer_thickness
-from evfem.mesh.mesh import CELLS, Mesh, raised
+from evfem.mesh.mesh import Mesh, raised
 from evfem.mesh.quality import scaled_jacobian
 
 
@@ -44,43 +44,6 @@ def test_outer_edges_run_around_the_body_with_the_body_on_the_left():
         assert len(mesh.outer_edges) == 12
         # Green: the integral of (x dy - y dx)/2 over the outline is plus the area
         assert 0.5 * np.sum(start[:, 0] * end[:, 1] - start[:, 1] * end[:, 0]) == pytest.approx(12.0)
-
-
-def test_edges_of_a_set_need_all_their_nodes():
-    mesh = strip()
-    assert len(mesh.edges_of("top")) == 4
-    part = Mesh(
-        mesh.points, mesh.cells, "quad", mesh.region, mesh.region_names, {"top": mesh.node_sets["top"][:3]}
-    )
-    assert len(part.edges_of("top")) == 2
-
-
-def test_every_edge_is_listed_once():
-    edges, of_cell = strip().edges
-    # 3 rows of 4 horizontal edges and 2 rows of 5 vertical ones
-    assert len(edges) == 22
-    assert len(np.unique(edges, axis=0)) == 22
-    assert (edges[:, 0] < edges[:, 1]).all()
-    assert of_cell.shape == (8, 4)
-    assert np.bincount(of_cell.ravel()).tolist().count(1) == 12
-
-
-def test_raised_mesh_has_straight_edges_and_middles():
-    mesh, old = strip(order=2), strip()
-    corner = mesh.points[mesh.cells[:, :4]]
-    assert mesh.kind == "quad9"
-    assert len(mesh.points) == 5 * 9  # (2 * 4 + 1) x (2 * 2 + 1) nodes, none twice
-    np.testing.assert_allclose(mesh.points[mesh.cells[:, 4:8]], 0.5 * (corner + np.roll(corner, -1, axis=1)))
-    np.testing.assert_allclose(mesh.points[mesh.cells[:, 8]], corner.mean(axis=1))
-    np.testing.assert_array_equal(mesh.points[: len(old.points)], old.points)
-    assert raised(mesh) is mesh
-
-
-def test_raised_triangle_has_mid_nodes_in_vtk_order():
-    mesh = triangle("triangle6", apex=(0.0, 2.0))
-    assert mesh.kind == "triangle6"
-    expected = [[0.5, 0.0], [0.5, 1.0], [0.0, 1.0]]
-    np.testing.assert_allclose(mesh.points[mesh.cells[0, 3:]], expected)
 
 
 def test_new_nodes_join_the_sets_of_their_outer_edge_only():
@@ -130,13 +93,6 @@ def test_thickness_follows_a_curved_quadratic_interface():
         assert layer_thickness(mesh, "layer", np.array([node]))[0] == pytest.approx(brute, rel=1e-9)
 
 
-def test_thickness_needs_the_region_and_a_neighbour():
-    with pytest.raises(InputError, match="allowed: under"):
-        layer_thickness(strip(), "skin", np.array([0]))
-    with pytest.raises(InputError, match="another one below"):
-        layer_thickness(triangle(), "skin", np.array([0]))
-
-
 @pytest.mark.parametrize("kind", ["triangle", "triangle6"])
 def test_equilateral_triangle_has_scaled_jacobian_one(kind):
     assert scaled_jacobian(triangle(kind))[0] == pytest.approx(1.0, rel=1e-12)
@@ -166,14 +122,6 @@ def test_scaled_jacobian_sees_a_mid_node_beyond_the_quarter_point():
         points[mesh.cells[0, 4], 0] += 2.0 * shift  # half width 2
         moved = Mesh(points, mesh.cells, mesh.kind, mesh.region, mesh.region_names)
         assert np.sign(scaled_jacobian(moved)[0]) == sign
-
-
-def test_the_table_of_cells_agrees_with_meshio():
-    import meshio
-
-    for name, kind in CELLS.items():
-        block = meshio.CellBlock(name, np.zeros((1, kind.nodes), dtype=int))
-        assert (block.dim, block.data.shape[1]) == (kind.dimension, kind.nodes)
 
 
 @pytest.mark.parametrize("kind", ["quad", "quad9", "triangle", "triangle6"])

@@ -3,15 +3,11 @@
 import meshio
 import numpy as np
 import pytest
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 from tools.mesh_parts import REGIONS, of_kind, raw
 from tools.meshes import half_finger
 
 from evfem.errors import InputError
 from evfem.mesh import file as meshfile
-from evfem.mesh import quality
 from evfem.mesh.mesh import Mesh, raised
 
 
@@ -145,29 +141,3 @@ def test_wrong_mesh_gets_one_sentence(case, tmp_path, capfd):
     assert "\n" not in message
     assert caught.value.key == "finger.mesh"
     assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_pairs_within_a_reach_are_those_of_a_search_tree(dim):
-    points = np.random.default_rng(3).random((400, dim))
-    points[:40] = points[40:80]  # some in one place
-    found = quality._pairs_within(points, 0.08)
-    expected = cKDTree(points).query_pairs(0.08)
-    assert len(found) == len(expected)
-    assert {tuple(sorted(pair)) for pair in found.tolist()} == expected
-
-
-@pytest.mark.parametrize("edges", [250, 900, 2500])
-def test_parts_are_the_components_of_the_graph_of_cells(edges):
-    of_cell = np.random.default_rng(edges).integers(0, edges, (600, 4))
-    table = coo_array((np.ones(of_cell.size), (np.repeat(np.arange(600), 4), of_cell.ravel())))
-    graph = (table @ table.T).tocsr()
-    graph.indices, graph.indptr = (part.astype(np.int32) for part in (graph.indices, graph.indptr))
-    expected, _ = connected_components(graph, directed=False)
-    assert quality._parts(of_cell, edges) == expected > 0
-
-
-def test_a_long_chain_of_cells_is_one_part():
-    chain = np.arange(20_000)
-    of_cell = np.random.default_rng(0).permutation(np.column_stack([chain, chain + 1]))
-    assert quality._parts(of_cell, 20_001) == 1

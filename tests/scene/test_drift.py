@@ -1,6 +1,5 @@
 """The load of a slide with a held indentation: what is estimated before, and measured after."""
 
-import numpy as np
 import pytest
 
 import evfem as ev
@@ -91,22 +90,3 @@ def test_the_measured_drift_counts_from_the_last_press():
     assert measured([press, row("hover", -0.1, -1e-3), row("voltage", -0.1, -0.1)]) == 0.0
     assert measured([press, row("press", 0.6, 0.06), row("slide", 0.6, 0.066)]) == pytest.approx(0.1)
     assert measured([row("press", 0.5, 0.0), row("slide", 0.5, 0.1)]) == 0.0
-
-
-@pytest.mark.filterwarnings("ignore:motion 1 slides with the indentation held")
-def test_a_result_says_how_far_its_load_has_drifted():
-    held = ev.simulate(sliding(hold="force"))
-    assert (held.load_drift, held.summary()["load_drift"]) == (0.0, 0.0)
-    assert "drifted" not in repr(held)
-    loose = ev.simulate(sliding(friction=1.0))
-    change = np.abs(loose.applied_force[4:] / loose.applied_force[3] - 1.0).max()
-    assert loose.load_drift == pytest.approx(change, rel=1e-12)
-    assert repr(loose).splitlines()[-1] == f"  the load drifted by {change:.1%} at a held indentation"
-
-
-def test_a_held_indentation_is_the_same_to_the_digits_that_are_solved():
-    held = {"motion": "slide", "indentation": 0.5 + 1e-13, "applied_force": 0.06}
-    press = held | {"motion": "press", "indentation": 0.5, "applied_force": 0.05}
-    assert measured([press, held]) == pytest.approx(0.2)
-    loose = press | {"applied_force": 1e-17}
-    assert measured([loose, held]) == 0.0

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tools.scenes import HOVER, WAIT, head
 
 import evfem as ev
 from evfem.errors import InputError
@@ -15,19 +16,7 @@ def thin(scene):
     return scene.electrics.of_skin(0.3)
 
 
-HEAD = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "strong_troxel"
-insulator = "touchscreen"
-"""
-HOVER = '[[motion]]\nkind = "hover"\ngap = 0.5\n'
-WAIT = '[[motion]]\nkind = "wait"\nduration = 0.1\nsteps = 200\n'
+HEAD = head('law = "strong_troxel"\ninsulator = "touchscreen"')
 MEAN = 'amplitude = 100.0\nfrequency = 250.0\nskin = "gabriel_dry"\ngap_conductivity = 1e-8\n'
 
 
@@ -147,11 +136,6 @@ def test_the_plan_warns_of_a_mean_that_the_tissue_would_follow():
     )  # fmt: skip
     assert "swings at 100 Hz, and the tissue follows up to 159 Hz" in str(ev.plan(slow).warning)
     assert "swings" not in str(ev.plan(replace(slow, drive=ev.Drive(500.0))).warning)
-
-
-def test_a_resolved_drive_is_told_to_take_short_steps():
-    scene = loads(HEAD + MEAN + 'drive = "resolved"\n' + HOVER + WAIT)
-    assert "8 steps in a period of the voltage (250 Hz)" in str(ev.plan(scene).warning)
 
 
 def test_the_mean_of_a_signal_that_repeats_is_a_number_to_the_run():

@@ -1,37 +1,21 @@
-"""A force law and a waveform more: one class each, and every door of the package knows them."""
+"""A force law more: one class, and every door of the package knows it."""
 
 from dataclasses import dataclass, replace
 from typing import Annotated
 
 import numpy as np
 import pytest
+from tools.scenes import HOVER, head
 
 import evfem as ev
 from evfem.common.checks import Within, number, plain
-from evfem.electrostatics import timesignals
-from evfem.electrostatics.alternating import grouped
 from evfem.electrostatics.laws import FORCE_LAWS, GapPermittivity, NamedLaw
 from evfem.errors import InputError
 from evfem.scene.file import dump, loads
 from evfem.scene.schema import schema
 
-TEXT = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "softened"
-softening = 0.02
-gap_eps_r = 2.0
-insulator = "film"
-voltage = 100.0
-[[motion]]
-kind = "hover"
-gap = 0.2
-"""
+KEYS = 'law = "softened"\nsoftening = 0.02\ngap_eps_r = 2.0\ninsulator = "film"\nvoltage = 100.0'
+TEXT = head(KEYS) + HOVER
 
 
 @pytest.fixture
@@ -78,29 +62,3 @@ def test_a_law_that_derives_from_another_is_for_python_alone():
     with pytest.raises(InputError, match="full with Weaker; allowed: local, or StrongTroxel"):
         replace(scene, field="full")
     assert replace(scene, law=ev.StrongTroxel(), field="full").field == "full"
-
-
-def test_a_waveform_more_is_a_class(monkeypatch):
-    @dataclass(frozen=True)
-    class Triangle(timesignals.Square):
-        kind = "triangle"
-        crest = float(np.sqrt(3.0))
-
-        @staticmethod
-        def harmonics():
-            order = np.arange(1.0, 101.0, 2.0)
-            weight = 96.0 / (np.pi * order) ** 4
-            return grouped(order, weight / weight.sum())
-
-    monkeypatch.setitem(timesignals.WAVEFORMS, "triangle", Triangle)
-    keys = 'law = "strong_troxel"\nwaveform = "triangle"\nfrequency = 50.0\nskin = "gabriel_dry"\n'
-    scene = loads(TEXT.replace('law = "softened"\nsoftening = 0.02\n', keys).replace("voltage", "amplitude"))
-    assert loads(dump(scene)) == scene
-    assert scene.voltage == pytest.approx(100.0 / np.sqrt(3.0))
-    assert schema()["properties"]["electrostatics"]["properties"]["waveform"]["enum"][-1] == "triangle"
-    law, layers = scene.electrics.attraction
-    solids, expected = (scene.electrics.skin, scene.electrics.insulator), 0.0
-    for order, weight in zip(*(part.tolist() for part in Triangle.harmonics()), strict=True):
-        one = ev.Layers.of(*solids, frequency=50.0 * order, gap_eps_r=2.0)
-        expected += weight * scene.law.traction(0.1, scene.voltage, one)
-    assert law.traction(0.1, scene.voltage, layers) == pytest.approx(expected, rel=1e-12)

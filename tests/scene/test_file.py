@@ -1,4 +1,4 @@
-"""Scene files: three examples load, what is written is read back, mistakes get one sentence."""
+"""Scene files: an example loads, what is written is read back, mistakes get one sentence."""
 
 import pickle
 from dataclasses import replace
@@ -16,7 +16,6 @@ from evfem.scene.file import dump, load, loads
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
 from evfem.scene.scene import Output, Scene, Solver, default_scene
 from evfem.scene.terms import Boundary
-from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
 from evfem.surface.textures import Grating, SelfAffine
 from evfem.tissue.forms import form
@@ -129,28 +128,6 @@ def test_the_first_example_is_the_default_scene():
     assert scene.motion == (Press(force=0.05, steps=10), Slide(distance=5.0, steps=100))
 
 
-def test_the_second_example_has_a_mesh_of_its_own(folder):
-    scene = loads(OWN_MESH, folder)
-    assert scene.finger.materials == {
-        "tissue": NeoHookean(E=0.05, nu=0.48),
-        "skin": NeoHookean(E=1.0, nu=0.3),
-    }
-    assert scene.finger.electrical == Electrical(0.38, 1650.0)
-    assert (scene.surface, scene.law, scene.voltage) == (Flat(friction=0.0, y=-6.395), None, 0.0)
-    assert scene.solver == Solver(element="q1")
-    assert scene.motion == (Press(indentation=1.5, steps=15),)
-    assert scene.finger.source == folder / "pad.vtu"
-    assert scene.finger.regions == {"tissue": 0, "skin": 1}
-
-
-def test_the_third_example_has_texture_and_time():
-    scene = loads(TEXTURE)
-    assert scene.finger == FingerPad(viscosity=1e-3)
-    assert scene.surface == Sinusoid(friction=0.1)
-    assert (scene.solver, scene.output) == (Solver(dynamics="viscous"), Output(every=1))
-    assert scene.motion[1] == Slide(distance=4.0, steps=200, speed=20.0)
-
-
 def test_a_file_gives_its_name_and_folder(folder):
     (folder / "my scan.toml").write_text(
         "version = 1\n[surface]\nkind='profile'\nfile='scan.csv'\n[electrostatics]\nlaw='strong_troxel'\n"
@@ -162,23 +139,6 @@ def test_a_file_gives_its_name_and_folder(folder):
     assert float(scene.surface.height(np.array(0.0))) == 0.01
     assert (scene.law, scene.surface.insulator) == (StrongTroxel(), Layer(0.1, 3.0))
     assert scene.motion == (Hover(gap=1.0),)
-
-
-def test_every_kind_of_motion_and_a_friction_table_can_be_written_in_a_file():
-    text = (
-        "version = 1\n[surface]\nkind='sinusoid'\nfriction=[[0, 0.3], [1, 0.5]]\nterms=[[0.1, 2, 0]]\n"
-        "[electrostatics]\nlaw='kaczmarek'\ninsulator_thickness=0.1\ninsulator_eps_r=3\nair_layer=false\n"
-        "[[motion]]\nkind='press'\nindentation=1\nspeed=2\n[[motion]]\nkind='voltage'\nvoltage=100\nsteps=3\nhold='force'\n"
-        "[[motion]]\nkind='slide'\ndistance=-1\nhold='force'\n[[motion]]\nkind='voltage'\ngap=0.05\nsteps=4\n"
-    )
-    scene = loads(text)
-    press, ramp = Press(indentation=1.0, speed=2.0), VoltageRamp(100.0, steps=3, hold="force")
-    closing = VoltageRamp(gap=0.05, steps=4)
-    assert scene.motion == (press, ramp, Slide(distance=-1.0, hold="force"), closing)
-    assert scene.voltage == 0.0
-    assert scene.surface.friction_coefficient(np.array([0.5])).tolist() == [0.4]
-    assert scene.surface.terms == ((0.1, 2.0, 0.0),)
-    assert scene.air_layer is False
 
 
 def test_a_participant_of_table_1_may_stand_in_a_file():
@@ -432,12 +392,6 @@ def test_what_an_unknown_key_may_stand_for_is_not_said_to_be_missing(folder):
     assert [mistake.key for mistake in caught.value.mistakes] == ["electrostatics.lwa"]
 
 
-def test_a_voltage_file_beside_a_ramp_is_refused(folder):
-    text = DISPLAY.replace("voltage = 1000.0", "voltage_file = 'voltage.csv'")
-    with pytest.raises(InputError, match=r"motion\[2\]: given a voltage ramp beside a voltage profile"):
-        loads(text + "[[motion]]\nkind = 'voltage'\nvoltage = 1\n", folder)
-
-
 def test_files_that_cannot_be_scenes_get_a_sentence(tmp_path):
     cases = {
         "none.toml": (None, "No such file"),
@@ -459,15 +413,6 @@ def test_a_table_that_is_too_large_is_refused_before_it_is_read(folder):
         file.truncate(65 * 2**20)
     with pytest.raises(InputError, match="at most 64 MB"):
         loads(DISPLAY.replace("voltage = 1000.0", "voltage_file = 'voltage.csv'"), folder)
-
-
-def test_the_strategy_goes_to_a_file_and_back():
-    text = 'version = 1\n[surface]\nkind = "flat"\n[[motion]]\nkind = "press"\nforce = 0.05\n'
-    scene = loads(text.replace("[[motion]]", "[solver.strategy]\npatience = 3.0\neasy = 5\n[[motion]]", 1))
-    assert scene.solver.strategy == Strategy(patience=3.0, easy=5)
-    assert loads(dump(scene)).solver == scene.solver
-    with pytest.raises(InputError, match=r"strategy\.growth: given 0\.5; allowed: a factor from 1 to 10"):
-        loads(text.replace("[[motion]]", "[solver.strategy]\ngrowth = 0.5\n[[motion]]", 1))
 
 
 def test_a_key_of_another_motion_is_not_told_that_it_stands_in_motion():

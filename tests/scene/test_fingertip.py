@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import evfem as ev
-from evfem import meshfile
 from evfem.cli import main
 from evfem.errors import InputError
 from evfem.scene.file import dump, loads
@@ -29,22 +28,6 @@ def test_kind_chooses_the_finger():
         assert isinstance(scene(text).finger, ev.FingerPad)
     with pytest.raises(InputError, match=r"finger.kind: given .toe.; allowed: pad \| fingertip"):
         scene('kind = "toe"')
-
-
-def test_keys_are_the_fields():
-    text = 'kind = "fingertip"\nlength = 24.0\nridges = "whorl"\nrim = "free"\nresolution = "coarse"\n'
-    finger = scene(text + "[finger.materials.dermis]\nE = 0.1\n[finger.electrical]\n").finger
-    assert finger.length == 24.0
-    assert finger.ridges == "whorl"
-    assert finger.rim == "free"
-    assert finger.materials["dermis"].E == 0.1
-    assert scene('kind = "fingertip"\nridges = false').finger.ridges == "none"
-
-
-def test_participants_have_their_sizes():
-    own = scene('kind = "fingertip"\nparticipant = "ii"\nridges = "none"\nbone_length = 15.0').finger
-    other = ev.Fingertip.participant("ii", ridges=False)
-    assert (own.width, own.length, own.bone_length) == (other.width, other.length, 15.0)
 
 
 @pytest.mark.parametrize(
@@ -85,16 +68,6 @@ def test_paths_are_relative_to_the_file(tmp_path):
     assert finger.ridges.height.tolist() == [[0.0, 0.0], [0.1, 0.1]]
 
 
-def test_mesh_is_written(tmp_path, capsys):
-    (tmp_path / "tip.toml").write_text(
-        f'version = 1\n[finger]\nkind = "fingertip"\nridges = "none"\nresolution = "coarse"\n{REST}'
-    )
-    assert main(["mesh", str(tmp_path / "tip.toml"), "--out", str(tmp_path / "tip.vtu")]) == 0
-    assert "hexahedron27" in capsys.readouterr().out
-    mesh = meshfile.read(tmp_path / "tip.vtu")
-    np.testing.assert_allclose(mesh.points, ev.Fingertip(ridges=False, resolution="coarse").mesh().points)
-
-
 def test_a_run_leaves_what_can_be_loaded(tmp_path, capsys):
     """Columns of three dimensions with their names in `history.csv`, fields of the solid."""
     lines = 'kind = "fingertip"\nridges = "none"\nresolution = "coarse"\n'
@@ -114,14 +87,3 @@ def test_a_run_leaves_what_can_be_loaded(tmp_path, capsys):
     assert float(np.nanmax(pressure)) == np.nanmax(result.frames[-1].contact_pressure)
     names = (folder / ".evfem-files").read_text().split()
     assert {"skin.pvd", "skin_00001.vtu", "fields.pvd"} <= set(names)
-
-
-def test_a_sweep_tells_columns_of_three_dimensions():
-    tip = {"kind": "fingertip", "ridges": "none", "resolution": "coarse"}
-    tables = {"version": 1, "finger": tip, "surface": {"kind": "flat"}}
-    tables["motion"] = [{"kind": "press", "indentation": 0.1}]
-    names = ("contact_area.last", "applied_tangential_force_x.last", "position_z.last")
-    table = ev.sweep(ev.Sweep(tables, {"finger.resolution": ["coarse"]}, outputs=names), workers=1)
-    assert [row["status"] for row in table.rows] == ["done"]
-    assert table.rows[0]["contact_area.last"] > 1.0
-    assert table.rows[0]["position_z.last"] == 0.0

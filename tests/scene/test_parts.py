@@ -373,16 +373,6 @@ def test_a_law_is_tried_at_negative_voltages_where_a_scene_has_them(name):
         plan(scene(None, PRESS, *motion, law=law(signed), **more))
 
 
-def test_a_million_volts_are_refused():
-    for more in ({"voltage": 1e6}, {"voltage": ev.VoltageProfile([0.0, 1.0], [0.0, -1e6])}):
-        with pytest.raises(
-            InputError, match=r"electrostatics\.voltage: given 1000000\.0; allowed: a voltage"
-        ):
-            plan(scene(law=CHARGED, **more))
-    with pytest.raises(InputError, match="allowed: a voltage"):
-        plan(scene(None, PRESS, ev.VoltageRamp(1e6), law=CHARGED))
-
-
 # -- surfaces --------------------------------------------------------------------------------------------
 
 #: ramps of a table, with their slope: neither has a derivative at the kinks
@@ -435,12 +425,6 @@ def test_a_law_of_friction_behind_a_decorator_is_taken():
     check_parts(
         scene(None, *FAST, friction_law=friction(lambda pressure, *args, **kwargs: 0.001 + 0.0 * pressure)), 2
     )
-
-
-def test_one_bound_for_all_nodes_is_taken():
-    result = ev.simulate(scene(None, *FAST, friction_law=friction(fixed)))
-    width = result.contact_width[-1]
-    assert result.tangential_force[-1] == pytest.approx(1e-3 * width, rel=0.1)
 
 
 def test_a_roughness_without_mistakes_is_taken():

@@ -11,7 +11,7 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
-from evfem.planning.plan import plan, plan_on, scene_mesh
+from evfem.planning.plan import plan
 from evfem.planning.way import remembers
 from evfem.simulation.model import make_model
 
@@ -66,41 +66,6 @@ def test_a_hovering_strip_bends_and_lands_as_beams_do(dim, voltages):
     result = ev.simulate(ev.Scene(pad, display, ev.StrongTroxel(), 0.0, motion))
     assert 0.5 - result.min_gap[1] == pytest.approx(deflection(500.0), rel=0.02)
     assert result.min_gap[2:] == pytest.approx([0.0] * (len(voltages) - 1), abs=1e-9)
-
-
-def test_the_largest_voltage_of_any_source_counts():
-    profile = ev.VoltageProfile([0.0, 1.0], [10.0, -300.0])
-    assert hovering(voltage=profile).electrics.largest_voltage == 300.0
-    ramps = [ev.VoltageRamp(-500.0), ev.VoltageRamp(0.0)]
-    assert hovering(voltage=20.0, motion=ramps).electrics.largest_voltage == 500.0
-    from_nothing = hovering(voltage=0.0, motion=ramps)
-    assert plan(from_nothing).has("electricity")
-    assert not plan(hovering(voltage=0.0)).has("electricity")
-
-
-def test_a_voltage_over_time_acts_whatever_it_says_of_itself():
-    class Modest:
-        largest, highest_frequency = 0.0, 1.0
-
-        def __call__(self, time):
-            return 100.0 + 0.0 * np.asarray(time)
-
-    run = {"motion": [ev.Wait(0.1, steps=2)]}
-    modest, plain = (ev.simulate(hovering(voltage=voltage, **run)) for voltage in (Modest(), 100.0))
-    np.testing.assert_allclose(modest.electrostatic_force, plain.electrostatic_force, rtol=1e-9)
-    assert plain.electrostatic_force[-1] > 0.0
-
-
-def test_numbers_are_those_of_the_mesh():
-    """40 by 2 quads of nine nodes: 81 by 5 nodes, the upper 81 move as one, the lower 81 may
-    touch.
-    """
-    scene = hovering()
-    mesh, element = scene_mesh(scene)
-    found = plan_on(scene, mesh, element)
-    assert (found.element, found.nodes, found.cells) == ("q2p1", 81 * 5, 80)
-    assert found.unknowns == 2 * 81 * 4 + 2 == make_model(hovering()).body.size
-    assert (found.pad_nodes, found.steps) == (81, 1)
 
 
 @pytest.mark.parametrize(("nu", "said"), [(0.49, False), (0.4999, True)])

@@ -8,13 +8,12 @@ import pytest
 from tools.builders import finger
 from tools.meshes import block
 
-from evfem.cli import main
 from evfem.planning.plan import plan
 from evfem.scene.motion import Press
 from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Flat, Profile, Sinusoid
-from evfem.surface.textures import Grating, SelfAffine
+from evfem.surface.textures import SelfAffine
 
 X = np.arange(-5.0, 5.001, 0.05)
 #: grooves 0.05 mm deep, 0.1 mm wide, 0.5 mm apart
@@ -40,22 +39,6 @@ def test_what_the_nodes_can_feel_is_not(surface):
     assert plan(scene(surface)).warning is None
 
 
-def test_finer_nodes_feel_what_coarse_ones_cannot():
-    wave = Sinusoid(terms=[[0.05, 2.0 * np.pi / 0.6, 0.0]], friction=0.0)
-    # between two nodes half a wave length apart lies all of it, an eighth apart next to nothing
-    assert plan(scene(wave, cells=6)).warning is not None
-    assert plan(scene(wave, cells=48)).warning is None
-
-
-def test_the_noise_of_a_scan_is_warned_of_though_its_height_is_small():
-    x = np.arange(-5.0, 5.001, 0.01)
-    noise = np.random.default_rng(2).normal(size=x.size)
-    wave = 0.008 * np.sin(2.0 * np.pi * x / 2.5)
-    # what lies between two nodes is 5 % of the height, but most of the slope
-    assert "is finer than that, as noise is" in plan(scene(Profile(x, wave + 2e-4 * noise), cells=64)).warning
-    assert plan(scene(Profile(x, wave), cells=64)).warning is None
-
-
 def test_how_much_of_the_slope_is_too_fine():
     long, short = 2.0 * np.pi / 4.0, 2.0 * np.pi * 3.0  # whole waves along the pad
     fine = Sinusoid(terms=[[0.05, long, 0.0], [3e-3, short, 0.0]], friction=0.0)
@@ -74,24 +57,3 @@ def test_the_shortest_waves_of_roughness_need_five_nodes_each():
         assert (found is None) == enough
     assert "(0.2 mm) have fewer than 5 nodes of the pad each, which are 0.042 mm apart" in found
     assert found.endswith("a shortest wave of 0.21 mm")
-
-
-def test_walls_of_a_grating_between_two_nodes_are_warned_of():
-    steep = Grating(period=1.0, groove_depth=0.02, wall_width=0.01, friction=0.0)
-    assert "sharper than the node spacing" in plan(scene(steep, cells=48)).warning
-    gentle = Grating(period=1.0, groove_depth=0.02, wall_width=0.2, friction=0.0)
-    assert plan(scene(gentle, cells=48)).warning is None
-
-
-def test_the_command_says_it_in_one_line(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    rows = "".join(f"{x},{-0.2 if round(x / 0.02) % 2 else 0.0}\n" for x in np.arange(-9.0, 9.0, 0.02))
-    (tmp_path / "scan.csv").write_text("x,height\n" + rows)
-    text = 'version = 1\n[finger]\nridges = false\nresolution = "coarse"\n[surface]\nkind = "profile"\n'
-    text += 'file = "scan.csv"\nfriction = 0.0\n[[motion]]\nkind = "press"\nindentation = 0.05\nsteps = 1\n'
-    (tmp_path / "scene.toml").write_text(text)
-    assert main(["run", "scene.toml", "--no-fields", "--no-plots"]) == 0
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if "warning" in line]
-    assert line.startswith(
-        "evfem: warning: scene.toml: the surface is sharper than the node spacing of the pad"
-    )

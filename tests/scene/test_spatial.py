@@ -1,8 +1,6 @@
 """What a finger in three dimensions is refused, where slides go, and the memory that is announced."""
 
-import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 from tools.domes import Dome, dome, dome_scene
 
 import evfem as ev
@@ -11,17 +9,8 @@ from evfem.planning.plan import plan
 from evfem.scene import spatial
 from evfem.scene.spatial import needed_memory
 from evfem.simulation.model import make_model
-from evfem.surface.edge import outline_nodes
 
 PRESS = ev.Press(indentation=0.1)
-
-
-@pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, 135.0, 180.0, -90.0, -45.0, 270.0, 360.0])
-def test_a_slide_goes_at_its_angle_from_x_towards_z(angle):
-    x, z = ev.Slide(2.0, angle=angle).course.travel
-    assert_allclose([x, z], [2.0 * np.cos(np.radians(angle)), 2.0 * np.sin(np.radians(angle))], atol=1e-15)
-    if angle % 90.0 == 0.0:
-        assert {abs(x), abs(z)} == {0.0, 2.0}
 
 
 def refusals():
@@ -54,11 +43,6 @@ def test_a_finger_in_the_plane_slides_along_x():
     flat = ev.Scene(ev.FingerPad(resolution="coarse"), ev.Flat(), motion=[PRESS, ev.Slide(1.0, angle=10.0)])
     with pytest.raises(InputError, match=r"motion\[1\].angle: given 10 degrees with a finger in the plane"):
         plan(flat)
-
-
-def test_what_is_of_the_plane_alone_refuses_a_whole_finger():
-    with pytest.raises(InputError, match="three dimensions"):
-        outline_nodes(dome())
 
 
 def test_the_plan_says_what_a_whole_finger_needs():

@@ -3,33 +3,14 @@
 import numpy as np
 import pytest
 from scipy.io import wavfile
+from tools.scenes import HOVER, PRESS, WAIT, head
 
 import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
 
-HEAD = """
-version = 1
-[finger]
-ridges = false
-resolution = "coarse"
-[surface]
-kind = "flat"
-[electrostatics]
-law = "kaczmarek"
-insulator_thickness = 0.001
-insulator_eps_r = 3.9
-"""
-WAITING = """
-[[motion]]
-kind = "hover"
-gap = 0.5
-[[motion]]
-kind = "wait"
-duration = 0.1
-steps = 200
-"""
+HEAD = head('law = "kaczmarek"\ninsulator_thickness = 0.001\ninsulator_eps_r = 3.9')
 SINE = '[electrostatics.signal]\nkind = "sine"\nfrequency = 50\namplitude = 100\nbias = 20.0\n'
 CARRIER = """[electrostatics.signal]
 kind = "carrier"
@@ -41,7 +22,7 @@ SAMPLED = '[electrostatics.signal]\nkind = "sampled"\nrate = 1000.0\nvoltage = [
 
 
 def scene_of(signal, folder="."):
-    return loads(HEAD + signal + WAITING, folder)
+    return loads(HEAD + signal + HOVER + WAIT, folder)
 
 
 def test_the_kinds_of_signals_are_those_of_python():
@@ -77,11 +58,6 @@ def test_samples_come_from_files(tmp_path):
     assert (found.voltage.tolist(), found.start, found.rate) == ([0.0, 120.0, -120.0], 0.5, 8000.0)
     # relative to the file, and whole in what is written
     assert loads(dump(scene_of(table, tmp_path))).voltage.voltage.tolist() == [0.0, 120.0, -120.0]
-
-
-def test_voltage_files_over_the_position_are_read_as_ever(tmp_path):
-    ev.VoltageProfile([0.0, 1.0], [5.0, 6.0]).to_csv(tmp_path / "voltage.csv")
-    assert isinstance(scene_of('voltage_file = "voltage.csv"\n', tmp_path).voltage, ev.VoltageProfile)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +97,7 @@ def test_a_mistake_is_named_by_its_key(tmp_path, signal, old, new, key):
 
 def test_a_signal_needs_a_motion_that_takes_time():
     with pytest.raises(InputError, match=r"electrostatics.voltage: given a signal over time, and no motion"):
-        loads(HEAD + SINE + '[[motion]]\nkind = "press"\nforce = 0.05\n')
+        loads(HEAD + SINE + PRESS)
     slide = '[[motion]]\nkind = "slide"\ndistance = 1.0\nsteps = 50\nspeed = 20.0\n'
     loads(HEAD + SINE + slide)
     with pytest.raises(InputError):
@@ -144,11 +120,9 @@ def test_a_signal_of_ones_own_goes_into_a_scene_but_not_into_a_file():
         assert caught.value.key.startswith("electrostatics.voltage")
 
 
-PRESS = ev.Press(indentation=0.3, steps=1)
-
-
 def warned(signal, *motion):
-    scene = ev.Scene(scene_of(SINE).finger, ev.Display(), ev.Kaczmarek(), signal, [PRESS, *motion])
+    motion = ev.Press(indentation=0.3, steps=1), *motion
+    scene = ev.Scene(scene_of(SINE).finger, ev.Display(), ev.Kaczmarek(), signal, motion)
     return plan(scene).warning or ""
 
 
@@ -167,18 +141,3 @@ def test_steps_that_cannot_follow_a_signal_are_warned_of():
     assert warned(ev.Sine(50.0, 10.0), slide, ev.Wait(0.1, steps=99)).startswith("motion 2 has")
     assert warned(ev.Sine(51.0, 10.0), slide).startswith("motion 1 has 19.6 steps")
     assert warned(ev.Sine(51.0, 10.0), ev.Wait(1e-4), ev.Slide(1.0, steps=1)) == ""
-
-
-def test_a_carrier_is_told_of_its_mean():
-    envelope = ev.Sine(50.0, 5.0, 10.0)
-    wait = ev.Wait(0.1, steps=100)
-    assert warned(ev.Carrier(10_000.0, envelope), wait).endswith(
-        "20100 steps in all, or resolved=False for the mean over the carrier's cycles"
-    )
-    assert warned(ev.Carrier(10_000.0, envelope, resolved=False), wait) == ""
-
-
-def test_the_plan_names_the_signal():
-    text = " ".join(str(plan(scene_of(SINE))).split())
-    assert "monolithic coupling, voltage over time to 50 Hz" in text
-    assert "- time quasi-static, the clock sets the voltage alone" in text

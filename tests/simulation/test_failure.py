@@ -3,7 +3,6 @@
 import traceback
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from tools.builders import coarse_pad, finger
 from tools.meshes import block
@@ -135,17 +134,3 @@ def test_a_plain_failure_keeps_its_reason():
     ) as caught:
         simulate(Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1), solver=hopeless))
     assert "".join(traceback.format_exception(caught.value)).count("Traceback") == 1
-
-
-def test_a_singular_tangent_leaves_the_reason():
-    class Broken:
-        @staticmethod
-        def verge(state, target):
-            raise StepFailed("the tangent is singular", [])
-
-    failed = StepFailed("cells would collapse", [1.0])
-    failed.last = object(), object()
-    scene = Scene(coarse_pad(), Flat(), motion=Press(indentation=0.5, steps=1))
-    model = type("Parts", (), {"equilibrium": Broken})
-    failed.unstable = bool(np.True_)
-    assert advice(scene, model, failed).startswith("cells would collapse; try smaller steps")

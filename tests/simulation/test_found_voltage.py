@@ -112,14 +112,6 @@ def test_the_balance_closes_on_the_way_beyond_a_third(dim):
     np.testing.assert_allclose(charge, charging(dim)[2][1:], rtol=1e-7)
 
 
-def test_a_charge_of_either_sign_takes_a_voltage_of_its_own():
-    asked = charging(2)[0]
-    minus = ev.ChargeControl(Rising(-asked.voltage.charge.last))
-    up, down = ev.simulate(asked), ev.simulate(replace(asked, voltage=minus))
-    np.testing.assert_allclose(down.voltage, -up.voltage, rtol=1e-12)
-    np.testing.assert_allclose(down.min_gap, up.min_gap, rtol=1e-12)
-
-
 def test_a_charge_that_leaks_leaves_the_voltage_of_the_insulator():
     """Long after, no field is left in a skin and a gap that conduct: U = Q s_3 / (eps_0 A), no force."""
     leak = ev.Drive(skin=ev.Dielectric(1e5, conductivity=1e-3), gap_conductivity=1e-4, resolved=True)
@@ -128,14 +120,6 @@ def test_a_charge_that_leaks_leaves_the_voltage_of_the_insulator():
     assert found.electrostatic_force[0] == pytest.approx(charge**2 / (2.0 * eps_0 * area), rel=1e-3)
     assert found.electrostatic_force[-1] < 1e-9 * found.electrostatic_force[0]
     assert found.voltage[-1] == pytest.approx(charge * 0.01 / 3.0 / (eps_0 * area), rel=1e-6)
-
-
-@pytest.mark.parametrize("coupling", ["staggered", "staggered_once"])
-def test_a_charge_goes_with_both_couplings(coupling):
-    """It is the given one with each of them."""
-    asked, _, charge = charging(2)
-    found = ev.simulate(replace(asked, coupling=coupling))
-    np.testing.assert_allclose(2.0 * found.field_energy[1:] / found.voltage[1:], charge[1:], rtol=1e-7)
 
 
 def test_a_charge_is_kept_by_a_finger_under_a_given_force():
@@ -166,21 +150,6 @@ def test_a_voltage_is_found_for_every_gap_through_the_pull_in_and_back(dim):
     assert found.voltage[9] == pytest.approx(found.voltage[4], rel=1e-6)
     assert found.relaxations.sum() == 0
     assert found.newton_iterations.max() <= 8
-
-
-def test_a_gap_is_reached_in_a_run_that_goes_on_after_an_interruption():
-    whole = scene(2, 0.0, [ev.VoltageRamp(gap=0.08, steps=4), ev.VoltageRamp(0.0, steps=2)])
-    saved = []
-
-    class Keep:
-        def step(self, row, frame, checkpoint):
-            saved.append((checkpoint(), [*(saved[-1][1] if saved else []), dict(row)]))
-
-    straight = ev.simulate(whole, observers=[Keep()])
-    resumed = ev.simulate(whole, resume=ev.result.Saved(*saved[3]))
-    for name in ("voltage", "min_gap", "electrostatic_force", "stored_energy"):
-        np.testing.assert_array_equal(resumed[name], straight[name])
-    assert straight.voltage[-1] == 0.0
 
 
 @pytest.mark.parametrize("dim", [2, 3])

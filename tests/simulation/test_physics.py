@@ -4,9 +4,7 @@ elasticity.
 
 import numpy as np
 import pytest
-import scipy.sparse as sparse
 from tools.builders import pad_state
-from tools.grids import quarter_ring, rectangle, tangent_of
 from tools.meshes import both_sides, contact_block, graded, parabola
 
 import evfem as ev
@@ -16,10 +14,7 @@ from evfem.reference import (
     HertzLine,
     plane_modulus,
     sliding_force_ratio,
-    tube_inner_radius,
 )
-from evfem.tissue.userforms import make_term
-from evfem.tissue.weakform import Tissue
 
 
 def press(mesh, law, surface, *motion, element=None):
@@ -148,72 +143,3 @@ def test_point_sliding_on_a_profile(direction):
             assert result.tangential_force[k] / result.normal_force[k] == pytest.approx(ratio, rel=1e-6)
             slipping += 1
     assert slipping > 12
-
-
-def follower(pressure):
-    """The weak form of a pressure on the deformed side: p cof(F) N . v."""
-
-    def form(u, v, w):
-        (a, b), (c, d) = ev.grad(u)
-        n, m = w.n
-        return pressure * (((1 + d) * n - c * m) * v[0] + ((1 + a) * m - b * n) * v[1])
-
-    return form
-
-
-def pressurised_tube(divisions, pressure, mu=1.0):
-    """Mean inner radius of a quarter of a ring, radii 1 and 2, under a pressure on the deformed
-    wall.
-
-    Symmetry holds the two cut sides.
-    """
-    space = rectangle("q2p1", divisions, warp=quarter_ring(1.0, 2.0))
-    nu = 0.49999
-    tissue = Tissue(space, {"lower": ev.NeoHookean(E=2.0 * mu * (1.0 + nu), nu=nu)})
-
-    sets = space.mesh.node_sets
-    free = np.ones((space.size, 2), dtype=bool)
-    free[sets["bottom"], 1] = free[sets["top"], 0] = False
-    free, u = free.ravel(), np.zeros((space.size, 2))
-    for present in np.linspace(0.25, 1.0, 4) * pressure:
-        term = make_term(space, follower(present), "left", boundary=True)
-        for _ in range(8):
-            K = tangent_of(space, u, tissue, term)[free][:, free]
-            residual = (tissue.forces(u) + term.forces(u)).ravel()[free]
-            u.ravel()[free] -= sparse.linalg.spsolve(K.tocsc(), residual)
-    assert np.abs(residual).max() < 1e-9
-    return float(np.hypot(*(space.mesh.points + u)[sets["left"]].T).mean())
-
-
-def test_neo_hookean_tube_under_pressure():
-    """A = 1, B = 2: p/mu = 0.4282284091 widens the bore to a = 1.5; order four, as for the area of
-    Q2 cells.
-
-    The closed form is incompressible, nu = 0.49999 here: 1 - 2 nu = 2e-5 shows in the sixth digit.
-    """
-    pressure = 0.4282284091
-    exact = tube_inner_radius(pressure, 1.0, 2.0, 1.0)
-    assert exact == pytest.approx(1.5, abs=1e-8)
-    errors = [abs(pressurised_tube((n, 2 * n), pressure) - exact) for n in (1, 2, 4)]
-    assert errors[2] < 1e-5
-    assert errors[0] > 10.0 * errors[1] > 100.0 * errors[2]
-
-
-def test_a_users_stress_law_is_the_built_in_law_in_the_same_contact():
-    """P(F) of the neo-Hookean law, written by a user; on plain quadratic elements the two are the
-    same.
-    """
-
-    class Mine:
-        def P(self, F):
-            mu, lmbda = 0.4, 0.6
-            return mu * F + (lmbda * np.log(ev.det(F)) - mu) * ev.transpose(ev.inv(F))
-
-    mesh = contact_block(np.linspace(-2.0, 2.0, 9), np.linspace(0.0, 2.0, 5), pad=2.0, lower=parabola(6.0))
-    motion = (ev.Press(indentation=0.4, steps=2), ev.Slide(distance=0.2, steps=2))
-    built_in = ev.NeoHookean(E=0.4 * (3 * 0.6 + 2 * 0.4) / (0.6 + 0.4), nu=0.6 / (2 * (0.6 + 0.4)))
-    mine, theirs = (
-        press(mesh, law, ev.Flat(friction=0.3), *motion, element="q2") for law in (Mine(), built_in)
-    )
-    for column in ("normal_force", "tangential_force", "stored_energy"):
-        np.testing.assert_allclose(getattr(mine, column), getattr(theirs, column), rtol=1e-7, atol=1e-9)

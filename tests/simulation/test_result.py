@@ -15,8 +15,7 @@ from tools.meshes import KINDS
 from evfem.errors import InputError, StorageError
 from evfem.simulation.checkpoint import Checkpoint
 from evfem.simulation.history import MEANINGS, csv_header, csv_line
-from evfem.simulation.provenance import versions
-from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, WHOLE_UNITS, Result, load
+from evfem.simulation.result import COLUMNS, INTEGERS, NEEDED, UNITS, Result, load
 
 #: the promised columns, and their order in history.csv
 CONTRACT = (
@@ -59,32 +58,10 @@ def test_a_result_without_frames_comes_back(tmp_path):
     assert (back.frames, back.rows, back.summary()["steps"]) == ([], [], 0)
 
 
-def test_saving_under_any_ending_keeps_the_name(tmp_path):
-    fake_result().save(tmp_path / "run.data")
-    assert [path.name for path in tmp_path.iterdir()] == ["run.data"]
-    assert len(load(tmp_path / "run.data").step) == 4
-
-
 def test_the_name_of_another_format_is_refused_with_what_writes_it(tmp_path):
     with pytest.raises(InputError, match=r"\.npz: to_csv writes the history"):
         fake_result().save(tmp_path / "run.csv")
     assert not list(tmp_path.iterdir())
-
-
-def test_rows_are_chosen_by_their_motion(tmp_path):
-    result = fake_result()
-    kinds = [row["motion"] for row in result.rows]
-    result.save(tmp_path / "run.npz")
-    for one in (result, result.total if result.depth else result, load(tmp_path / "run.npz")):
-        chosen = one.position[one.motion == kinds[0]]
-        assert len(chosen) == kinds.count(kinds[0]) > 0
-    assert {type(row["motion"]) for row in result.rows} == {str}
-
-
-def test_the_file_holds_no_pickled_objects(tmp_path):
-    fake_result().save(tmp_path / "run.npz")
-    with np.load(tmp_path / "run.npz", allow_pickle=False) as archive:
-        assert not any(archive[name].dtype.hasobject for name in archive.files)
 
 
 def test_rows_with_a_missing_or_unknown_column_are_refused():
@@ -205,12 +182,6 @@ def test_history_csv_keeps_every_digit():
         assert all(float(read[name]) == row[name] for name in COLUMNS if name != "motion")
 
 
-def test_csv_numbers_are_plain_also_from_numpy_scalars():
-    row = fake_row(3) | {"normal_force": np.float64(0.1), "step": np.int64(3), "min_gap": np.nan}
-    values = dict(zip(COLUMNS, csv_line(row).strip().split(","), strict=True))
-    assert (values["normal_force"], values["step"], values["min_gap"]) == ("0.1", "3", "nan")
-
-
 def test_a_column_is_found_by_its_name_and_a_misspelt_one_is_guessed():
     result = fake_result()
     for name in COLUMNS:
@@ -293,14 +264,6 @@ def test_a_total_has_the_same_names_over_the_depth(tmp_path):
     assert back.total is back
 
 
-def test_energies_over_the_depth_are_forces_over_it_times_ways():
-    """1 N over 1 mm is 1 mJ: work per depth in N times mm is mJ."""
-    result = with_depth()
-    work = result.applied_force[-1] * result.indentation[-1]  # N/mm times mm
-    assert result.total.applied_force[-1] * result.indentation[-1] == pytest.approx(10.0 * work)
-    assert WHOLE_UNITS["external_work"] == "mJ"
-
-
 @pytest.mark.parametrize("name", ["total", "contact_area", "real_contact_area"])
 def test_without_a_depth_there_is_no_total(name):
     for result in (fake_result(), with_depth(None)):
@@ -325,10 +288,6 @@ def test_the_summary_says_the_end_over_the_depth_too():
     whole = result.total.summary()
     assert whole["units"]["force"] == "N"
     assert "total" not in whole
-
-
-def test_versions_name_what_computes():
-    assert {"evfem", "python", "numpy", "scipy", "scikit-fem"} <= set(versions())
 
 
 def state():
@@ -359,34 +318,3 @@ def test_a_checkpoint_with_other_columns_is_refused_as_of_another_version(tmp_pa
     point.write("a" * 64, state(), rows)
     with pytest.raises(InputError, match="damaged: columns of row 2"):
         point.read("a" * 64)
-
-
-def test_a_checkpoint_that_is_damaged_or_no_checkpoint_gets_a_sentence(tmp_path):
-    point = Checkpoint(tmp_path / "checkpoint.npz")
-    with pytest.raises(InputError, match="does not exist"):
-        point.read("a" * 64)
-    point.write("a" * 64, state(), [fake_row(1)])
-    point.path.write_bytes(point.path.read_bytes()[:-100])
-    with pytest.raises(InputError, match="cut off"):
-        point.read("a" * 64)
-    fake_result().save(point.path)
-    with pytest.raises(InputError, match="another format"):
-        point.read("a" * 64)
-
-
-def test_objects_do_not_get_into_a_checkpoint(tmp_path):
-    with pytest.raises(InputError, match="objects"):
-        Checkpoint(tmp_path / "c.npz").write("a", {"x": np.array([{}], dtype=object)}, [])
-    assert not list(tmp_path.iterdir())
-
-
-def test_rows_written_again_are_those_of_a_fresh_checkpoint(tmp_path):
-    """Rows added, taken away, and replaced by equal and by other ones."""
-    rows = [fake_row(step) for step in range(1, 6)]
-    once = Checkpoint(tmp_path / "once.npz")
-    other = [*rows[:1], fake_row(2) | {"position": 7.0}, fake_row(3)]
-    for given in (rows[:2], rows[:4], rows[:3], rows, other, [dict(row) for row in rows], []):
-        once.write("digest", {}, given)
-        fresh = Checkpoint(tmp_path / "fresh.npz")
-        fresh.write("digest", {}, given)
-        assert once.path.read_bytes() == fresh.path.read_bytes()

@@ -34,14 +34,6 @@ def closed(result):
     return np.maximum(np.abs(source), np.abs(source + bone)) / np.abs(result.source_work).max()
 
 
-def test_a_mean_without_losses_is_the_direct_voltage_bit_for_bit():
-    hover = [ev.Hover(0.2)]
-    plain = ev.simulate(scene(None, hover, 150.0))
-    driven = ev.simulate(scene(ev.Drive(frequency=50.0), hover, 150.0))
-    for name in ("electrostatic_force", "applied_force", "min_gap", "stored_energy"):
-        np.testing.assert_array_equal(plain[name], driven[name])
-
-
 def test_the_mean_of_a_hovering_pad_is_the_closed_form_at_its_nodes():
     """Far off, at the deformed gaps of its nodes."""
     drive = ev.Drive(frequency=FREQUENCY, skin="gabriel_dry", gap_conductivity=1e-8)
@@ -93,33 +85,6 @@ def test_the_balance_of_a_soft_hovering_pad_closes_with_the_source():
     assert np.abs(found.electrostatic_work).max() > 0.0
 
 
-@pytest.mark.slow
-def test_a_skin_with_debye_poles_closes_its_balance_and_has_the_mean_of_the_phasor():
-    """The balance of a soft pad, the mean of one that is far enough off to be rigid."""
-    wet = ev.electrostatics.SKINS["gabriel_wet"].debye(1.0, 1e5)
-    drive = ev.Drive(frequency=FREQUENCY, skin=wet, gap_conductivity=1e-4, resolved=True)
-    soft = ev.simulate(scene(drive, [ev.Hover(0.02), ev.Wait(0.25 / FREQUENCY, steps=5)]))
-    assert closed(soft).max() < 1e-9
-    assert soft.leakage_dissipation[-1] > 0.0
-    steps = 24
-    found = ev.simulate(scene(drive, [ev.Hover(2.0), ev.Wait(2.0 / FREQUENCY, steps=2 * steps)]))
-    mean = ev.simulate(scene(replace(drive, resolved=False), [ev.Hover(2.0)]))
-    last = found.electrostatic_force[-steps:].mean()
-    assert last == pytest.approx(mean.electrostatic_force[-1], rel=(2.0 * np.pi / steps) ** 2 / 3.0)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:at .* V touching skin")
-def test_the_balance_of_a_sliding_pad_closes_with_the_source():
-    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-8, resolved=True)
-    motion = [
-        ev.Press(force=0.05, steps=4),
-        ev.Slide(0.3, steps=3),
-        ev.Slide(20.0 / FREQUENCY, steps=20, speed=20.0),
-    ]
-    assert closed(ev.simulate(scene(drive, motion))).max() < 1e-6
-
-
 def test_without_time_or_leak_charges_change_nothing():
     """Lossless layers under a slow ramp are those of the direct voltage at every step."""
     wait = [ev.Hover(0.05), ev.Wait(0.1, steps=4)]
@@ -128,36 +93,6 @@ def test_without_time_or_leak_charges_change_nothing():
     charged = ev.simulate(scene(ev.Drive(resolved=True), wait, signal))
     np.testing.assert_allclose(charged.electrostatic_force, plain.electrostatic_force, rtol=1e-9)
     assert charged.leakage_dissipation[-1] == 0.0
-
-
-@pytest.mark.filterwarnings("ignore:at .* V touching skin")
-def test_a_resumed_run_has_the_charges_of_the_uninterrupted_one():
-    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-7, resolved=True)
-    whole = scene(drive, [ev.Press(force=0.02, steps=2), ev.Wait(0.3 / FREQUENCY, steps=6)])
-
-    class Keep:
-        saved = None
-
-        def step(self, row, frame, checkpoint):
-            self.rows = [*getattr(self, "rows", []), dict(row)]
-            if row["step"] == 4:
-                self.saved = checkpoint()
-                self.first = list(self.rows)
-
-    keep = Keep()
-    straight = ev.simulate(whole, observers=[keep])
-    resumed = ev.simulate(whole, resume=ev.result.Saved(keep.saved, keep.first))
-    for name in ("electrostatic_force", "applied_force", "source_work", "field_energy"):
-        np.testing.assert_array_equal(resumed[name], straight[name])
-
-
-@pytest.mark.parametrize("coupling", ["staggered", "staggered_once"])
-def test_charges_go_with_both_couplings(coupling):
-    drive = ev.Drive(frequency=FREQUENCY, skin=SKIN, gap_conductivity=1e-7, resolved=True)
-    motion = [ev.Hover(0.05), ev.Wait(0.25 / FREQUENCY, steps=5)]
-    together = ev.simulate(scene(drive, motion))
-    apart = ev.simulate(scene(drive, motion, coupling=coupling))
-    np.testing.assert_allclose(apart.electrostatic_force, together.electrostatic_force, rtol=1e-2)
 
 
 def line(signal, drive):
@@ -201,17 +136,6 @@ def test_an_open_circuit_keeps_the_force_on_a_flat_pad_whatever_the_gap():
         replace(free, drive=None)
 
 
-def test_a_soft_pad_over_an_open_circuit_finds_its_voltage():
-    """Charge of the electrode, summed over the nodes of the frame, is what it was."""
-    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
-    motion = [ev.Hover(0.02, steps=1), ev.Wait(1e-3, steps=1), ev.Hover(0.06, steps=2)]
-    found = ev.simulate(scene(drive, motion, ev.OpenCircuit(100.0, 1e-3)))
-    assert (np.diff(found.voltage[1:]) > 0.0).all()
-    # without leak the field's energy is Q U / 2
-    charge = 2.0 * found.field_energy / found.voltage
-    np.testing.assert_allclose(charge, charge[1], rtol=1e-7)
-
-
 def test_a_prescribed_charge_pulls_a_flat_pad_alike_at_every_gap():
     """F = Q^2 / (2 eps_0 A), U = Q (g + s) / (eps_0 A); A shrinks by 4e-7 under the pull."""
     mesh = block(8, 3)
@@ -232,16 +156,6 @@ def test_a_prescribed_charge_pulls_a_flat_pad_alike_at_every_gap():
         replace(held, drive=None)
 
 
-def test_a_charge_over_time_is_followed_by_a_soft_pad():
-    """Charges of the nodes add up to what was asked."""
-    drive = ev.Drive(skin=ev.Dielectric(1136.0), resolved=True)
-    asked = ev.ChargeControl(ev.Sine(2.5, 0.03))
-    found = ev.simulate(scene(drive, [ev.Hover(0.02, steps=1), ev.Wait(0.1, steps=5)], asked))
-    charge = 1e6 * 2.0 * found.field_energy[1:] / found.voltage[1:]
-    np.testing.assert_allclose(charge, 0.03 * np.sin(2.5 * 2.0 * np.pi * found.time[1:]), rtol=1e-7)
-    assert found.voltage[0] == 0.0
-
-
 def test_another_law_tells_no_balance_of_the_source():
     drive = ev.Drive(skin=SKIN, gap_conductivity=1e-7, resolved=True)
     waits = [ev.Hover(2.0), ev.Wait(1e-3, steps=2)]
@@ -254,20 +168,3 @@ def test_another_law_tells_no_balance_of_the_source():
         if term.name == "drive"
     )
     assert "no balance of the source" in said
-
-
-def test_what_charge_kaczmareks_law_implies_and_why_no_leak_goes_with_it():
-    """Its work on a moving plate is that of a source with the charge -dPi/dU, as long as nothing
-    leaks; but with that charge a closed gap keeps most of the voltage.
-    """
-    law, layers = ev.Kaczmarek(), ev.Layers(0.5e-3, 0.301)
-    g, U = np.linspace(0.0, 0.01, 20001), 70.0
-    charge = lambda gap, volts: -2.0 * law.potential(gap, volts, layers) / volts  # noqa: E731
-    source = U * (charge(0.0, U) - charge(0.01, U))
-    stored = 0.5 * U * (charge(0.0, U) - charge(0.01, U))
-    work = np.trapezoid(law.traction(g, U, layers), g)
-    assert source - stored == pytest.approx(work, rel=1e-6)
-    across_solids = charge(0.0, U) / eps_0 * layers.reduced
-    assert across_solids < 0.05 * U
-    rigid = ev.StrongTroxel()
-    assert -2.0 * rigid.potential(0.0, U, layers) / U / eps_0 * layers.reduced == pytest.approx(U, rel=1e-12)

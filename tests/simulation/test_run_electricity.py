@@ -1,15 +1,14 @@
-"""Scenes with a voltage: couplings, hovering, ramps and profiles, force laws in whole runs."""
+"""Scenes with a voltage: couplings, hovering, ramps and profiles."""
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_finger, benchmark_scene, finger
+from tools.builders import INSULATOR, balance, benchmark_finger, finger
 from tools.meshes import block
 
 from evfem.electrostatics.laws import Kaczmarek, Layer, Layers
 from evfem.electrostatics.signals import VoltageProfile
-from evfem.errors import InputError
 from evfem.scene.motion import Hover, Press, Slide, VoltageRamp
-from evfem.scene.scene import Scene, Solver
+from evfem.scene.scene import Scene
 from evfem.simulation.run import simulate
 from evfem.surface.surfaces import Display
 
@@ -25,21 +24,6 @@ def columns(result, *names):
     return np.array([getattr(result, name) for name in names])
 
 
-def test_scene_c_adds_the_attraction_to_scene_a():
-    a, c = (simulate(benchmark_scene(kind, 0)) for kind in "AC")
-    assert (c.electrostatic_force > 0).all()
-    np.testing.assert_allclose(c.applied_force, c.normal_force - c.electrostatic_force, rtol=1e-7)
-    # the attraction pulls the pad on: more contact force, less load for the same indentation
-    assert (c.normal_force > a.normal_force).all()
-    assert (c.applied_force < a.applied_force).all()
-    assert c.contact_width[0] > a.contact_width[0]
-    # touching skin carries p(0) = eps0 U^2 / (2 s D), so the total is more than that over the contact width
-    touching = 0.5 * 8.8541878128e-12 * 1e6 / ((0.38 / 1650.0 + 0.09 / 3.35) * 0.47)
-    share = touching * c.contact_width[9:] / c.electrostatic_force[9:]
-    assert (share > 0.8).all()
-    assert (share < 1.0).all()
-
-
 @pytest.mark.parametrize("direction", ["vertical", "normal"])
 def test_staggered_iterations_end_where_the_monolithic_ones_do(direction):
     names = ("applied_force", "normal_force", "tangential_force", "electrostatic_force", "stored_energy")
@@ -53,27 +37,6 @@ def test_staggered_iterations_end_where_the_monolithic_ones_do(direction):
     assert apart["staggered"].max() < 1e-6
     # once per step: the attraction of the state before, so the first press is far off
     assert apart["staggered_once"][3, 0] > 0.05
-
-
-LAW = Solver(core="off")  # itself
-
-
-def test_staggered_once_uses_the_attraction_of_the_state_before():
-    once = run(
-        Display(),
-        Press(indentation=0.2, steps=2),
-        law=Kaczmarek(),
-        voltage=2500.0,
-        coupling="staggered_once",
-        solver=LAW,
-    )
-    rest = run(Display(), Hover(0.0), law=Kaczmarek(), voltage=2500.0, coupling="staggered_once", solver=LAW)
-    # the first step carries the attraction of the undeformed outline at first touch
-    assert once.electrostatic_force[0] == pytest.approx(rest.electrostatic_force[0], rel=1e-12)
-    mesh = once.mesh
-    pressure = Kaczmarek().traction(mesh.points[:, 1], 2500.0, Layers.of(Layer(0.38, 1650.0), INSULATOR))
-    expected = np.sum(pressure * tributary(mesh, 0.0))
-    assert once.electrostatic_force[0] == pytest.approx(expected, rel=1e-9)
 
 
 def direct_force(mesh, displacement, gap_to, voltage):
@@ -105,16 +68,6 @@ def test_hover_force_is_the_integral_over_the_deformed_outline(gap, rise):
     assert result.applied_force[0] == pytest.approx(-result.electrostatic_force[0], rel=1e-7)
     assert 0.9 * gap < result.min_gap[0] < gap
     assert result.indentation[0] == -gap
-
-
-@pytest.mark.filterwarnings("ignore:the shear modulus of tissue")
-def test_a_stiff_hovering_pad_carries_the_force_of_the_rigid_outline():
-    body = finger(block(40, 2, sag=1.0), E=1e3)
-    result = run(Display(), Hover(0.25), body=body, law=Kaczmarek(), voltage=1000.0)
-    raised = np.broadcast_to([0.0, 0.25], result.mesh.points.shape)
-    rigid = direct_force(result.mesh, raised, 0.0, 1000.0)
-    assert result.electrostatic_force[0] == pytest.approx(rigid, rel=1e-3)
-    assert result.applied_force[0] == pytest.approx(-rigid, rel=1e-3)
 
 
 def test_without_air_layer_only_the_contact_attracts():
@@ -170,19 +123,3 @@ def test_a_voltage_profile_follows_the_bone():
     assert result.electrostatic_force[:3].tolist() == [0.0, 0.0, 0.0]
     constant = run(Display(), law=Kaczmarek(), voltage=2000.0)
     assert result.electrostatic_force[-1] == pytest.approx(constant.electrostatic_force[-1], rel=0.05)
-
-
-class TractionOnly:
-    """A user's law with the one method it must have."""
-
-    def traction(self, gap, voltage, layers):
-        return 3e-9 * voltage**2 * np.exp(-gap / 0.1)
-
-
-def test_a_law_of_the_user_needs_only_a_traction():
-    result = run(Display(), law=TractionOnly(), voltage=2000.0)
-    assert balance(result).max() < 1e-7
-    # touching skin carries 12 kPa
-    assert (result.electrostatic_force > 3e-9 * 2000.0**2 * result.real_contact_width * 0.9).all()
-    with pytest.raises(InputError, match="potential"):
-        run(Display(), law=TractionOnly(), voltage=2000.0, direction="normal")

@@ -6,7 +6,6 @@ from tools.builders import balance, finger
 from tools.meshes import block
 
 import evfem as ev
-from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import Run
 
 #: steps are long on purpose: equal ones are compared with each other
@@ -94,100 +93,3 @@ def test_a_finger_that_just_touches_is_loose():
     for force, loose in ((0.0, True), (1e-17, True), (-1e-17, True), (1e-8, False)):
         going.rows = [row | {"normal_force": force}]
         assert going._start_of(1)["loose"] == loose
-
-
-@pytest.mark.parametrize("ends", [(1000.0, 0.0), (0.0, 1000.0)])
-def test_a_voltage_that_comes_or_goes_within_a_step_finds_a_loose_finger(ends):
-    """Parts of a step have the controls of both its ends."""
-    off = [ev.Press(indentation=0.1, steps=2), ev.Press(indentation=-0.05, steps=1)]
-    ramps = [ev.VoltageRamp(voltage, steps=2, hold="force") for voltage in ends]
-    steps = ev.Solver(strategy=ev.Strategy(steps="auto"))
-    result = ev.simulate(scene(*off, *ramps, voltage=0.0, solver=steps))
-    assert np.abs(result.applied_force[3:]).max() < 1e-8
-    assert (result.contact_width[3:] > 0.0).any()
-
-
-def test_an_equilibrium_does_not_depend_on_how_long_it_took():
-    """Quasi-static: the same voltages as a profile over the position, at the same places."""
-    slide = ev.Slide(0.4, steps=8, speed=20.0)
-    time = run(PRESS, slide, voltage=ev.Sine(40.0, 1000.0, 200.0))
-    x = np.linspace(0.0, 0.4, 4001)
-    place = run(PRESS, slide, voltage=ev.VoltageProfile(x, ev.Sine(40.0, 1000.0, 200.0)(x / 20.0)))
-    np.testing.assert_allclose(time.tangential_force, place.tangential_force, rtol=1e-5)
-    np.testing.assert_allclose(time.electrostatic_force, place.electrostatic_force, rtol=1e-5)
-
-
-def test_tissue_creeps_while_the_finger_waits():
-    """Kelvin-Voigt tissue under a held load goes where it goes without viscosity, in a few
-    relaxation times.
-    """
-    soft = finger(block(8, 3, sag=0.4), viscosity=5e-3)
-    motion = PRESS, ev.Wait(0.1, steps=25, hold="force")
-    plain = ev.simulate(scene(PRESS, voltage=0.0, friction=0.0))
-    slow = ev.simulate(
-        scene(*motion, voltage=0.0, body=soft, friction=0.0, solver=ev.Solver(dynamics="viscous"))
-    )
-    sudden = slow.indentation[2]
-    np.testing.assert_allclose(slow.applied_force[2:], 0.02, rtol=1e-7)
-    assert sudden == pytest.approx(plain.indentation[-1], rel=1e-6)  # a press without speed takes no time
-    assert slow.indentation[-1] == pytest.approx(sudden, rel=1e-6)
-    pressed = ev.Press(indentation=plain.indentation[-1], steps=3, speed=50.0)
-    relaxing = ev.simulate(
-        scene(
-            pressed,
-            ev.Wait(0.1, steps=25),
-            voltage=0.0,
-            body=soft,
-            friction=0.0,
-            solver=ev.Solver(dynamics="viscous"),
-        )
-    )
-    force = relaxing.applied_force
-    assert force[2] > 1.05 * 0.02
-    assert (np.diff(force[2:]) < 1e-9).all()
-    assert force[-1] == pytest.approx(0.02, rel=1e-3)
-
-
-@pytest.mark.parametrize("at", [4, 9])
-def test_a_run_resumed_while_waiting_ends_like_an_uninterrupted_one(at):
-    kept, rows = {}, []
-
-    class Observer:
-        def step(self, row, frame, checkpoint):
-            rows.append(row)
-            kept[row["step"]] = {name: np.copy(array) for name, array in checkpoint().items()}
-
-    motion = PRESS, ev.Wait(0.01, steps=5, hold="force"), ev.Slide(0.1, steps=5, speed=10.0)
-    whole = run(*motion, observers=[Observer()])
-    assert len(whole.step) == 13
-    resumed = run(*motion, resume=Saved(kept[at], rows[:at]))
-    for name in set(COLUMNS) - {"seconds", "newton_iterations", "motion", "substeps"}:
-        np.testing.assert_allclose(
-            getattr(resumed, name), getattr(whole, name), rtol=1e-7, atol=1e-10, err_msg=name
-        )
-    assert resumed.time.tolist() == whole.time.tolist()
-    assert resumed.voltage.tolist() == whole.voltage.tolist()
-
-
-def test_the_parts_of_a_step_follow_the_signal():
-    """A step of half a period, cut into parts: the voltage of the parts is that of their time."""
-    seen = []
-    made = scene(PRESS, ev.Wait(0.01, steps=1))
-    going = Run(made, None)
-    for request in going.requests():
-        if request.kind == "wait":
-            seen = [request.path(0.0, part) for part in (0.25, 0.5, 1.0)]
-        going.advance(request)
-    np.testing.assert_allclose(
-        [t.drive.voltage for t in seen], HUM(np.array([0.0025, 0.005, 0.01])), atol=1e-9
-    )
-    assert [t.duration for t in seen] == pytest.approx([0.0025, 0.005, 0.01])
-
-
-def test_the_first_step_of_a_signal_acts_in_full_as_a_number_does():
-    signal = ev.Sine(50.0, 100.0, bias=1500.0)
-    press = ev.Press(indentation=0.2, steps=2)
-    over_time = run(press, ev.Wait(0.02, steps=1), voltage=signal)
-    number = run(press, voltage=1500.0)
-    for name in ("electrostatic_force", "electrostatic_work", "external_work"):
-        np.testing.assert_allclose(getattr(over_time, name)[:2], getattr(number, name), rtol=1e-9)

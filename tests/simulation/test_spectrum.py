@@ -35,14 +35,6 @@ def test_lines_stand_at_their_frequencies_with_their_amplitudes():
     np.testing.assert_allclose(amplitude, lines, atol=1e-12)
 
 
-def test_odd_numbers_of_rows_have_no_line_at_half_the_rate():
-    values = 0.2 * np.sin(2 * np.pi * 10.0 * TIMES[:90])
-    found = ev.spectrum(column(values[:81], TIMES[:81]), "tangential_force")
-    assert found.frequency[-1] == pytest.approx(40 / 0.81)
-    found = ev.spectrum(column(values, TIMES[:90]), "tangential_force")
-    np.testing.assert_allclose(found.amplitude[[8, 9, 10]], [0.0, 0.2, 0.0], atol=1e-12)
-
-
 def test_a_window_keeps_a_line_of_no_whole_number_of_periods_to_its_neighbours():
     """5.5 periods: without a window a tenth of the line is still 3 lines away; Hann's falls with the
     cube, and its highest value is 8 / (3 pi) of the amplitude.
@@ -70,23 +62,6 @@ def test_rows_of_the_last_motion_are_used_or_those_of_a_window_of_time():
     np.testing.assert_allclose(later.amplitude[[0, 6]], [0.0, 1.0], atol=1e-12)  # 10 Hz over 0.6 s
     first = ev.spectrum(made, "tangential_force", start=0.0, stop=0.4)
     np.testing.assert_allclose(first.amplitude[:2], [5.0, 0.0], atol=1e-12)
-
-
-@pytest.mark.parametrize("rounding", [-1e-15, 1e-15])
-def test_a_window_begins_and_ends_at_its_rows_however_their_times_are_rounded(rounding):
-    made = column(np.sin(2 * np.pi * 10.0 * TIMES), TIMES + rounding)
-    later = ev.spectrum(made, "tangential_force", start=0.4)
-    assert later.frequency[1] == pytest.approx(1.0 / 0.6)  # 60 rows of 10 ms
-    first = ev.spectrum(made, "tangential_force", start=0.0, stop=0.4)
-    assert first.frequency[1] == pytest.approx(1.0 / 0.4)
-
-
-def test_a_press_that_takes_no_time_stands_before():
-    time = np.concatenate([np.zeros(10), TIMES[:40]])
-    made = column(
-        np.concatenate([np.zeros(10), np.cos(2 * np.pi * 5.0 * TIMES[:40])]), time, [0] * 10 + [1] * 40
-    )
-    np.testing.assert_allclose(ev.spectrum(made, "tangential_force").amplitude[2], 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize(

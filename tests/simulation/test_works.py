@@ -100,14 +100,6 @@ def test_what_the_way_loses_falls_with_the_square_of_the_step(name):
     assert fine.snap_dissipation[-1] < 1e-9 * fine.stored_energy[-1]
 
 
-def test_full_slip_dissipates_friction_times_way():
-    result = simulate(
-        scene(Flat(friction=0.1), motion=(Press(indentation=0.2, steps=2), Slide(1.0, steps=10)))
-    )
-    grown = np.diff(result.friction_dissipation)[-3:]
-    np.testing.assert_allclose(grown, 0.1 * 0.1 * result.normal_force[-3:], rtol=1e-7)
-
-
 @pytest.mark.filterwarnings("ignore:motion . has steps of")
 def test_a_body_that_swings_loses_its_energy_to_the_integrator():
     """Held by the bone in the air nothing gives or takes but backward Euler, and less with half
@@ -152,13 +144,6 @@ def test_a_plate_that_snaps_sets_free_what_the_closed_form_says(gap):
     pulled = [StrongTroxel().potential(g, critical.voltage, layers) for g in (gap - critical.travel, 0.0)]
     freed = width * (pulled[0] - pulled[1]) - 0.5 * stiffness * (gap**2 - critical.travel**2)
     assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.02)
-
-
-@pytest.mark.slow
-def test_the_energy_of_a_snap_does_not_depend_on_the_steps():
-    few, many = (simulate(in_parts(SCENES["snap"], times)) for times in (32, 64))
-    assert few.snap_dissipation[-1] == pytest.approx(many.snap_dissipation[-1], rel=0.05)
-    assert abs(many.integrator_dissipation[-1]) < 0.2 * many.snap_dissipation[-1]
 
 
 #: status before and after, way in mm, and the share of mu times normal force times way that is dissipated
@@ -266,26 +251,6 @@ def test_what_the_way_of_the_loads_loses_in_a_release_is_no_energy_set_free():
     assert sorted(signs) == [-1.0, 1.0]
 
 
-def test_between_rough_faces_the_attraction_on_the_way_is_that_of_the_forces_on_the_way(monkeypatch):
-    """From those of the begin to those of the end."""
-    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
-    law = ev.PowerRoughness(0.002, 0.01, 0.2, 0.01)
-    motion = Press(indentation=0.01)
-    model = make_model(scene(Display(INSULATOR), StrongTroxel(), 140.0, (motion,), column, roughness_gap=law))
-    rest = model.equilibrium.rest(np.array([0.0, 0.0]), 140.0)
-    nodes = len(rest.contact_force)
-    loads = [np.column_stack([load * np.arange(1.0, nodes + 1), np.zeros(nodes)]) for load in (0.1, 0.4)]
-    old, new = (replace(rest, contact_force=load) for load in loads)
-    seen = []
-    monkeypatch.setattr(
-        type(model.attraction),
-        "way_forces",
-        lambda self, places, volts, touching, p: seen.append(p) or places,
-    )
-    Part(model, old, new).pulls(np.zeros((nodes, 2)), np.array([0.0, 0.5, 1.0]), (140.0, 140.0))
-    np.testing.assert_allclose(seen[0], [loads[0][:, 0], 2.5 * loads[0][:, 0], loads[1][:, 0]], rtol=1e-12)
-
-
 def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     """By hand: 3 and 4 mm of slip along x and z, on a way of 1 and 2 mm; then 2 mm back along z."""
     slips = np.array([[3.0, 4.0], [0.0, -2.0]])
@@ -294,18 +259,6 @@ def test_in_space_a_way_counts_along_the_slip(monkeypatch):
     part = SimpleNamespace(model=model, old=None, new=None, slip_length=np.array([5.0, 2.0]))
     along = np.array([[1.0, 9.0, 2.0], [5.0, 9.0, 7.0]])
     np.testing.assert_allclose(Part._with_slip(part, along), [2.2, -7.0], rtol=1e-12)
-
-
-def test_a_finger_that_goes_with_its_bone_is_pulled_along_by_nothing():
-    """What counts is how the attraction changes on the way that the bone does not go."""
-    column = MeshedFinger(block(4, 2), {"tissue": LinearElastic(E=0.1, nu=0.0)}, SKIN)
-    model = make_model(scene(Display(INSULATOR), StrongTroxel(), 500.0, (Hover(0.3),), column))
-    rest, way = model.equilibrium.rest(np.array([0.0, 0.3]), 500.0), np.array([0.0, -0.1])
-    carried = replace(rest, u=rest.u + way, bone=rest.bone + way)
-    along = np.tile([0.0, -1.0], (len(rest.contact_force), 1))
-    assert Part(model, rest, carried)._pulled_along(along) == 0.0
-    fallen = replace(carried, u=carried.u + 0.5 * way)
-    assert Part(model, rest, fallen)._pulled_along(along) > 1e-6
 
 
 def test_the_field_stretches_with_the_forces_on_the_way():

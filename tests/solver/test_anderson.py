@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from evfem.common.constants import ANDERSON_DEPTH, KILOVOLT
+from evfem.common.constants import KILOVOLT
 from evfem.contact.signorini import OPEN, STICK
 from evfem.solver.anderson import Anderson
 from evfem.solver.state import State
@@ -69,11 +69,6 @@ def test_a_linear_contraction_ends_after_one_step_more_than_it_has_dimensions(di
     assert errors[dimension] > 1e-3 * errors[0]
 
 
-def test_one_step_is_taken_as_it_is():
-    after = state(np.ones(4))
-    assert Anderson().next_iterate(state(np.zeros(4)), after) is after
-
-
 def test_forces_bone_and_squared_voltage_keep_their_linear_relations():
     """What is a linear function of u in every image is the same function of the mixture."""
     point, M = contraction(2)
@@ -112,19 +107,3 @@ def test_another_map_begins_anew(how):
     after = state(1.5 * np.ones(4))
     assert mixing.next_iterate(second, after) is after
     assert mixing.next_iterate(after, state(1.75 * np.ones(4))) is not after
-
-
-def test_what_is_remembered_is_the_combination_of_the_last_differences():
-    """The formula on whole differences, made anew in every iteration, at random iterates."""
-    rng = np.random.default_rng(5)
-    mixing, steps, images = Anderson(), [], []
-    for _ in range(9):
-        before, after = state(rng.normal(size=4)), state(rng.normal(size=4), rng.normal(), rng.normal())
-        found = mixing.next_iterate(before, after)
-        steps.append((after.u - before.u).ravel())
-        images.append(np.concatenate([after.u.ravel(), after.contact_force.ravel(), after.bone]))
-        changes = np.diff(steps[-1 - ANDERSON_DEPTH :], axis=0)
-        shares = np.linalg.lstsq(changes.T, steps[-1], rcond=None)[0] if len(changes) else np.zeros(0)
-        expected = images[-1] - shares @ np.diff(images[-1 - ANDERSON_DEPTH :], axis=0)
-        values = np.concatenate([found.u.ravel(), found.contact_force.ravel(), found.bone])
-        np.testing.assert_allclose(values, expected, rtol=1e-9, atol=1e-9)

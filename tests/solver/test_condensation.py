@@ -9,11 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tools.grids import rectangle
 
-from evfem.solver.condensation import Pardiso, Singular, SuperLU, make_condensation, mkl_library
-from evfem.tissue.body import Body
-from evfem.tissue.laws import NeoHookean
+from evfem.solver.condensation import Pardiso, Singular, SuperLU, mkl_library
 from evfem.tissue.pattern import Pattern
 
 #: PARDISO is part of evfem[fast]; without it there is one back end to test
@@ -94,34 +91,6 @@ def entries(pattern, cells):
     return pattern.finish(data)
 
 
-def test_pattern_adds_cells_up():
-    """Both triangles equal the dense sum; empty rows keep a diagonal."""
-    problem = random_problem(size=45, count=20)
-    pattern = Pattern(problem.unknowns, 1)
-    found = pattern.full(entries(pattern, problem.cells)).toarray()
-    np.testing.assert_allclose(found, problem.dense, atol=1e-13)
-    assert (np.diff(pattern.indptr) >= 1).all()
-    row = np.repeat(np.arange(problem.size), np.diff(pattern.indptr))
-    assert (pattern.indices >= row).all()
-    # cells that hold an unknown twice, as those with two bone nodes do
-    twice = Pattern(np.array([[0, 1, 1]]), 1)
-    cell = np.array([[[1.0, 2.0, 3.0], [2.0, 4.0, 5.0], [3.0, 5.0, 6.0]]])
-    np.testing.assert_allclose(twice.full(entries(twice, cell)).toarray(), [[1.0, 5.0], [5.0, 20.0]])
-
-
-@pytest.mark.parametrize("dim", [2, 3])
-def test_pattern_adds_up_the_components_of_nodes_that_a_cell_has_twice(dim):
-    nodes = np.array([[0, 3, 1, 3], [3, 2, 3, 0], [2, 1, 0, 3]])
-    cells = np.random.default_rng(5).normal(size=(3, 4 * dim, 4 * dim))
-    cells += np.swapaxes(cells, 1, 2)
-    unknowns = (dim * nodes[:, :, None] + np.arange(dim)).reshape(3, -1)
-    dense = np.zeros((4 * dim, 4 * dim))
-    for rows, matrix in zip(unknowns, cells, strict=True):
-        np.add.at(dense, (rows[:, None], rows), matrix)
-    pattern = Pattern(nodes, dim)
-    np.testing.assert_allclose(pattern.full(entries(pattern, cells)).toarray(), dense, atol=1e-13)
-
-
 @every_back_end
 @pytest.mark.parametrize("kept", [KEPT, np.sort(KEPT), KEPT[:1]], ids=["any order", "sorted", "one"])
 def test_condensation_equals_dense_elimination(back_end, kept):
@@ -130,28 +99,6 @@ def test_condensation_equals_dense_elimination(back_end, kept):
     factor = back_end(pattern, kept)
     factor.factorise(entries(pattern, problem.cells))
     compare(factor, problem, kept, 1e-12)
-
-
-@every_back_end
-def test_indefinite_interior(back_end):
-    problem = indefinite_problem()
-    pattern = Pattern(problem.unknowns, 1)
-    factor = back_end(pattern, KEPT)
-    factor.factorise(entries(pattern, problem.cells))
-    compare(factor, problem, KEPT, 1e-10)
-
-
-@every_back_end
-def test_singular_condensed_matrix_is_no_obstacle(back_end):
-    """A bone free to move: the whole matrix is singular, its interior is not, and S has the rigid
-    motion.
-    """
-    unknowns = np.array([[0, 1], [1, 2], [2, 3], [3, 4]])
-    problem = Problem(unknowns, np.tile([[1.0, -1.0], [-1.0, 1.0]], (4, 1, 1)), 5)
-    pattern, kept = Pattern(unknowns, 1), np.array([4, 0])
-    factor = back_end(pattern, kept)
-    factor.factorise(entries(pattern, problem.cells))
-    np.testing.assert_allclose(factor.schur, 0.25 * np.array([[1.0, -1.0], [-1.0, 1.0]]), atol=1e-14)
 
 
 @every_back_end
@@ -204,42 +151,6 @@ def test_zero_pivots_give_no_wrong_answer(back_end):
     except Singular:
         return
     compare(factor, problem, kept, 1e-10)
-
-
-def test_back_ends_agree_on_tissue():
-    """Deformed skin on nearly incompressible tissue, pad and bone kept: equal to 1e-10."""
-    space = rectangle("q2p1", (8, 8), split=lambda x, y: y > 0.25)
-    mesh = space.mesh
-    sets = {"bone": mesh.node_sets["top"], "pad": mesh.node_sets["bottom"]}
-    object.__setattr__(mesh, "node_sets", sets)
-    body = Body(space, {"lower": NeoHookean(E=1.0, nu=0.3), "upper": NeoHookean(E=0.034, nu=0.4999)})
-    x, y = mesh.points.T
-    u = 0.1 * np.column_stack([x * y, -y * (1 + x)])
-    assert body.tissue.smallest_J(u) > 0.5
-    upper = body.tangent(u)
-    kept = np.concatenate([body.bone, body.unknowns[sets["pad"]].ravel()])
-    b = np.sin(np.arange(body.size))
-    answers = []
-    for back_end in BACK_ENDS:
-        factor = back_end(body.pattern, kept)
-        factor.factorise(upper)
-        state, g = factor.forward(b)
-        answers.append((factor.schur, g, factor.backward(state, np.full(kept.size, 0.1))))
-    dense = body.pattern.full(upper).toarray()
-    i = np.setdiff1d(np.arange(body.size), kept)
-    S = dense[np.ix_(kept, kept)] - dense[np.ix_(kept, i)] @ np.linalg.solve(
-        dense[np.ix_(i, i)], dense[np.ix_(i, kept)]
-    )
-    answers.append((S, answers[0][1], answers[0][2]))
-    for other in answers[1:]:
-        for ours, theirs in zip(answers[0], other, strict=True):
-            np.testing.assert_allclose(ours, theirs, atol=1e-10 * np.abs(theirs).max())
-
-
-def test_fastest_back_end_is_chosen():
-    problem = random_problem()
-    pattern = Pattern(problem.unknowns, 1)
-    assert type(make_condensation(pattern, KEPT)) is BACK_ENDS[0]
 
 
 def test_the_library_is_the_first_runtime_that_is_there(monkeypatch, tmp_path):

@@ -11,20 +11,11 @@ from evfem.solver.control import (
     FollowFriction,
     Force,
     GivenVoltage,
-    Indentation,
     Loose,
-    Target,
     VoltageProblem,
 )
 
 REACTION = np.array([0.2, -3.0])
-
-
-def test_a_height_is_known_and_misses_no_force():
-    height = Indentation(-0.4)
-    assert (height.free, height.known(0.7), height.missing(0.7, REACTION)) == (False, -0.4, 0.0)
-    assert height.unknowns(None, 0.7) == ()
-    assert height.towards(Indentation(-0.8), 0.25) == Indentation(-0.5)
 
 
 def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
@@ -36,25 +27,6 @@ def test_a_force_leaves_the_height_open_and_misses_what_the_bone_lacks():
     assert force.missing(0.7, REACTION) == pytest.approx(-2.0)
     assert force.missing(0.7, np.array([0.2, -5.0])) == 0.0
     assert force.towards(Force(9.0), 0.25) == Force(6.0)
-
-
-def test_the_travel_of_a_pressed_bone_is_an_unknown_that_pushes_with_the_bones_column():
-    """Raising the bone by d changes the condensed forces by S d e_y, which stands on the other
-    side; the equation is that of the bone's y component.
-    """
-    schur = np.arange(16.0).reshape(4, 4)
-    (unknown,) = Force(5.0).unknowns(SimpleNamespace(schur=schur, dim=2), 0.7)
-    np.testing.assert_array_equal(unknown.push, -schur @ [0.0, 0.0, 0.0, 1.0])
-    assert (unknown.axis, unknown.force) == (1, -5.0)
-
-
-def test_a_target_knows_where_the_bone_must_be():
-    pressed, held = Target(0.1, Force(5.0), GivenVoltage(0.0)), Target.held(np.array([0.1, -0.4]), 7.0)
-    np.testing.assert_array_equal(pressed.bone(np.array([9.0, 0.7])), [0.1, 0.7])
-    np.testing.assert_array_equal(held.bone(np.array([9.0, 0.7])), [0.1, -0.4])
-    assert pressed.reached(np.array([0.1, 0.7]))
-    assert not pressed.reached(np.array([0.2, 0.7]))
-    assert not held.reached(np.array([0.1, 0.7]))
 
 
 # -- the voltage that follows a friction force ----------------------------------------------------------
@@ -128,15 +100,6 @@ def test_a_bound_is_left_only_where_the_voltage_could_help(way, wish, tolerated,
         control.force = way * control.force
         assert control.accepts(way, np.array([way * force, 0.0]), 1e-6) == accepted
         assert control.free == (not accepted)
-
-
-def test_a_step_from_no_voltage_begins_at_that_bound():
-    """There the derivative of the attraction by the voltage says nothing."""
-    for before, free in ((0.0, False), (10.0, True)):
-        control = FollowFriction(1.0, 2000.0)
-        control.begin(SimpleNamespace(voltage=before))
-        assert control.free == free
-        assert control.guess(before) == before
 
 
 @pytest.mark.parametrize(

@@ -1,27 +1,23 @@
-"""Equilibrium steps: balance, tangent, cut and failed steps, force control, exact statements on
-profiles.
-"""
+"""Equilibrium steps: balance, tangent, cut and failed steps, force control."""
 
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, balance, benchmark_finger, finger
+from tools.builders import INSULATOR, finger
 from tools.meshes import block
 
-from evfem.contact import condensed
-from evfem.contact.signorini import BACKWARD, FORWARD, OPEN, STICK, ContactNotSolved
 from evfem.electrostatics.laws import Kaczmarek
 from evfem.errors import NotConverged
-from evfem.scene.motion import Hover, Press, Slide
+from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
 from evfem.solver.state import Balance, StepFailed
 from evfem.solver.strategy import Strategy, stuck
-from evfem.surface.surfaces import Display, Flat, Profile, Sinusoid
+from evfem.surface.surfaces import Display, Flat, Sinusoid
 
 ROUND = finger(block(8, 3, sag=0.4))
 GENTLE = Sinusoid(friction=0.3, terms=[[0.02, 2.0, 0.4]], insulator=INSULATOR)
@@ -60,33 +56,6 @@ def test_nodal_forces_of_an_accepted_state_balance(surface):
     np.testing.assert_allclose(state.u[bone], np.broadcast_to([0.0, -0.2], (bone.size, 2)), atol=1e-14)
 
 
-@pytest.mark.parametrize("surface", [Display(friction=0.4), GENTLE], ids=["flat", "sinusoid"])
-def test_statuses_of_an_accepted_state_are_those_of_its_forces(surface):
-    model, state = pressed(surface)
-    equilibrium = model.equilibrium
-    slid = equilibrium.step(state, Target.held(model.bone(0.05, 0.2), 0.0))
-    before, after = equilibrium.positions(state.u)[:, 0], equilibrium.positions(slid.u)
-    gap = after[:, 1] - model.surface.y - model.surface.height(after[:, 0])
-    normal, shear = slid.contact_force.T
-    slip = after[:, 0] - before
-    limit = model.surface.friction_coefficient(after[:, 0]) * normal
-    open_, stick = slid.status == OPEN, slid.status == STICK
-    forward, backward = slid.status == FORWARD, slid.status == BACKWARD
-    weak = 1e-8 * normal.max()
-    assert not slid.contact_force[open_].any()
-    assert (gap > -1e-8).all()
-    assert np.abs(gap[~open_]).max() < 1e-8
-    assert (normal >= -weak).all()
-    assert (np.abs(shear) <= limit + weak).all()
-    assert np.abs(slip[stick]).max(initial=0.0) < 1e-8
-    np.testing.assert_allclose(shear[forward], -limit[forward], atol=weak)
-    np.testing.assert_allclose(shear[backward], limit[backward], atol=weak)
-    assert (slip[forward] > -1e-8).all()
-    assert (slip[backward] < 1e-8).all()
-    assert open_.any()
-    assert forward.any()
-
-
 @pytest.mark.parametrize("move", [(0.0, 1.0), (1.0, 0.0), (-0.5, 1.0)], ids=["down", "along", "back"])
 @pytest.mark.parametrize(
     "options",
@@ -118,19 +87,6 @@ def test_one_iteration_of_the_whole_step_leaves_a_quadratic_rest(options, move):
     assert rest[1] < 0.1 * rest[0]
 
 
-@pytest.mark.parametrize("rounding", [-1e-20, 0.0, 1e-20])
-def test_a_step_that_turns_off_begins_where_the_last_one_ended_whatever_the_rounding(rounding):
-    model, state = pressed(Flat(friction=0.3))
-    last = state.last_increment.copy()
-    last[model.mesh.node_sets["bone"], 0] = rounding
-    seen = []
-    for trial in (last, 0.0 * last):
-        model.equilibrium.body.forget()
-        model.equilibrium.step(replace(state, last_increment=trial), Target.held(model.bone(0.05, 0.2), 0.0))
-        seen.append(model.equilibrium.record.residuals[1])
-    assert seen[0] == pytest.approx(seen[1], rel=1e-6)
-
-
 def test_a_failed_step_returns_nothing_and_leaves_its_start_alone():
     model, state = pressed(Flat())
     kept = {
@@ -146,32 +102,6 @@ def test_a_failed_step_returns_nothing_and_leaves_its_start_alone():
     fresh, start = pressed(Flat())
     expected = fresh.equilibrium.step(start, Target.held(fresh.bone(0.0, 0.25), 0.0))
     np.testing.assert_allclose(after.reaction, expected.reaction, rtol=1e-7, atol=1e-10)
-
-
-def test_contact_without_a_solution_is_tried_again_with_a_fresh_tangent(monkeypatch):
-    """An older tangent may ask for what no contact can give; a fresh one that does has failed."""
-    model, state = pressed(Flat())
-    equilibrium, target = model.equilibrium, Target.held(model.bone(0.0, 0.201), 0.0)
-    expected = equilibrium.step(state, target)
-    solve, refusals = condensed.solve_with_attraction, []
-
-    def refuse_once(*arguments):
-        if not refusals:
-            refusals.append(equilibrium.record.factorisations)
-            raise ContactNotSolved("as told")
-        return solve(*arguments)
-
-    assert equilibrium.body.linearisation.reusable is not None  # an older tangent is at hand
-    monkeypatch.setattr(condensed, "solve_with_attraction", refuse_once)
-    before = equilibrium.record.factorisations
-    found = equilibrium.step(state, target)
-    assert refusals == [before]
-    assert equilibrium.record.factorisations > before
-    np.testing.assert_allclose(found.reaction, expected.reaction, rtol=1e-7, atol=1e-12)
-    refusals.clear()
-    equilibrium.body.linearisation.forget()
-    with pytest.raises(StepFailed, match="contact: as told"):
-        equilibrium.step(state, target)
 
 
 @pytest.mark.filterwarnings("ignore:motion 1 presses")
@@ -192,28 +122,6 @@ def test_an_impossible_press_stops_with_the_good_rows():
     np.testing.assert_allclose(caught.value.result.indentation, [0.1, 0.2, 0.3], rtol=1e-14)
     assert caught.value.residuals
     assert "try" in str(caught.value)
-
-
-def test_a_step_far_too_large_is_cut_and_reaches_its_exact_target():
-    fine = run(Flat(friction=0.0), Press(indentation=0.4, steps=8))
-    # so few iterations do not suffice for the whole way
-    few = Solver(strategy=Strategy(iterations=4))
-    coarse = run(Flat(friction=0.0), Press(indentation=0.4, steps=1), solver=few)
-    assert coarse.provenance["solver"]["cuts"] > 0
-    assert coarse.substeps[0] > 1
-    assert coarse.indentation[0] == 0.4
-    assert coarse.step.tolist() == [1]
-    assert coarse.applied_force[0] == pytest.approx(fine.applied_force[-1], rel=1e-7)
-
-
-def test_parts_stop_halving_at_the_smallest_one():
-    with pytest.raises(NotConverged) as caught:
-        run(Flat(), Press(indentation=0.4, steps=1), solver=Solver(strategy=Strategy(iterations=1)))
-    assert caught.value.step == 1
-    assert len(caught.value.result.step) == 0
-    # 1, 1/2, ... 1/1024 of the step
-    assert caught.value.result.provenance["solver"]["cuts"] == 11
-    assert Strategy().smallest_part == 2.0**-10
 
 
 def test_a_failed_step_says_where_and_in_what_state():
@@ -242,15 +150,6 @@ def test_a_prescribed_force_equals_the_prescribed_indentation(friction, options)
         np.testing.assert_allclose(getattr(by_force, column), getattr(by_depth, column), rtol=2e-7)
 
 
-def test_first_touch_from_hovering_under_a_prescribed_force():
-    direct = run(Flat(friction=0.0), Press(force=0.02, steps=1))
-    hovered = run(Flat(friction=0.0), Hover(0.3), Press(force=0.02, steps=1))
-    assert hovered.normal_force[0] == 0.0
-    assert hovered.min_gap[0] == pytest.approx(0.3, rel=1e-12)
-    assert hovered.applied_force[-1] == pytest.approx(0.02, rel=1e-8)
-    assert hovered.indentation[-1] == pytest.approx(direct.indentation[-1], rel=1e-7)
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_unloading_leaves_nothing_behind(friction):
     motion = [Press(indentation=0.3, steps=3), Slide(0.3, steps=3), Press(indentation=-0.05, steps=4)]
@@ -267,66 +166,6 @@ def test_unloading_leaves_nothing_behind(friction):
     assert result.min_gap[-1] == pytest.approx(0.05, rel=1e-6)
 
 
-TIP = finger(block(2, 2, width=2.0, height=2.0, sag=0.7), E=10.0, nu=0.3)
-HILLS = [
-    Sinusoid(friction=0.25, terms=[[0.05, 4.0, 0.3]]),
-    Profile(np.linspace(-3.0, 3.0, 9), 0.04 * np.array([0, 1, 0, 1.2, 0.3, 1.5, 0, 1, 0]), friction=0.25),
-]
-
-
-@pytest.mark.filterwarnings("ignore:the surface is sharper")  # only one node touches
-@pytest.mark.parametrize("distance", [1.5, -1.5])
-@pytest.mark.parametrize("surface", HILLS, ids=["sinusoid", "profile"])
-def test_a_point_on_a_profile_has_the_exact_apparent_friction(surface, distance):
-    # balance of a point that slides up a slope y': F_t / F_n = (mu + y') / (1 - mu y'), mu -> -mu backwards
-    result = run(surface, Press(indentation=0.15, steps=1), Slide(distance, steps=12), body=TIP)
-    mu = 0.25 * np.sign(distance)
-    slopes = []
-    for row, frame in enumerate(result.frames[1:], start=1):
-        touching = np.flatnonzero(frame.contact_status)
-        assert touching.size == 1
-        x = result.mesh.points[touching, 0] + frame.displacement[touching, 0]
-        slope = surface.slope(x)[0]
-        ratio = result.tangential_force[row] / result.normal_force[row]
-        if frame.contact_status[touching] == 2:
-            assert ratio == pytest.approx((mu + slope) / (1.0 - mu * slope), abs=1e-7)
-            slopes.append(slope)
-    assert len(slopes) > 8
-    assert np.ptp(slopes) > 0.1
-
-
-TABLES = {"fall": [[0.0, 0.7], [0.4, 0.7], [0.4, 0.2]], "ramp": [[-3.0, 0.2], [3.0, 0.4]]}
-
-
-@pytest.mark.parametrize("table", TABLES.values(), ids=TABLES.keys())
-def test_accepted_states_obey_the_coefficient_at_their_own_place(table):
-    surface = Flat(friction=table)
-    result = run(surface, Press(indentation=0.3, steps=2), Slide(1.2, steps=12))
-    used = []
-    for frame in result.frames[2:]:
-        slipping = frame.contact_status == 2
-        x = result.mesh.points[slipping, 0] + frame.displacement[slipping, 0]
-        ratio = np.abs(frame.shear_traction[slipping]) / frame.contact_pressure[slipping]
-        heavy = frame.contact_pressure[slipping] > 1e-4 * frame.contact_pressure.max()
-        np.testing.assert_allclose(ratio[heavy], surface.friction_coefficient(x[heavy]), rtol=1e-4)
-        used += ratio[heavy].tolist()
-    assert len(set(np.round(used, 2))) > 1
-    assert balance(result).max() < 1e-7
-
-
-def test_penalty_contact_approaches_the_exact_one_like_one_over_the_penalty():
-    motion = [Press(indentation=0.3, steps=2), Slide(0.2, steps=2)]
-    exact = run(Flat(friction=0.4), *motion)
-    for column in ("normal_force", "tangential_force"):
-        errors = []
-        for penalty in (1e2, 1e3):
-            solver = Solver(contact="penalty", penalty_normal=penalty, penalty_tangential=penalty)
-            soft = run(Flat(friction=0.4), *motion, solver=solver)
-            errors.append(getattr(soft, column)[-1] / getattr(exact, column)[-1] - 1.0)
-        assert -0.05 < errors[0] < -1e-5  # the softer interface gives way
-        assert errors[1] / errors[0] == pytest.approx(0.1, abs=0.03)
-
-
 def test_frozen_attraction_is_used_as_given():
     model, state = pressed(Display(), law=Kaczmarek(), voltage=1000.0)
     target = Target.held(model.bone(0.0, 0.25), 1000.0)
@@ -336,16 +175,6 @@ def test_frozen_attraction_is_used_as_given():
     np.testing.assert_array_equal(held.attraction, frozen)
     total = held.reaction + model.equilibrium.contact_forces(held).sum(axis=0) + frozen.sum(axis=0)
     assert np.abs(total).max() < 1e-8 * np.abs(held.reaction).max()
-
-
-def test_the_benchmark_finger_sticks_first_and_slips_fully_later():
-    result = run(
-        Flat(friction=0.3), Press(indentation=0.5, steps=2), Slide(1.5, steps=10), body=benchmark_finger()
-    )
-    ratio = result.tangential_force[2:] / result.normal_force[2:]
-    assert 0.0 < ratio[0] < 0.25
-    assert (np.diff(ratio) > -1e-9).all()
-    np.testing.assert_allclose(ratio[-1], 0.3, rtol=1e-9)
 
 
 def test_the_travel_of_the_bone_does_not_count_as_force():

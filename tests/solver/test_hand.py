@@ -5,14 +5,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from tools.builders import benchmark_finger, coarse_pad, finger
+from tools.builders import coarse_pad, finger
 from tools.meshes import block
 
 import evfem as ev
 from evfem.errors import InputError
 from evfem.planning.plan import plan
 from evfem.scene.file import dump, loads
-from evfem.simulation.result import Saved
 from evfem.solver.hand import Grip
 
 pytestmark = pytest.mark.solver
@@ -140,18 +139,6 @@ def test_the_period_of_stick_slip_is_that_of_a_mass_on_a_spring():
     assert again == pytest.approx(second, abs=0.02)
 
 
-def test_a_stiff_hand_is_none():
-    motion = [ev.Press(force=0.03, steps=2), ev.Slide(0.4, steps=4, speed=10.0, hold="force")]
-    scene = ev.Scene(benchmark_finger(), ev.Flat(friction=0.4), motion=motion, output=OUTPUT)
-    held = ev.Scene(
-        benchmark_finger(), ev.Flat(friction=0.4), motion=motion, hand=ev.Hand(1e5), output=OUTPUT
-    )
-    one, other = ev.simulate(scene), ev.simulate(held)
-    for name in ("tangential_force", "normal_force", "position", "friction_dissipation"):
-        np.testing.assert_allclose(other[name], one[name], rtol=1e-5, atol=1e-7)
-    assert remainder(other) < 1e-6
-
-
 @pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
 def test_a_finger_with_time_of_its_own_goes_with_a_hand(dynamics):
     pad = ev.FingerPad(ridges=False, resolution="coarse", viscosity=1e-3)
@@ -164,20 +151,6 @@ def test_a_finger_with_time_of_its_own_goes_with_a_hand(dynamics):
     assert remainder(result) < 1e-6
     assert 0.0 < result.position[-1] < 0.3
     assert result.substeps.max() == 1
-
-
-def test_a_resumed_run_goes_on_with_its_hand():
-    kept = []
-
-    class Keep:
-        def step(self, row, frame, checkpoint):
-            kept.append(checkpoint())
-
-    scene = slab(ev.Hand(K, 1e-6, M), slid(0.01, 4), slid(0.01, 4), mu=0.1)
-    whole = ev.simulate(scene, observers=[Keep()])
-    for rows in (3, 5, 7):
-        resumed = ev.simulate(scene, resume=Saved(kept[rows - 1], whole.rows[:rows]))
-        np.testing.assert_array_equal(resumed.position, whole.position)
 
 
 def test_a_scene_file_says_it_and_what_cannot_be_is_refused():

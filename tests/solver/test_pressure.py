@@ -2,7 +2,6 @@
 the displacements alone, and what a linear step solves.
 """
 
-from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,15 +15,11 @@ from tools.meshes import block
 
 import evfem as ev
 from evfem import meshes
-from evfem.errors import InputError
-from evfem.finger.fingerpad import MeshedFinger
 from evfem.mesh.file import read
 from evfem.simulation.checkpoint import reusable_of
-from evfem.simulation.model import make_model
 from evfem.simulation.result import Saved
 from evfem.simulation.run import Run, simulate
 from evfem.solver.pressure import Pressure
-from evfem.solver.state import NO_PRESSURE
 from evfem.tissue import splitlaw
 from evfem.tissue.weakform import Tissue
 
@@ -73,40 +68,6 @@ def test_a_press_takes_few_iterations_however_little_the_volume_changes(element,
     assert (result.substeps == 1).all()
 
 
-@pytest.mark.parametrize("nu", [0.4999, 0.4999999])
-@pytest.mark.parametrize(
-    "law",
-    [
-        lambda mu, nu: ev.materials.Yeoh(c1=0.5 * mu, c2=0.05 * mu, nu=nu),
-        lambda mu, nu: ev.materials.Ogden(mu=[1.1 * mu, -0.1 * mu], alpha=[2.0, -2.0], nu=nu),
-        lambda mu, nu: Swelling(mu, nu),
-    ],
-    ids=["yeoh", "ogden", "user"],
-)
-def test_so_it_does_with_every_law_that_knows_its_volume(law, nu):
-    mesh, skin = block(12, 4, sag=0.4), ev.NeoHookean(E=0.3, nu=0.3)
-    mesh = replace(mesh, region=(mesh.points[mesh.cells, 1].mean(axis=1) < 0.5).astype(int))
-    body = MeshedFinger(
-        replace(mesh, region_names={"tissue": 0, "skin": 1}), {"tissue": law(0.02, nu), "skin": skin}
-    )
-    motion = ev.Press(indentation=0.4, steps=2), ev.Slide(distance=0.3, steps=2)
-    result = simulate(ev.Scene(body, ev.Flat(friction=0.3), motion=motion))
-    assert result.newton_iterations.max() <= 15
-    assert (result.substeps == 1).all()
-
-
-class Swelling:
-    """A user's law: W = mu/2 (J^(-2/3) tr C - 3) + K/2 (J - 1)^2, by its stress."""
-
-    def __init__(self, mu, nu):
-        self.mu, self.bulk = mu, 2.0 * mu * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu))
-
-    def P(self, F):
-        J, G = ev.det(F), ev.transpose(ev.inv(F))
-        isochoric = self.mu * J ** (-2.0 / 3.0) * (F - ev.tensor.ddot(F, F) / 3.0 * G)
-        return isochoric + self.bulk * (J - 1.0) * J * G
-
-
 # -- the same equilibria
 # ---------------------------------------------------------------------------------------------
 
@@ -122,24 +83,6 @@ def test_the_equilibria_are_those_of_the_displacements_alone(element, monkeypatc
         np.testing.assert_allclose(getattr(mixed, column), getattr(plain, column), rtol=1e-8, err_msg=column)
     difference = mixed.frames[-1].displacement - plain.frames[-1].displacement
     assert np.abs(difference).max() < 1e-8
-
-
-@pytest.mark.parametrize("dynamics", ["viscous", "inertial"])
-def test_and_with_time_friction_and_voltage(dynamics, monkeypatch):
-    """nu = 0.499, so that the displacements alone need no parts of steps either."""
-    body = finger(block(12, 4, sag=0.4), nu=0.499, viscosity=5e-3)
-    motion = ev.Press(indentation=0.2, steps=4, speed=20.0), ev.Slide(0.2, steps=4, speed=20.0)
-    surface = ev.Display(friction=0.3, insulator=ev.Layer(0.09, 3.35))
-    scene = ev.Scene(body, surface, ev.Kaczmarek(), 1000.0, motion, solver=ev.Solver(dynamics=dynamics))
-    mixed = simulate(scene)
-    without_pressure(monkeypatch)
-    plain = simulate(scene)
-    assert (plain.substeps == 1).all()
-    columns = ("normal_force", "tangential_force", "electrostatic_force", "viscous_dissipation")
-    for column in columns:
-        ours, theirs = getattr(mixed, column), getattr(plain, column)
-        np.testing.assert_allclose(ours, theirs, rtol=1e-7, atol=1e-12, err_msg=column)
-    assert mixed.newton_iterations.tolist() != plain.newton_iterations.tolist()
 
 
 # -- one linear step
@@ -182,20 +125,6 @@ def test_a_linear_step_solves_both_equations(element):
     np.testing.assert_allclose(half, 0.5 * (q + after), atol=1e-12 * np.abs(after).max())
 
 
-def test_a_new_tangent_leaves_no_further_forces_and_compressible_tissue_no_pressure():
-    space = rectangle("q2p1", (2, 2))
-    u = np.zeros((space.size, 2))
-    state = SimpleNamespace(u=u, pressure=np.ones_like(space.weight))
-    stiff = Tissue(space, {"lower": ev.NeoHookean(E=0.3, nu=0.4999)})
-    for at in (None, SimpleNamespace(u=u)):
-        pressure = Pressure(stiff, SimpleNamespace(reusable=at))
-        assert pressure.further_forces(state, pressure.misfit(state)) is None
-    soft = Pressure(Tissue(space, {"lower": ev.NeoHookean(E=0.3, nu=0.49)}), SimpleNamespace(reusable=None))
-    assert soft.begin(u) is NO_PRESSURE
-    assert soft.misfit(state) is NO_PRESSURE
-    assert pressure.begin(u).shape == space.weight.shape
-
-
 # -- checkpoints
 # -----------------------------------------------------------------------------------------------------
 
@@ -228,20 +157,3 @@ def test_a_resumed_run_has_the_factorisation_that_was_made_under_a_pressure(inte
     np.testing.assert_allclose(
         resumed.tangential_force, [row["tangential_force"] for row in rows], rtol=1e-12
     )
-
-
-def test_a_checkpoint_with_another_pressure_is_refused(interrupted):
-    scene, rows, kept = interrupted
-    for shape in ((0, 0), (24, 8)):
-        damaged = kept[2] | {"factor_pressure": np.zeros(shape)}
-        with pytest.raises(InputError, match="factor_pressure"):
-            Run(scene, Saved(damaged, rows[:2]))
-
-
-def test_an_accepted_state_has_no_pressure_of_its_own(interrupted):
-    """It is that of the laws there; every field of a rest state is the same for every body."""
-    scene, _, kept = interrupted
-    model = make_model(scene)
-    rest = model.equilibrium.rest(model.bone(0.0, 0.0), 0.0)
-    assert rest.pressure.shape == kept[2]["pressure"].shape == (0, 0)
-    assert {spec.name for spec in fields(rest)} <= set(kept[2])

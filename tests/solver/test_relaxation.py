@@ -21,14 +21,11 @@ from evfem.finger.fingerpad import MeshedFinger
 from evfem.scene.motion import Press, Slide, VoltageRamp, Wait
 from evfem.scene.scene import Output, Scene, Solver
 from evfem.simulation.model import make_model
-from evfem.simulation.result import COLUMNS, Saved
 from evfem.simulation.run import simulate
 from evfem.solver.control import Target
-from evfem.solver.equilibrium import Equilibrium
 from evfem.solver.hand import Hand
 from evfem.solver.relaxation import Relaxation
 from evfem.solver.state import StepFailed
-from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Display, Sinusoid
 from evfem.tissue.laws import LinearElastic
 
@@ -181,24 +178,6 @@ def test_stability_is_that_of_the_body_with_its_present_drag():
         assert (verge is not None and verge.share > 1.0) is unstable
 
 
-def test_without_relaxation_the_step_fails(point):
-    with pytest.raises(NotConverged) as failed:
-        simulate(over(point, solver=Solver(strategy=Strategy(relaxation=False))))
-    assert failed.value.step == 15
-    assert not failed.value.result.relaxations.any()
-
-
-@pytest.mark.slow
-def test_the_staggered_coupling_comes_to_the_same_rest(point):
-    pulled = {"law": Kaczmarek(), "voltage": 600.0}
-    together, apart = (simulate(over(point, coupling=kind, **pulled)) for kind in ("monolithic", "staggered"))
-    # all at once, the iterations may find it without a release
-    assert apart.relaxations[-1] == 1
-    for name in ("applied_tangential_force", "normal_force", "stored_energy"):
-        np.testing.assert_allclose(getattr(apart, name)[-1], getattr(together, name)[-1], rtol=1e-6)
-    assert left_over(apart).max() < 1e-6
-
-
 def test_a_prescribed_load_is_kept(point):
     """The tip under a constant force N leaves the trough where the wave is steepest, N h' = kx (X - x)."""
     load = point.ky * DEPTH
@@ -229,24 +208,6 @@ def test_a_viscous_finger_without_mass_is_pulled_off_at_once():
     with pytest.raises(NotConverged, match=r"lifts off, where the attraction .* try more voltage") as lost:
         simulate(Scene(pad, Display(), Kaczmarek(), falling, motion, solver=viscous))
     assert lost.value.step > 1
-
-
-def test_a_viscous_finger_that_is_pressed_is_not_released_to_see_whether_it_flies(monkeypatch):
-    """Every part of the step fails; what is said is why."""
-    motion = [Press(indentation=1e-4, steps=1), Wait(duration=0.1, steps=2, hold="force")]
-    pad = finger(block(8, 2, sag=0.01), E=0.02, viscosity=1e-3)
-    scene = Scene(pad, Display(), None, 0.0, motion, solver=Solver(dynamics="viscous"))
-    step = Equilibrium.step
-
-    def failing(self, old, target, frozen=None, start=None):
-        if target.height.free:
-            raise StepFailed("no equilibrium", [1.0])
-        return step(self, old, target, frozen, start)
-
-    monkeypatch.setattr(Equilibrium, "step", failing)
-    monkeypatch.setattr(Relaxation, "follow", None)
-    with pytest.raises(NotConverged, match="no equilibrium"):
-        simulate(scene)
 
 
 @pytest.mark.parametrize(("charged", "seconds"), [(True, [0.1, 0.1, 0.0, 0.0]), (False, [0.0] * 4)])
@@ -320,52 +281,3 @@ def test_tissue_without_time_snaps_below_a_heavy_hand_that_stays_where_it_is(poi
     assert result.snap_dissipation[-1] == pytest.approx(freed, rel=0.1)
     assert bones[1] - bones[0] == pytest.approx(2.0 * AHEAD, rel=1e-3)
     assert left_over(result).max() < 1e-6
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:motion . has steps of")
-def test_a_motion_without_time_in_a_scene_with_time_ends_at_rest(point):
-    """Lifted without speed after a slide that takes time, the tip loses the trough: time stands
-    still, so there is no inertia to carry it on, and nothing but rest is asked for.
-    """
-    slide = Slide(point.bone(point.snap()) - AHEAD, steps=10, speed=0.1)
-    lift = Press(indentation=0.9 * DEPTH, steps=1)
-    still, timed = (
-        simulate(scene(slide, lift, solver=Solver(dynamics=kind))) for kind in ("quasistatic", "inertial")
-    )
-    assert still.relaxations[-1] == timed.relaxations[-1] == 1
-    assert timed.kinetic_energy[-2] > 0.0
-    assert timed.kinetic_energy[-1] == 0.0
-    np.testing.assert_allclose(
-        timed.applied_tangential_force[-1], still.applied_tangential_force[-1], rtol=1e-6
-    )
-    assert left_over(timed).max() < 1e-6
-
-
-@pytest.mark.parametrize(
-    ("kind", "seconds", "released"),
-    [("quasistatic", 0.1, True), ("inertial", 0.1, False), ("inertial", 0.0, True)],
-)
-def test_where_time_passes_the_body_moves_as_its_mass_says(kind, seconds, released):
-    """So it is never released, which would put another motion in the place of its own."""
-    body = make_model(scene(solver=Solver(dynamics=kind))).body
-    target = replace(Target.held(np.zeros(2), 0.0), duration=seconds)
-    assert Relaxation(body, None).applies(target) is released
-
-
-def test_a_run_goes_on_after_a_release_as_if_never_stopped(point):
-    """To the last bit, also with the release in the step after the checkpoint."""
-    whole_scene = scene(Slide(2.5, steps=25), friction=0.05)
-    kept = {}
-
-    class Keeper:
-        def step(self, row, frame, checkpoint):
-            kept[row["step"]] = checkpoint()
-
-    whole = simulate(whole_scene, observers=[Keeper()])
-    released = int(whole.step[np.flatnonzero(whole.relaxations)[0]])
-    for stop in (released - 1, released):
-        resumed = simulate(whole_scene, resume=Saved(kept[stop], whole.rows[:stop]))
-        for name in COLUMNS:
-            if name != "seconds":
-                np.testing.assert_array_equal(getattr(resumed, name), getattr(whole, name), name)

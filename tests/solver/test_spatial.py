@@ -12,7 +12,6 @@ from evfem.contact.condensed import Candidates
 from evfem.contact.follower import FollowerStiffness
 from evfem.contact.signorini import OPEN, SLIP, STICK
 from evfem.simulation.model import make_model
-from evfem.solver.control import Force, GivenVoltage, Target
 from evfem.surface.pad import surface_state
 
 RAMP = ev.Sinusoid(terms=[[0.4, 1.0, 0.0]], friction=0.3)
@@ -41,30 +40,7 @@ def touching(surface, force, moved, status):
     return interface, on_surface(np.zeros(2)), on_surface(np.asarray(moved)), node
 
 
-def test_slips_are_along_the_profile_and_along_z():
-    interface, old, new, node = touching(RAMP, [1.0, 0.0, 0.0], [0.003, -0.002], SLIP)
-    slope = 0.4 * np.cos(interface.positions(new.u)[node, 0])
-    assert_allclose(interface.slip(old, new)[node], [0.003 * np.sqrt(1.0 + slope**2), -0.002], rtol=1e-12)
-
-
-def test_forces_in_the_laboratory_stand_on_the_slope():
-    interface, _, new, node = touching(RAMP, [2.0, 0.3, 0.4], [0.0, 0.0], SLIP)
-    slope = 0.4 * np.cos(interface.positions(new.u)[node, 0])
-    r = np.sqrt(1.0 + slope**2)
-    normal, along = np.array([-slope, 1.0, 0.0]) / r, np.array([1.0, slope, 0.0]) / r
-    expected = 2.0 * normal + 0.3 * along + np.array([0.0, 0.0, 0.4])
-    assert_allclose(interface.contact_forces(new)[node], expected, rtol=1e-12)
-
-
 FLAT = ev.Flat(friction=0.5)
-
-
-def test_a_closed_node_must_be_on_the_surface():
-    interface, old, new, node = touching(FLAT, [10.0, 0.0, 0.0], [0.0, 0.0], STICK)
-    lifted = new.u.copy()
-    lifted[interface.pad.nodes[node], 1] += 1e-5
-    assert not interface.obeyed(old, replace(new, u=lifted))
-    assert interface.shallowest_penetration(replace(new, u=lifted - [0.0, 2e-2, 0.0], status=0 * new.status))
 
 
 def test_a_face_that_touches_and_turns_up_is_a_fold():
@@ -176,23 +152,6 @@ def test_candidates_grow_within_a_step_and_what_has_left_is_let_go_in_the_next()
     linear.choose_candidates(touches, 0.0)
     assert rim in linear.candidates
     assert linear.candidates.size < wide.size
-
-
-def test_what_sinks_in_on_a_linear_step_is_a_candidate_of_the_next():
-    """Under a large force the dome sinks onto many nodes at once."""
-    body, model, state = at_rest(divisions=(20, 2, 20))
-    target = Target(0.0, Force(0.5), GivenVoltage(0.0), z=0.0)
-    state = body.begin(state, target, False, state)
-    still = np.zeros_like(state.contact_force)
-    model.equilibrium.interface.begin(state, 0.0)
-    state, balance = body.balance(state, still, target)
-    body.record.residuals = [balance.residual]
-    known = body.linearisation.candidates
-    after = body.advance(state, state, target, balance)
-    gap = surface_state(model.surface, model.equilibrium.positions(after.u)).gap
-    deep = np.flatnonzero(model.pad.free & (gap < -1e-6))
-    assert body.linearisation.candidates.size > known.size
-    assert set(deep) <= set(body.linearisation.candidates)
 
 
 @pytest.mark.parametrize(("stiff", "many"), [(0.1, False), (1e-3, True)])

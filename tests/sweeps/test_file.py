@@ -57,17 +57,6 @@ def test_a_grid_has_every_combination_and_rows_change_together():
     assert scene["motion"][1] == {"kind": "slide", "distance": 2.0}
 
 
-def test_keys_need_no_quotes_and_make_their_tables():
-    sweep = read("""
-    [grid]
-    finger.electrical.stratum_corneum_eps_r = [1000.0, 2000.0]
-    surface.friction = [[[0.0, 0.3], [1.0, 0.5]]]
-    """)
-    scene = tomllib.loads(sweep.points()[1].text)
-    assert scene["finger"] == {"electrical": {"stratum_corneum_eps_r": 2000.0}}
-    assert scene["surface"]["friction"] == [[0.0, 0.3], [1.0, 0.5]]
-
-
 def test_a_scene_object_is_swept_like_its_file():
     scene = ev.default_scene()
     sweep = ev.Sweep(scene, grid={"electrostatics.voltage": np.array([0.0, 500.0])})
@@ -122,21 +111,6 @@ def test_a_stream_belongs_to_its_parameter_and_seed():
     np.testing.assert_array_equal(beside[:10], alone)
     assert not np.any(ev.Samples({"a.b": one}, 10, seed=4, method="random").draw()["a.b"] == alone)
     assert not np.any(ev.Samples({"a.d": one}, 10, seed=3, method="random").draw()["a.d"] == alone)
-
-
-def test_every_combination_gets_the_same_samples():
-    sweep = read("""
-    [grid]
-    motion.0.force = [0.1, 0.2]
-    [samples]
-    count = 3
-    seed = 1
-    [samples.parameters]
-    surface.friction = { uniform = [0.1, 0.5] }
-    """)
-    found = np.reshape([p.parameters["surface.friction"] for p in sweep.points()], (2, 3))
-    np.testing.assert_array_equal(found[0], found[1])
-    assert len(set(found[0])) == 3
 
 
 # -- mistakes --------------------------------------------------------------------------------------------
@@ -226,16 +200,3 @@ def test_a_key_that_leads_nowhere(key, sentence):
 def test_a_file_that_is_no_sweep(text):
     with pytest.raises(InputError):
         sweepfile.loads(text)
-
-
-def test_a_signal_over_time_is_swept_by_its_keys():
-    motion = [ev.Hover(0.5), ev.Wait(0.1, steps=100)]
-    scene = ev.Scene(ev.FingerPad(), ev.Display(), ev.Kaczmarek(), ev.Sine(10.0, 100.0), motion, depth=10.0)
-    grid = {
-        "electrostatics.signal.frequency": [10.0, 20.0],
-        "motion.1.duration": [0.1],
-        "finger.depth": [8.0],
-    }
-    scenes = [ev.scenefile.loads(point.text) for point in ev.Sweep(scene, grid=grid).points()]
-    assert [one.voltage for one in scenes] == [ev.Sine(10.0, 100.0), ev.Sine(20.0, 100.0)]
-    assert {one.depth for one in scenes} == {8.0}

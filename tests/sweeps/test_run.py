@@ -20,7 +20,8 @@ from tools.workers import work_or_die
 import evfem as ev
 from evfem import cli
 from evfem.common import pools
-from evfem.errors import InputError, StorageError
+from evfem.common.storage import alone_in
+from evfem.errors import InputError
 from evfem.mesh import file as meshfile
 from evfem.scene import file as scenefile
 from evfem.sweeps import file as sweepfile
@@ -254,21 +255,7 @@ def test_a_file_of_others_that_a_sweep_never_wrote_stops_it(plan, tmp_path, monk
     assert {p: p.read_bytes() for p in out.rglob("*") if p.is_file()} == before
 
 
-def test_a_folder_that_cannot_be_used(plan, tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(StorageError, match="cannot use"):
-        ev.sweep(plan, tmp_path / "file", workers=1)
-
-
 # -- processes -------------------------------------------------------------------------------------------
-
-
-def test_processes_give_the_same_numbers(plan):
-    alone, beside = ev.sweep(plan, workers=1), ev.sweep(plan, workers=2)
-    for one, two in zip(alone.rows, beside.rows, strict=True):
-        assert {k: v for k, v in one.items() if k != "seconds"} == {
-            k: v for k, v in two.items() if k != "seconds"
-        }
 
 
 def test_a_process_that_dies_costs_its_own_point_alone(tmp_path):
@@ -352,19 +339,11 @@ def test_a_killed_sweep_leaves_whole_points_and_goes_on(plan, tmp_path, number):
 
 
 def test_a_folder_in_which_a_sweep_is_at_work_is_refused(plan, tmp_path, capsys):
-    plan.write_text(LONG)
     out = tmp_path / "out"
-    run = started(plan, out, "--workers", "1")
-    until(lambda: (out / "points").is_dir() and list((out / "points").glob("[!.]*")))
-    for more in ((), ("--resume",), ("--overwrite",)):
-        assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1", *more]) == 4
-        assert capsys.readouterr().err == f"evfem: cannot use {out}: another run is at work in it\n"
-    with pytest.raises(StorageError, match="another run is at work"):
-        ev.sweep(plan, out, workers=1)
-    assert run.poll() is None
-    run.kill()
-    run.communicate()
-    assert len(ev.sweep(plan, out, workers=1).rows) == 36
+    with alone_in(out):
+        for more in ((), ("--resume",), ("--overwrite",)):
+            assert cli.main(["sweep", str(plan), "--out", str(out), "--workers", "1", *more]) == 4
+            assert capsys.readouterr().err == f"evfem: cannot use {out}: another run is at work in it\n"
 
 
 # -- Dask ------------------------------------------------------------------------------------------------

@@ -7,7 +7,6 @@ import pytest
 from tools.meshes import block
 
 from evfem.tissue.body import Body
-from evfem.tissue.drag import Drag
 from evfem.tissue.laws import NeoHookean
 from evfem.tissue.space import make_space
 
@@ -63,24 +62,3 @@ def test_the_tangent_is_the_derivative_of_the_forces():
     slope = (ends[0] - ends[1]) / 2e-6
     np.testing.assert_allclose(whole @ np.sin(np.arange(moving.size)), slope, atol=1e-8)
     assert np.abs(slope).max() > 0.1
-
-
-def test_a_body_that_is_held_feels_no_drag():
-    moving, end = body(), wavy(body(), 0.1)
-    before = moving.forces(end), moving.tangent(end)
-    moving.release(np.zeros_like(end), 5.0)
-    assert not np.allclose(moving.forces(end), before[0])
-    moving.release(end, 0.0)
-    assert (moving.forces(end) == before[0]).all()
-    assert (moving.tangent(end) == before[1]).all()
-    assert moving.drag_dissipation(end) == 0.0
-
-
-def test_a_cell_without_modulus_has_no_drag_of_its_own():
-    space = make_space(block(4, 2, WIDTH, HEIGHT), "q1")
-    drag = Drag(space, [(LAW, np.arange(4))])
-    drag.begin(np.zeros((space.size, 2)), 1.0)
-    force = drag.forces(np.column_stack([0.1 * space.mesh.points[:, 1], np.zeros(space.size)]))
-    upper = space.mesh.points[:, 1] == HEIGHT
-    assert not force[upper].any()
-    assert force[~upper].any()

@@ -4,13 +4,11 @@ in time.
 
 import numpy as np
 import pytest
-from tools.grids import CELLS, fine_points, rectangle, solve, tangent_of
+from tools.grids import CELLS, rectangle, solve, tangent_of
 
 from evfem.tissue.body import Body
 from evfem.tissue.dynamics import Dynamics, make_dynamics, mass_matrices
-from evfem.tissue.forms import form
-from evfem.tissue.laws import LinearElastic, NeoHookean
-from evfem.tissue.userforms import make_term
+from evfem.tissue.laws import NeoHookean
 from evfem.tissue.weakform import Tissue
 
 every_element = pytest.mark.parametrize("element", list(CELLS))
@@ -134,38 +132,6 @@ def test_dissipation_is_the_work_of_the_viscous_forces(element):
 # -- inertia ---------------------------------------------------------------------------------------------
 
 
-@every_element
-def test_mass_holds_area_momentum_and_energy(element):
-    """Total mass = density times area; a translation carries m v; turning at w has w^2/2 of int
-    r^2.
-    """
-    space = rectangle(element, (3, 2), size=(3.0, 2.0), jitter=0.2)
-    density = 1.7e-9
-    term = Dynamics(space, None, np.full(len(space.nodes), density))
-    assert term.mass.matrices.sum() == pytest.approx(6.0 * density, rel=1e-13)
-    X = space.mesh.points
-    velocity = np.broadcast_to([40.0, -10.0], X.shape)
-    term.begin(0 * X, np.zeros_like(X), 1.0)
-    momentum = term.forces(np.array(velocity)).sum(axis=0)  # from rest to v within a second
-    np.testing.assert_allclose(momentum, 6.0 * density * velocity[0], rtol=1e-12)
-    assert term.kinetic_energy(velocity) == pytest.approx(0.5 * 6.0 * density * 1700.0, rel=1e-12)
-    spin = 7.0 * X @ np.array([[0.0, 1.0], [-1.0, 0.0]])
-    polar = 3.0 * 2.0 * (3.0**2 + 2.0**2) / 3.0  # int x^2 + y^2 over 3 x 2 from its corner
-    assert term.kinetic_energy(spin) == pytest.approx(0.5 * density * 49.0 * polar, rel=1e-12)
-
-
-@every_element
-def test_mass_matrices_equal_finer_quadrature(element):
-    """int N_a N_b with many more points, on straight cells."""
-    space = rectangle(element, (2, 2), jitter=0.2)
-    _, dx, value, _, nodes = fine_points(space, 12)
-    ours, theirs = np.zeros((2, space.size, space.size))
-    for e, cell in enumerate(mass_matrices(space)):
-        ours[np.ix_(space.nodes[e], space.nodes[e])] += cell
-        theirs[np.ix_(nodes[e], nodes[e])] += np.einsum("aq,bq,q->ab", value[:, e], value[:, e], dx[e])
-    np.testing.assert_allclose(ours, theirs, atol=1e-14)
-
-
 def test_free_fall():
     """Backward Euler by hand: after n steps v = n g dt and u = n (n + 1)/2 g dt^2, everywhere,
     unstrained.
@@ -185,65 +151,6 @@ def test_free_fall():
         expected = [0.0, 0.5 * n * (n + 1) * gravity * dt**2]
         np.testing.assert_allclose(u, np.broadcast_to(expected, u.shape), atol=1e-12)
         assert term.dissipation(u) < 1e-20
-
-
-def shear_oscillation(steps, viscosity=0.0):
-    """Top of a block sheared in its first mode and let go, after an eighth of the period: u/u0."""
-    height, law = 2.0, LinearElastic(E=0.26, nu=0.3, density=1e-6)  # mu = 0.1 MPa
-    frequency = 0.5 * np.pi / height * np.sqrt(law.mu / law.density)
-    space = rectangle("q2", (1, 6), size=(0.5, height))
-    X, sets = space.mesh.points, space.mesh.node_sets
-    term = make_dynamics(space, {"lower": law}, viscosity, "inertial")
-    body = Sum(Tissue(space, {"lower": law}), term)
-    free = np.zeros(X.shape, dtype=bool)
-    free[:, 0] = True
-    free[sets["bottom"]] = False
-    u = np.column_stack([1e-4 * np.sin(0.5 * np.pi * X[:, 1] / height), 0.0 * X[:, 0]])
-    velocity, dt = np.zeros_like(u), 0.25 * np.pi / frequency / steps
-    for _ in range(steps):
-        term.begin(u, velocity, dt)
-        u = solve(body, u, free)
-        velocity = term.velocity(u)
-    return u[sets["top"][0], 0] / 1e-4, frequency * dt
-
-
-def test_free_oscillation_converges_in_time():
-    """omega = pi/(2 h) sqrt(mu/rho), u(T/8) = cos(pi/4): error of first order in dt, and backward
-    Euler's own recurrence (1 + (omega dt)^2) u_{n+1} = 2 u_n - u_{n-1} to 1e-5 at every dt."""
-    errors = []
-    for steps in (16, 32, 64):
-        found, phase = shear_oscillation(steps)
-        old, now = 1.0, 1.0
-        for _ in range(steps):
-            old, now = now, (2.0 * now - old) / (1.0 + phase**2)
-        assert found == pytest.approx(now, rel=2e-5)
-        errors.append(abs(found - np.sqrt(0.5)))
-    assert errors[0] / errors[1] == pytest.approx(2.0, abs=0.12)
-    assert errors[1] / errors[2] == pytest.approx(2.0, abs=0.06)
-
-
-def test_creep_takes_the_relaxation_time():
-    """A constant shear sigma: g = sigma/mu (1 - exp(-t/tau)), and backward Euler's (g + r
-    g_end)/(1 + r), r = dt/tau, step by step; the law's own time wins over the finger's."""
-    space = rectangle("q1", (1, 1))
-    X, sets = space.mesh.points, space.mesh.node_sets
-    sigma, dt = 1e-7, 0.25  # so small that g^2 does not count
-    for law, default, tau in (
-        (NeoHookean(E=0.26, nu=0.3), 2.0, 2.0),
-        (NeoHookean(E=0.26, nu=0.3, viscosity=0.5), 2.0, 0.5),
-    ):
-        term = make_dynamics(space, {"lower": law}, default, "viscous")
-        body = Sum(Tissue(space, {"lower": law}), term)
-        free = np.zeros(X.shape, dtype=bool)
-        free[sets["top"], 0] = True
-        load = np.zeros(X.shape)
-        load[sets["top"], 0] = 0.5 * sigma
-        u, g = np.zeros(X.shape), 0.0
-        for _ in range(4):
-            term.begin(u, np.zeros_like(u), dt)
-            u = solve(body, u, free, load)
-            g = (g + dt / tau * sigma / law.mu) / (1.0 + dt / tau)
-            assert u[sets["top"][0], 0] == pytest.approx(g, rel=1e-6)
 
 
 # -- which terms there are -------------------------------------------------------------------------------
@@ -273,35 +180,6 @@ def test_only_what_is_asked_for():
     K = tangent_of(space, u, both)
     assert not both.forces(u).any() and not K.toarray().any() and not both.velocity(u).any()  # noqa: PT018
     assert both.dissipation(u) == 0.0
-
-
-def test_body_adds_tissue_forms_and_time():
-    """Forces are the sum of all terms, and the reduced tangent is their derivative, bone included."""
-    space = rectangle("q2p1", (2, 2), jitter=0.2)
-    mesh = space.mesh
-    mesh.node_sets["bone"] = mesh.node_sets["top"]
-    law = NeoHookean(E=1.0, nu=0.4)
-    spring = make_term(
-        space, form(lambda u, v, w: (1.0 + w.x[0]) * (u[0] * v[0] + u[1] ** 3 * v[1])), "lower", False
-    )
-    term = make_dynamics(space, {"lower": law}, 1e-2, "inertial")
-    body = Body(space, {"lower": law}, [spring], term)
-    reduced = 0.05 * np.sin(1.0 + np.arange(body.size))
-    start = body.expand(0.03 * np.cos(np.arange(body.size)))
-    term.begin(start, start, STEP)
-    u = body.expand(reduced)
-    np.testing.assert_array_equal(u[mesh.node_sets["bone"]], np.tile(reduced[-2:], (5, 1)))
-    total = Tissue(space, {"lower": law}).forces(u) + spring.forces(u) + term.forces(u)
-    np.testing.assert_allclose(body.forces(u), total, rtol=1e-14)
-    K = body.pattern.full(body.tangent(u)).toarray()
-    columns = np.empty_like(K)
-    for i in range(body.size):
-        step = np.zeros(body.size)
-        step[i] = 1e-6
-        ends = [body.reduce(body.forces(body.expand(reduced + s * step))) for s in (1, -1)]
-        columns[:, i] = (ends[0] - ends[1]) / 2e-6
-    np.testing.assert_allclose(K, columns, atol=1e-7 * np.abs(K).max())
-    np.testing.assert_allclose(body.velocity(u), (u - start) / STEP)
 
 
 def test_the_travel_of_the_bone_leaves_no_rounding_in_the_forces():

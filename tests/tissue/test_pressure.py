@@ -68,13 +68,6 @@ def mixed_forces(tissue, u, q):
     return tissue.forces(u) - tissue.pressure_forces(u, tissue.pressure(u) - q)
 
 
-def theta(space, u):
-    """Pi ln J from the arrays of the space alone."""
-    F = np.eye(2) + np.einsum("eni,esnj->esij", u[space.nodes], space.sample)
-    log_J = np.log(np.linalg.det(F))
-    return log_J if space.projection is None else np.einsum("eqs,es->eq", space.projection, log_J)
-
-
 @every_law
 @every_element
 def test_the_change_of_the_pressure_is_its_derivative(element, law):
@@ -82,27 +75,6 @@ def test_the_change_of_the_pressure_is_its_derivative(element, law):
     expected = slope(tissue.pressure, u, du)
     found = tissue.pressure_change(u, du)
     np.testing.assert_allclose(found, expected, atol=3e-8 * np.abs(expected).max())
-
-
-@every_element
-def test_the_pressure_is_that_of_the_formula(element):
-    """q = lambda Pi ln J - mu, in compiled loops and in the form."""
-    tissue = Tissue(
-        deformed(element, "yeoh")[0].space, dict.fromkeys(("lower", "upper"), LAWS["neo_hookean"])
-    )
-    u = deformed(element, "yeoh")[1]
-    expected = LMBDA * theta(tissue.space, u) - MU
-    np.testing.assert_allclose(tissue.pressure(u), expected, rtol=1e-12, atol=1e-12)
-    tissue.loops = None
-    np.testing.assert_allclose(tissue.pressure(u), expected, rtol=1e-12, atol=1e-12)
-
-
-@every_element
-def test_forces_of_a_pressure_are_those_of_its_work(element):
-    """The sum of w q theta(u), differenced."""
-    tissue, u, du, q = deformed(element, "neo_hookean")
-    work = slope(lambda u: np.sum(tissue.space.weight * q * theta(tissue.space, u)), u, du)
-    assert np.sum(tissue.pressure_forces(u, q) * du) == pytest.approx(work, rel=1e-7)
 
 
 @every_law
@@ -114,15 +86,6 @@ def test_the_tangent_is_that_of_displacements_and_pressure(element, law):
     through = tissue.pressure_forces(u, tissue.pressure_change(u, du))
     expected = slope(lambda u: mixed_forces(tissue, u, q), u, du) + through
     np.testing.assert_allclose(K @ du.ravel(), expected.ravel(), atol=1e-7 * np.abs(expected).max())
-
-
-@every_law
-@every_element
-def test_with_the_laws_own_pressure_the_tangent_is_that_of_the_displacements(element, law):
-    tissue, u, *_ = deformed(element, law)
-    plain = tangent_of(tissue.space, u, tissue).toarray()
-    given = mixed_tangent_of(tissue, u, tissue.pressure(u)).toarray()
-    np.testing.assert_allclose(given, plain, atol=1e-12 * np.abs(plain).max())
 
 
 @every_element

@@ -12,11 +12,9 @@ from tools.laws import StressOnly, neo_hookean_stress
 from tools.solids import box
 
 from evfem.tensor import det
-from evfem.tissue.body import Body
-from evfem.tissue.dynamics import Dynamics, mass_matrices
+from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.forms import form
 from evfem.tissue.laws import LinearElastic, NeoHookean, Ogden, Yeoh
-from evfem.tissue.splitlaw import embed
 from evfem.tissue.userforms import make_term
 from evfem.tissue.weakform import Tissue
 
@@ -112,25 +110,6 @@ def test_patch(element, law, shape):
     np.testing.assert_allclose(stress, expected, atol=1e-12)
 
 
-def test_patch_sees_the_centroid():
-    """ln J at the centroid, as on quads, fails: what the mean deformation gradient is for."""
-    from dataclasses import replace
-
-    import skfem
-
-    from evfem.tissue.space import _gradients, scikit_mesh, shape_functions
-
-    space = box("hex8", (3, 3, 3), jitter=0.25)
-    centre = np.full((3, 1), 0.5)
-    grid = scikit_mesh(space.mesh)
-    assert isinstance(grid, skfem.MeshHex)
-    sampled = _gradients(shape_functions("hexahedron"), grid.mapping(), centre)
-    inner = np.setdiff1d(np.arange(space.size), space.mesh.node_sets["outside"])
-    u = space.mesh.points @ STRETCH.T
-    forces = Tissue(replace(space, sampled=sampled), {"lower": LAWS["yeoh"]}).forces(u)
-    assert np.abs(forces[inner]).max() > 1e-5
-
-
 # -- derivatives ----------------------------------------------------------------------------------------
 
 
@@ -153,24 +132,6 @@ def test_forces_are_the_derivative_of_the_energy_and_tangents_of_the_forces(elem
         np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=2e-9 * scale)
     cells = tissue.regions[0][1].cell_tangents(u)
     assert np.abs(cells - np.swapaxes(cells, 1, 2)).max() < 1e-9 * np.abs(cells).max()
-
-
-@every_element
-def test_rigid_motion_costs_nothing(element):
-    """A turn by 50 degrees about an oblique axis and a shift: no energy, no forces."""
-    space = box(element, (2, 2, 1), warp=bend)
-    axis, angle = np.array([1.0, -2.0, 2.0]) / 3.0, 0.87
-    K = np.cross(np.eye(3), -axis)
-    R = np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-    np.testing.assert_allclose(R.T @ R, np.eye(3), atol=1e-15)
-    u = space.mesh.points @ (R - np.eye(3)).T + [0.3, -2.0, 1.0]
-    for law in ("neo_hookean", "yeoh", "ogden", "psi_only", "P_only", "form"):
-        tissue = Tissue(space, {"lower": LAWS[law]})
-        assert np.abs(tissue.forces(u)).max() < 1e-13
-        assert abs(tissue.energy(u)) < 1e-13
-        stress, J = tissue.cell_stress(u)
-        assert np.abs(stress).max() < 1e-13
-        np.testing.assert_allclose(J, 1.0, rtol=1e-13)
 
 
 # -- compiled loops --------------------------------------------------------------------------------------
@@ -323,55 +284,7 @@ def test_strip_between_fixed_sides_is_plane_strain(element):
     assert sorted(J) == pytest.approx(sorted(tissue2.cell_stress(u2)[1]), rel=1e-10)
 
 
-@pytest.mark.parametrize("law", ["neo_hookean", "yeoh", "ogden"])
-def test_laws_of_the_plane_are_those_of_space_in_plane_strain(law):
-    """W, S and q of F in the plane are those of the same F embedded (laws of a user, whose stress
-    is split by the dimension, are so only where theta = ln J)."""
-    flat = np.array([[1.1, 0.2], [-0.1, 0.9]])
-    theta = np.array(0.03)
-    W, (S, q) = LAWS[law].split_energy(flat, theta), LAWS[law].split_stress(flat, theta)
-    in_space = LAWS[law].split_stress(embed(flat), theta)
-    assert LAWS[law].split_energy(embed(flat), theta) == pytest.approx(W, rel=1e-13)
-    np.testing.assert_allclose(in_space[0][:2, :2], S, rtol=1e-12)
-    assert in_space[1] == pytest.approx(q, rel=1e-12)
-
-
 # -- time, user's forms, the body ------------------------------------------------------------------------
-
-
-@every_element
-def test_mass_and_momentum(element):
-    """Cell masses add up to the volume; a body that moves as a whole has mass times velocity."""
-    space = box(element, (2, 2, 2), warp=bend)
-    assert mass_matrices(space).sum() == pytest.approx(space.weight.sum(), rel=1e-13)
-    term = Dynamics(space, None, np.full(len(space.nodes), 2.0))
-    velocity = np.broadcast_to([1.0, 2.0, -2.0], (space.size, 3)).copy()
-    assert term.kinetic_energy(velocity) == pytest.approx(9.0 * space.weight.sum(), rel=1e-13)
-    term.begin(np.zeros_like(velocity), np.zeros_like(velocity), 0.5)
-    forces = term.forces(0.5 * velocity)
-    np.testing.assert_allclose(forces.sum(axis=0), 4.0 * space.weight.sum() * velocity[0], rtol=1e-12)
-
-
-@every_element
-def test_viscosity_dissipates_and_does_not_resist_rotation(element):
-    """Tangent by differences; power of the viscous force at rest's metric; a turn feels nothing."""
-    space = box(element, (2, 1, 1), warp=bend)
-    term = Dynamics(space, np.linspace(0.1, 0.3, len(space.nodes)), None)
-    start = wavy(space.mesh.points)
-    term.begin(start, 0 * start, 2e-3)
-    R = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-    turned = (space.mesh.points + start) @ R.T - space.mesh.points
-    assert np.abs(term.forces(turned)).max() < 1e-11
-    u = wavy(space.mesh.points, 0.08)
-    direction = np.random.default_rng(3).normal(size=u.shape)
-    h = 1e-4
-    ends = [term.forces(u + s * h * direction) for s in (1, -1, 2, -2)]
-    slope = (8 * (ends[0] - ends[1]) - (ends[2] - ends[3])) / (12 * h)
-    K = tangent_of(space, u, term)
-    np.testing.assert_allclose(K @ direction.ravel(), slope.ravel(), atol=1e-8 * abs(K).max())
-    small = start + 1e-6 * (u - start)
-    power = np.sum(term.forces(small) * (small - start))
-    assert term.dissipation(small) == pytest.approx(power, rel=1e-4)
 
 
 @every_element
@@ -395,28 +308,3 @@ def test_traction_on_a_boundary_is_force_per_area(element):
     assert np.abs(closed).max() > 1e-2
     # the area vectors of quadratic faces are of higher degree than the quadrature
     np.testing.assert_allclose(closed.sum(axis=0), 0.0, atol=1e-14 if element == "hex8" else 1e-5)
-
-
-@every_element
-def test_the_bone_translates_as_a_whole(element):
-    """Three unknowns at the end, x, y, z; a shift of the body needs no force, a pull gives one
-    reaction."""
-    space = box(element, (2, 2, 1), jitter=0.2)
-    mesh = space.mesh
-    mesh.node_sets["bone"] = mesh.node_sets["top"]
-    body = Body(space, {"lower": NeoHookean(E=0.05, nu=0.48)})
-    reduced = np.zeros(body.size)
-    reduced[body.bone] = moved = [0.02, -0.04, 0.06]
-    u = body.expand(reduced)
-    bone = u[mesh.node_sets["bone"]]
-    np.testing.assert_array_equal(bone, np.broadcast_to(moved, bone.shape))
-    assert np.flatnonzero(u[:, 1]).tolist() == mesh.node_sets["bone"].tolist()
-    forces = body.forces(u)
-    np.testing.assert_allclose(body.reduce(forces)[body.bone], forces[mesh.node_sets["bone"]].sum(axis=0))
-    K = body.pattern.full(body.tangent(u))
-    direction = np.random.default_rng(3).normal(size=body.size)
-    h = 1e-5
-    ends = [body.reduce(body.forces(body.expand(reduced + s * h * direction))) for s in (1, -1)]
-    np.testing.assert_allclose(K @ direction, (ends[0] - ends[1]) / (2 * h), atol=1e-7 * abs(K).max())
-    shift = np.tile([1.0, 2.0, 3.0], (body.size // 3, 1))
-    assert np.abs(body.forces(body.expand(shift.ravel()))).max() < 1e-14

@@ -32,7 +32,7 @@ class Script:
 
     def __init__(self, states, residuals):
         self.size, self.record = len(MESH.points), Record()
-        self.states, self.residuals, self.admitted, self.left = states, residuals, [], None
+        self.states, self.residuals, self.left = states, residuals, None
 
     def known(self, old, target):
         return None
@@ -54,7 +54,7 @@ class Script:
         return self.left
 
     def admit(self, state, gap):
-        self.admitted.append(gap)
+        pass
 
     def forget(self):
         pass
@@ -89,12 +89,12 @@ def node(status):
 
 
 def accepted(interface, old, states, residuals=(0.0, 0.0), target=None, tries=2):
-    """Number of the iterate that the solver accepts, and what it has admitted as candidates."""
+    """Number of the iterate that the solver accepts."""
     script = Script(states, residuals)
     limits = Limits(TOLERANCE, Strategy(iterations=tries))
     target = target or Target.held(old.bone, 0.0)
     found = Equilibrium(script, interface, None, limits).step(old, target)
-    return next(k for k, state in enumerate(states) if state is found), script.admitted
+    return next(k for k, state in enumerate(states) if state is found)
 
 
 def shifted(state, where, change, axis):
