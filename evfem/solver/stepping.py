@@ -26,7 +26,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -35,13 +34,15 @@ from evfem.common.arrays import Floats
 from evfem.common.constants import COARSER, PATH_FIRST, RELEASED, SMALLEST_FORCE, STAGGERED_LIMIT
 from evfem.solver.control import Met, Target
 from evfem.solver.equilibrium import Equilibrium
-from evfem.solver.hold import BARRIER, Hold
+from evfem.solver.hold import Hold
 from evfem.solver.path import apart, longer
 from evfem.solver.relaxation import Relaxation, pull
 from evfem.solver.state import Folded, LiftedOff, State, StepFailed
 from evfem.solver.strategy import stuck
 from evfem.tissue.body import Body
 
+#: why an equilibrium is refused that lies behind a barrier
+BARRIER = "the equilibrium that was found lies behind a barrier, which the finger would not climb"
 #: a climb that is rounding, as a share of the stored energy
 CLIMB = 1e-3
 #: from the fraction of the way that is done (0 to 1) and the next one to the target there
@@ -61,19 +62,6 @@ class Accounts(Protocol):
 
     def back(self, mark: Any) -> None:
         """What was accepted since `mark` led nowhere."""
-
-
-class Unbooked:
-    """Accounts that keep nothing."""
-
-    def accept(self, old: State, new: State) -> None:
-        """A part was accepted."""
-
-    def mark(self) -> None:
-        """Where the accounts stand: nowhere."""
-
-    def back(self, mark: None) -> None:
-        """Nothing was kept."""
 
 
 @dataclass(frozen=True)
@@ -275,7 +263,7 @@ class Stepper:
         if pull(state, target) <= 0.0:
             return
         try:
-            relaxation.follow(state, replace(target, duration=0.0), Unbooked().accept)
+            relaxation.follow(state, replace(target, duration=0.0), lambda old, new: None)
         except LiftedOff as lifted:
             lifted.last = failed.last
             raise
@@ -291,24 +279,27 @@ class Stepper:
         if not self._climbs(target, state, new):
             return new
         self.barriers += 1
-        assert self.body is not None
-        if self.releasing or not self._relaxation(self.body).applies(target):
+        if self.body is None or self.releasing or not self._relaxation(self.body).applies(target):
             raise StepFailed(BARRIER, self.equilibrium.record.residuals)
-        hold = Hold(self.body, self._found, partial(self._climbs, target), self.equilibrium.strategy.hold)
-        new = hold.follow(state, target)
+        new = Hold(self.body, self._reached, self.equilibrium.strategy.hold).follow(state, target)
         self.held += 1
+        return new
+
+    def _reached(self, old: State, target: Target, start: State) -> State:
+        """The equilibrium found from `start`, which the body must reach from there without climbing."""
+        new = self._found(old, target, start)
+        if self._climbs(target, start, new):
+            raise StepFailed(BARRIER, self.equilibrium.record.residuals)
         return new
 
     def _climbs(self, target: Target, old: State, new: State) -> bool:
         """Whether a barrier lies between two states; without attraction there is none to come over, and where
         a voltage is found it is no load whose potential could rise.
         """
-        attraction, drive = self.equilibrium.attraction, target.drive
-        if self.rise is None or self.body is None or drive.free or drive.follows:
+        attraction = self.equilibrium.attraction
+        if self.rise is None or attraction is None or not attraction.acts(new.voltage):
             return False
-        if attraction is None or not attraction.acts(new.voltage):
-            return False
-        return self.rise(old, new, target) > CLIMB
+        return not (target.drive.free or target.drive.follows) and self.rise(old, new, target) > CLIMB
 
     def _found(self, state: State, target: Target, start: State | None = None) -> State:
         """One equilibrium with the coupling asked for; where charges move, they follow."""

@@ -12,9 +12,22 @@ from evfem.scene.motion import Press, Slide
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.run import simulate
 from evfem.solver.state import Record, StepFailed
-from evfem.solver.stepping import Stepper, Unbooked
+from evfem.solver.stepping import Stepper
 from evfem.solver.strategy import Strategy
 from evfem.surface.surfaces import Flat
+
+
+class Unbooked:
+    """Accounts that keep nothing."""
+
+    def accept(self, old, new):
+        pass
+
+    def mark(self):
+        pass
+
+    def back(self, mark):
+        pass
 
 
 @dataclass
