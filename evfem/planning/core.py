@@ -35,6 +35,8 @@ RESOLVED = 1 / 6
 FIRST, LOW = 1e-6, 0.05
 #: error of an edge of contact in node distances
 EDGE = 1.5
+#: modulus (MPa) in the place of none
+RIGID = 1e30
 #: a core is no longer than this share of a hovering gap, for pull-in is to see the law; nor should it be of
 #: a texture's depth
 SEEN = 0.5
@@ -91,14 +93,11 @@ def core_of(scene: Scene, mesh: Mesh) -> Core | None:
     has_none = charged or found or not scene.air_layer
     if wanted == "off" or not scene.electrics.acts or has_none or _full(scene, mesh):
         return None
-    electrics, rough = electrics_of(scene, mesh), roughness_of(scene.roughness_gap)
-    law, layers = electrics.attraction
-    closed = 0.0 if rough is None else float(rough.separation(0.0))
+    (law, layers), closed = electrics_of(scene, mesh).attraction, _closed(scene)
     stiffness, distance, height = _local(scene, mesh)
     first = height <= height.min() + FIRST * np.ptp(mesh.points[:, 1])
-    low = (height <= height.min() + LOW * np.ptp(mesh.points[:, 1])) & (stiffness > 0.0)
-    slope = -np.broadcast_to(traction_derivative(law, closed, voltage, layers), stiffness.shape)
-    if isinstance(wanted, str) and not (slope > RESOLVED * stiffness)[low].any():
+    slope = _slope(scene, mesh)
+    if isinstance(wanted, str) and not snaps(scene, mesh):
         return None
     cored = Cored(law, closed, RESOLVED * stiffness, None if isinstance(wanted, str) else wanted)
     length = np.max((cored.line(voltage, layers).end - closed)[first])
@@ -108,17 +107,41 @@ def core_of(scene: Scene, mesh: Mesh) -> Core | None:
     return Core(cored, float(ratio), float(length), float(np.max(distance[first])), float(work), fits)
 
 
+def snaps(scene: Scene, mesh: Mesh) -> bool:
+    """Whether a node of the pad can snap by itself under the law itself, steeper than the mesh resolves."""
+    stiffness, _, height = _local(scene, mesh)
+    low = height <= height.min() + LOW * np.ptp(mesh.points[:, 1])
+    return bool((_slope(scene, mesh) > RESOLVED * stiffness)[low].any())
+
+
+def _closed(scene: Scene) -> float:
+    """The gap (mm) of closed faces, that of rough ones without pressure."""
+    rough = roughness_of(scene.roughness_gap)
+    return 0.0 if rough is None else float(rough.separation(0.0))
+
+
+def _slope(scene: Scene, mesh: Mesh) -> Floats:
+    """How fast the traction falls with the gap of closed faces under the largest voltage (P,), MPa/mm."""
+    law, layers = electrics_of(scene, mesh).attraction
+    slope = traction_derivative(law, _closed(scene), scene.electrics.largest_voltage, layers)
+    nodes = np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad"))
+    return -np.broadcast_to(slope, nodes.shape)
+
+
 def _local(scene: Scene, mesh: Mesh) -> tuple[Floats, Floats, Floats]:
-    """Of each node of the pad (P,) the least E*/h (MPa/mm), the largest h (mm) and its height (mm)."""
+    """Of each node of the pad (P,) the least E*/h (MPa/mm), the largest h (mm) and its height (mm); cells of
+    no stiffness of their own have another's, and resolve everything.
+    """
     sides = mesh.cell_edges if mesh.dim == 2 else mesh.cell_faces
     on_pad = np.isin(sides, np.unique(mesh.edges_of("pad") if mesh.dim == 2 else mesh.faces_of("pad")))
     cell, side = np.nonzero(on_pad.all(axis=2))
     nodes, place = np.unique(sides[cell, side], return_inverse=True)
     corners = mesh.points[sides[cell, side][:, : 2 * (mesh.dim - 1)]]
     longest = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2).max(axis=1) / mesh.order
-    modulus = np.zeros(mesh.region.max() + 1)
+    modulus = np.full(mesh.region.max() + 1, RIGID)
     for name, law in scene.finger.materials.items():
-        modulus[mesh.region_names[name]] = max(plane_modulus(split(law, mesh.dim), mesh.dim), 0.0)
+        if (found := plane_modulus(split(law, mesh.dim), mesh.dim)) > 0.0:
+            modulus[mesh.region_names[name]] = found
     stiffness, distance = np.full(nodes.size, np.inf), np.zeros(nodes.size)
     for each in place.reshape(len(cell), -1).T:
         np.minimum.at(stiffness, each, modulus[mesh.region[cell]] / longest)

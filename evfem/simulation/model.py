@@ -19,7 +19,7 @@ from evfem.electrostatics.roughness import roughness_of
 from evfem.electrostatics.signals import FollowForce
 from evfem.errors import InputError
 from evfem.mesh.mesh import Mesh
-from evfem.planning.core import Core, core_of, electrics_of
+from evfem.planning.core import Core, core_of, electrics_of, snaps
 from evfem.planning.plan import plan_on, scene_mesh
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_memory
@@ -41,8 +41,8 @@ from evfem.tissue.weakform import check_laws
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest
-    vertical gap at the start.
+    """The parts of a scene; `surface` has its height set, `first_gap` is g0 (mm), the smallest vertical gap
+    at the start, and `trapped` says whether nodes of the pad snap one by one, for want of a core.
     """
 
     scene: Scene
@@ -54,6 +54,7 @@ class Model:
     equilibrium: Equilibrium
     first_gap: float
     core: Core | None = None
+    trapped: bool = False
 
     @cached_property
     def shear_modulus(self) -> Floats:
@@ -112,7 +113,8 @@ def make_model(scene: Scene) -> Model:
         interface.law = scene.friction_law
     factorised = FactorisedBody(body, interface, attraction, limits)
     equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core)
+    trapped = core is None and attraction is not None and snaps(scene, mesh)
+    return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core, trapped)
 
 
 def make_interface(scene: Scene, mesh: Mesh, pad: Pad | Skin, surface: Any) -> Interface:

@@ -59,6 +59,8 @@ from evfem.tissue.kernels.blocks import loops
 
 #: what is known where a motion starts
 START = ("position", "position_z", "indentation", "applied_force", "voltage", "min_gap", "loose")
+#: the first part of a run under a voltage that can close nodes one by one: it is raised in such parts
+FIRST_PART = 0.125
 #: coulombs per metre of depth in a nanocoulomb per millimetre
 NANO = 1e-6
 
@@ -150,6 +152,8 @@ class Run:
             allowed=allowed_error(scene),
             rise=lambda old, new, target: rise(Part(self.model, old, new), target),
         )
+        if self.model.trapped and self.voltage_at(0.0, 0.0) != 0.0:
+            self.stepper.substep = FIRST_PART
         self.outside, self.sunk = outside(self.model), np.zeros(2)
         self.rows: list[dict[str, Any]] = []
         self.frames: list[Frame] = []
@@ -211,7 +215,7 @@ class Run:
                 begin = self._target(course, start, (k - 1) / motion.steps, now)
                 end = self._target(course, start, k / motion.steps, now + seconds)
                 if first + k == 1 and not self._follows(seconds):
-                    # the voltage acts in full; only a first step that must be cut raises it on the way
+                    # the voltage acts in full; only a first step in parts raises it on the way
                     begin = replace(begin, drive=GivenVoltage(0.0))
                 if (kept := self._kept(now + seconds, now)) is not None:
                     begin, end = (replace(one, drive=kept) for one in (begin, end))
