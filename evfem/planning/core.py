@@ -108,7 +108,11 @@ def core_of(scene: Scene, mesh: Mesh) -> Core | None:
 
 
 def snaps(scene: Scene, mesh: Mesh) -> bool:
-    """Whether a node of the pad can snap by itself under the law itself, steeper than the mesh resolves."""
+    """Whether a node of the pad can snap by itself under the law itself, steeper than the mesh resolves; one
+    that is attracted only while it touches cannot.
+    """
+    if not scene.air_layer:
+        return False
     stiffness, _, height = _local(scene, mesh)
     low = height <= height.min() + LOW * np.ptp(mesh.points[:, 1])
     return bool((_slope(scene, mesh) > RESOLVED * stiffness)[low].any())

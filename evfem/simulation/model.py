@@ -113,7 +113,8 @@ def make_model(scene: Scene) -> Model:
         interface.law = scene.friction_law
     factorised = FactorisedBody(body, interface, attraction, limits)
     equilibrium = Equilibrium(factorised, interface, attraction, limits)
-    trapped = core is None and attraction is not None and snaps(scene, mesh)
+    timed = solver.timed or (scene.drive is not None and scene.drive.resolved)
+    trapped = not timed and core is None and attraction is not None and snaps(scene, mesh)
     return Model(scene, mesh, body, pad, surface, attraction, equilibrium, first_gap, core, trapped)
 
 

@@ -107,4 +107,6 @@ def test_what_a_summit_gains_on_closing_and_loses_on_opening_is_the_fields():
 @pytest.mark.filterwarnings("ignore:at .* V touching skin")
 def test_ridges_that_touch_with_one_node_are_pressed_between_rough_faces():
     """Seed 1801122, scene 752: with the columns' tangent such a node closed and opened by turns."""
-    assert ev.simulate(ridged()).newton_iterations.sum() < 60
+    found = ev.simulate(ridged())
+    assert found.provenance["solver"]["cuts"] == 0
+    assert found.newton_iterations.sum() < 20 * found.substeps.sum()

@@ -134,12 +134,21 @@ def test_a_core_that_would_reach_a_hovering_gap_is_refused_by_the_plan():
 
 def test_a_node_after_the_other_is_not_jumped_over():
     """The law itself on a mesh that does not resolve it: iterations alone zip the block shut, to 35 times
-    the scale of the theory, whose pull-off is at .47.
+    the scale of the theory, whose pull-off is at .47, from a whole first row; in parts they do not.
     """
-    found = simulated(*WAYS["voltage first"], core="off")
-    done = found.provenance["solver"]
-    assert done["barriers"] == done["held"] == 1
-    assert found.applied_force[-1] > -10.0 * SCALE
+    for motion, voltage in WAYS["voltage first"], ([ev.Press(indentation=0.02, steps=1)], VOLTAGE):
+        assert simulated(motion, voltage, core="off").applied_force[-1] > -5.0 * SCALE
+
+
+def test_the_branch_is_followed_where_iterations_jump_off_it():
+    """A voltage raised in one step on the law itself: the half width stays below 1.18 mm, to which nodes are
+    trapped; iterations alone go to 1.27 mm.
+    """
+    found = simulated(
+        [ev.Press(indentation=0.02, steps=2), ev.VoltageRamp(VOLTAGE, steps=3)], 0.0, core="off"
+    )
+    assert found.provenance["solver"]["held"] > 0
+    assert 0.5 * found.contact_width[-1] < 1.18
 
 
 @pytest.mark.slow

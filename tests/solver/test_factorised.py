@@ -12,7 +12,7 @@ from tools.meshes import block
 from evfem.contact.signorini import FORWARD, OPEN
 from evfem.contact.stability import Verge
 from evfem.electrostatics.laws import Kaczmarek
-from evfem.scene.motion import Hover, Press
+from evfem.scene.motion import Hover, Press, VoltageRamp
 from evfem.scene.scene import Scene, Solver
 from evfem.simulation.model import make_model
 from evfem.simulation.run import simulate
@@ -149,7 +149,7 @@ def test_an_iterate_of_a_scaled_down_attraction_is_not_mixed(monkeypatch):
 
     monkeypatch.setattr(FactorisedBody, "_solve", solved)
     monkeypatch.setattr(Anderson, "next_iterate", next_iterate)
-    simulate(Scene(ROUND, Display(), Kaczmarek(), 6000.0, [Hover(gap=0.005)]))
+    simulate(Scene(ROUND, Display(), Kaczmarek(), 0.0, [Hover(gap=0.005), VoltageRamp(6000.0, steps=1)]))
     assert any(scaled)
     assert mixed
     assert not any(mixed)
