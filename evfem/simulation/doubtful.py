@@ -14,6 +14,8 @@ from evfem.surface.pad import surface_state
 
 #: share of the energy of motions that take time that their finite steps may dissipate
 DISSIPATED = 0.05
+#: share of the energy of a run that a row may have from nowhere
+GAINED = 0.01
 #: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
 #: centimetre (algometers), and the crests of its ridges carry twice the mean
 BORNE = 1.0
@@ -49,7 +51,8 @@ def through(model: Model, sunk: Floats) -> Iterator[str]:
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
     """A sentence for everything that the rows of a scene's run say of their own worth."""
-    return [*_missed(scene, rows), *_crushed(scene, rows), *_dissipated(scene, rows)] if rows else []
+    told = _missed(scene, rows), _crushed(scene, rows), _dissipated(scene, rows), _gained(rows)
+    return [sentence for one in told for sentence in one] if rows else []
 
 
 def _column(rows: Sequence[Row], name: str) -> Floats:
@@ -86,19 +89,39 @@ def _crushed(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
         )
 
 
+def _lost(rows: Sequence[Row], name: str) -> Floats:
+    """What a column of dissipation adds in each row (r,)."""
+    return np.diff(_column(rows, f"{name}_dissipation"), prepend=0.0)
+
+
+def _energy(rows: Sequence[Row]) -> float:
+    """What is stored at most, and all that is dissipated."""
+    stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
+    return float(stored) + sum(
+        float(np.abs(_lost(rows, name)).sum()) for name in ("friction", "viscous", "snap")
+    )
+
+
+def _gained(rows: Sequence[Row]) -> Iterator[str]:
+    """A row whose works lack energy."""
+    own = _lost(rows, "integrator")
+    if own.min() < -GAINED * _energy(rows):
+        worst = int(own.argmin())
+        yield (
+            f"step {rows[worst]['step']} has {-own[worst] / _energy(rows):.1%} of the energy of the run from "
+            "nowhere (integrator_dissipation): its works are known at its ends alone, or it went over a "
+            "barrier; take more steps there"
+        )
+
+
 def _dissipated(scene: Scene, rows: Sequence[Row]) -> Iterator[str]:
     """Steps in time that dissipate by themselves."""
     hand = scene.hand is not None and scene.hand.timed
     if not scene.solver.timed and not hand:
         return
     timed = np.diff(_column(rows, "time"), prepend=0.0) > 0.0
-
-    def lost(name: str) -> float:
-        return float(np.abs(np.diff(_column(rows, name), prepend=0.0)[timed]).sum())
-
-    stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
-    energy = float(stored) + sum(lost(f"{name}_dissipation") for name in ("friction", "viscous", "snap"))
-    if (own := lost("integrator_dissipation")) > DISSIPATED * energy:
+    own, energy = float(np.abs(_lost(rows, "integrator")[timed]).sum()), _energy(rows)
+    if own > DISSIPATED * energy:
         yield (
             f"the steps in time dissipate {own / energy:.0%} of the energy that is stored or dissipated by "
             "themselves (integrator_dissipation): take shorter ones"

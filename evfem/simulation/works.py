@@ -11,7 +11,9 @@ the solver's tolerance,
 
 The history has
 
-- ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u`, given by bone and user's forms;
+- ``external_work`` :math:`W = \bar r\cdot\Delta b - \bar f_u\cdot\Delta u + W_t`, given by bone and user's
+  forms; :math:`W_t = -\tfrac{1}{2}\sum \Delta\lambda_t\,s` is of nodes that begin to slip in the part, or
+  turn: their shear force changes while they stick and stays while they slip;
 - ``electrostatic_work`` :math:`W_e = \int f_e\cdot du` along the straight way, the squared voltage growing
   evenly; where a node stays open its travel with the bone counts trapezoidally, as the bone's does;
 - ``stored_energy`` :math:`\psi` of the tissue and, with penalties, of the springs of the interface;
@@ -27,7 +29,7 @@ What separates them is found term by term, without the work of the bone, and so 
 only where the forces of the accepted states balance:
 
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
-          + (W_e - \bar f_e\cdot\Delta u) .
+          + (W_e - \bar f_e\cdot\Delta u) + W_t .
 
 First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a
 share that telescopes; then the work of nodes that land, leave or begin to slip; then what the way
@@ -186,12 +188,13 @@ class Part:
         moved = new.u - old.u
         given = _mean_work(old.reaction, new.reaction, new.bone - old.bone)
         given -= _mean_work(begin.given, end.given, moved)
+        given += (turned := self._turned())
         pulled, friction = self.electrostatic(), self.friction()
         viscous = 0.0 if body.dynamics is None else body.dynamics.dissipation(new.u)
         lost = _mean_work(begin.forces, end.forces, moved) - viscous
         lost -= end.stored - begin.stored + end.springs - begin.springs + end.kinetic - begin.kinetic
         lost -= self._contact() + friction
-        lost += pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
+        lost += turned + pulled - _mean_work(old.attraction, new.attraction, moved[self.model.pad.nodes])
         if (hand := self.model.scene.hand) is not None:
             more, damped = hand.given(old, new), hand.dissipation(old, new, self._seconds)
             given, viscous, lost = given + more, viscous + damped, lost + more - damped
@@ -205,6 +208,16 @@ class Part:
         source = (flow.source_work, flow.leakage, stretched)
         added = (given, pulled, friction, viscous, *snapped, *source)
         return dict(zip(SUMS, added, strict=True))
+
+    def _turned(self) -> float:
+        """What the bone gives beyond the trapezoid where nodes begin to slip: their shear force changes while
+        they stick, and stays while they slip.
+        """
+        old, new, interface = self.old, self.new, self.model.equilibrium.interface
+        slip = slipped(interface, old, new) if interface.dim == 3 else self._slip[:, None]
+        before, after = old.contact_force[:, 1:], new.contact_force[:, 1:]
+        begins = (old.status == STICK) | (old.touching & (np.sum(before * slip, axis=1) > 0.0))
+        return -0.5 * float(np.sum(((after - before) * slip)[begins & new.touching]))
 
     def electrostatic(self) -> float:
         """Work of the attraction W_e, N mm per mm of depth."""

@@ -59,7 +59,7 @@ def test_a_resumed_run_knows_what_passed_before(tmp_path):
     whole = ev.simulate(scene, observers=[Keeper()])
     file = Checkpoint(tmp_path / "checkpoint.npz")
     file.write(scene.digest(), kept[0], whole.rows[:1])
-    assert len(whole.warnings) == 1
+    assert any("passed through the surface" in said for said in whole.warnings)
     assert ev.simulate(scene, resume=file.read(scene.digest())).warnings == whole.warnings
 
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tools.builders import INSULATOR, SKIN, finger
+from tools.builders import INSULATOR, SKIN, coarse_pad, finger
 from tools.meshes import block
 
 import evfem as ev
@@ -281,3 +281,12 @@ def test_the_field_stretches_with_the_forces_on_the_way():
     )
     assert Part(model, old, new)._stretching() == pytest.approx(3 * 0.5, rel=1e-12)
     np.testing.assert_allclose(seen, 0.2 + 0.4 * np.outer(works.WAY, nodes), rtol=1e-12)
+
+
+@pytest.mark.parametrize("distances", [(0.5,), (0.5, -1.0)])
+def test_a_slide_in_one_step_has_closed_books(distances):
+    """Nodes stick, then slip, or turn: the bone gives what friction and tissue take, to a twentieth of it."""
+    slides = [Slide(distance, steps=1, hold="force") for distance in distances]
+    found = simulate(Scene(coarse_pad(), Flat(friction=0.3), motion=[Press(force=0.05, steps=4), *slides]))
+    taken = np.diff(found.friction_dissipation)[-1]
+    assert abs(np.diff(found.integrator_dissipation)[-1]) < 0.05 * taken
