@@ -16,6 +16,8 @@ from evfem.surface.pad import surface_state
 DISSIPATED = 0.05
 #: share of the energy of a run that a row may have from nowhere
 GAINED = 0.01
+#: share of the energy of a run that is lost in one row where other states are stable too
+SNAPPED = 0.1
 #: pressure (MPa) that no fingertip bears: pressing on one begins to hurt at 0.3 to 0.6 MPa over a square
 #: centimetre (algometers), and the crests of its ridges carry twice the mean
 BORNE = 1.0
@@ -51,7 +53,13 @@ def through(model: Model, sunk: Floats) -> Iterator[str]:
 
 def doubtful(scene: Scene, rows: Sequence[Row]) -> list[str]:
     """A sentence for everything that the rows of a scene's run say of their own worth."""
-    told = _missed(scene, rows), _crushed(scene, rows), _dissipated(scene, rows), _gained(rows)
+    told = (
+        _missed(scene, rows),
+        _crushed(scene, rows),
+        _dissipated(scene, rows),
+        _gained(rows),
+        _snapped(rows),
+    )
     return [sentence for one in told for sentence in one] if rows else []
 
 
@@ -97,8 +105,10 @@ def _lost(rows: Sequence[Row], name: str) -> Floats:
 def _energy(rows: Sequence[Row]) -> float:
     """What is stored at most, and all that is dissipated."""
     stored = (_column(rows, "stored_energy") + _column(rows, "kinetic_energy")).max()
-    return float(stored) + sum(
-        float(np.abs(_lost(rows, name)).sum()) for name in ("friction", "viscous", "snap")
+    return (
+        1e-300
+        + float(stored)
+        + sum(float(np.abs(_lost(rows, name)).sum()) for name in ("friction", "viscous", "snap"))
     )
 
 
@@ -111,6 +121,17 @@ def _gained(rows: Sequence[Row]) -> Iterator[str]:
             f"step {rows[worst]['step']} has {-own[worst] / _energy(rows):.1%} of the energy of the run from "
             "nowhere (integrator_dissipation): its works are known at its ends alone, or it went over a "
             "barrier; take more steps there"
+        )
+
+
+def _snapped(rows: Sequence[Row]) -> Iterator[str]:
+    """A row in which an attracted finger sets much of the run's energy free."""
+    freed = np.where(_column(rows, "electrostatic_force") > 0.0, _lost(rows, "snap"), 0.0) / _energy(rows)
+    if freed.max() > SNAPPED:
+        worst = int(freed.argmax())
+        yield (
+            f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of the "
+            "run: other states are stable too, and the way decides which is reached; `evfem check` compares"
         )
 
 

@@ -10,6 +10,9 @@ Algorithm (`Stepper.follow`)::
             at the strategy's smallest
         else: accept; if it took few iterations, the next substep is longer
 
+A body that is released from the begin of a long part lags the loads of its end by all of it, and its edge
+peels on the way: so the part is halved first.
+
 Where the error of the path is limited, a part is solved as two halves and accepted if one whole part
 ends close enough to them; its length follows that error (`evfem.solver.path`).
 

@@ -88,3 +88,15 @@ def test_steps_in_time_that_dissipate_by_themselves_are_told():
     (said,) = told(20)
     assert "dissipate" in said
     assert told(2000) == []
+
+
+def test_a_snap_is_told_with_its_share():
+    """A block that pulls in from a hair's breadth above a thin insulator."""
+    mesh = block(8, 3)
+    skin = ev.Electrical(stratum_corneum_thickness=0.01, stratum_corneum_eps_r=1e3)
+    own = ev.MeshedFinger(mesh, {"tissue": ev.LinearElastic(E=0.1, nu=0.3)}, electrical=skin)
+    motion = [ev.Hover(0.05, steps=1), ev.VoltageRamp(3000.0, steps=2)]
+    scene = ev.Scene(own, ev.Display(ev.Layer(0.01, 3.0)), ev.StrongTroxel(), 0.0, motion)
+    found = ev.simulate(scene)
+    assert found.jumps.sum() > 0
+    assert any("the finger snaps and loses" in said for said in found.warnings)
