@@ -130,8 +130,8 @@ def _snapped(rows: Sequence[Row]) -> Iterator[str]:
     if freed.max() > SNAPPED:
         worst = int(freed.argmax())
         yield (
-            f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of the "
-            "run: other states are stable too, and the way decides which is reached; `evfem check` compares"
+            f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of "
+            "the run: other states are stable too, and the way decides which is reached; `evfem check` compares"
         )
 
 

@@ -68,7 +68,8 @@ def test_a_slide_that_touches_nothing_is_told():
     slide = [ev.Hover(gap=0.3), ev.Slide(distance=0.2, steps=1)]
     up = replace(scene_2d(10.0), surface=ev.Display(), law=ev.Kaczmarek(), voltage=10.0, motion=slide)
     assert ev.simulate(up).warnings == ["motion 1, a slide, never touched"]
-    assert ev.simulate(replace(up, motion=[*slide, ev.Press(indentation=0.05, steps=1)])).warnings == []
+    pressed = ev.simulate(replace(up, motion=[*slide, ev.Press(indentation=0.05, steps=1)])).warnings
+    assert not any("never touched" in said for said in pressed)
 
 
 def test_steps_in_time_that_dissipate_by_themselves_are_told():
