@@ -131,7 +131,7 @@ def _snapped(rows: Sequence[Row]) -> Iterator[str]:
         worst = int(freed.argmax())
         yield (
             f"in step {rows[worst]['step']} the finger snaps and loses {freed[worst]:.0%} of the energy of "
-            "the run: other states are stable too, and the way decides which is reached; `evfem check` compares"
+            "the run: other states are stable too, and the way decides which; `evfem check` compares"
         )
 
 
