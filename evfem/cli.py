@@ -183,7 +183,7 @@ def _init(given: argparse.Namespace) -> int:
 
 def _schema(given: argparse.Namespace) -> int:
     from evfem.scene import schema as scenes
-    from evfem.sweeps import schema as sweeps
+    from evfem.sweeps import file as sweeps
 
     found = scenes.schema() if given.of == "scene" else sweeps.schema()
     text = json.dumps(found, indent=2)

@@ -32,17 +32,18 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ROUNDING, STABLE, UNHELD, WEAK
-from evfem.contact.attracted import AttractionStiffness, Roughness
 from evfem.contact.follower import FollowerStiffness, local
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
     SLIP,
+    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     ExtraUnknowns,
+    Roughness,
     Unstable,
 )
 from evfem.contact.solve import solve_with_attraction

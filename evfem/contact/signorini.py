@@ -51,7 +51,52 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import DISC_OWN
-from evfem.contact.attracted import AttractionStiffness
+
+
+@dataclass(frozen=True)
+class Roughness:
+    """Attraction between rough faces, along normal and tangent: stronger by `gain` (k, 1 + d) times what a
+    contact force has beyond `present` (k,), weaker by `loss_on_opening` (k, 1 + d) N/mm where open.
+    """
+
+    gain: Floats
+    loss_on_opening: Floats
+    present: Floats
+
+    def of(self, nodes: Ints) -> Roughness:
+        """Of these nodes alone."""
+        return Roughness(self.gain[nodes], self.loss_on_opening[nodes], self.present[nodes])
+
+
+@dataclass(frozen=True)
+class AttractionStiffness:
+    """How the attraction of every node depends on its gap: it weakens by `negative_stiffness` (k,)
+    per unit of gap from its value at `reference_gap` (k,) while open, and is stronger by
+    `gain_on_closing` (k,) at g = 0. `roughness` says how it depends on the contact force there.
+    """
+
+    negative_stiffness: Floats
+    reference_gap: Floats
+    gain_on_closing: Floats
+    roughness: Roughness | None = None
+
+
+def feedback(compliance: Floats, held_by: Floats, gaps: Ints, held: Ints, stiffness: Floats) -> float:
+    """Largest factor by which the attraction of open nodes returns to itself: from 1 on they snap.
+
+    Their `gaps` (m,) are rows of the compliance, and the attraction weakens with them by `stiffness`
+    (m,). The rows `held` (h,) of closed nodes do not move; `held_by` is the compliance to their forces.
+    """
+    if not gaps.size:
+        return 0.0
+    free = compliance[np.ix_(gaps, gaps)]
+    if held.size:
+        back = np.linalg.solve(held_by[np.ix_(held, held)], compliance[np.ix_(held, gaps)])
+        free = free - compliance[np.ix_(gaps, held)] @ back
+    root = np.sqrt(stiffness)
+    gain = root[:, None] * free * root
+    return float(np.linalg.eigvalsh(0.5 * (gain + gain.T))[-1])
+
 
 #: of a node; `FORWARD` or `BACKWARD` in the plane where it slips, `SLIP` in three dimensions
 OPEN, STICK, FORWARD, BACKWARD = 0, 1, 2, 3

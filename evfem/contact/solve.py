@@ -36,18 +36,19 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.common.constants import ACTIVE_SET_LIMIT, ROUNDING, STABLE
-from evfem.contact.attracted import AttractionStiffness, feedback
 from evfem.contact.signorini import (
     BACKWARD,
     FORWARD,
     OPEN,
     SLIP,
     STICK,
+    AttractionStiffness,
     ContactNotSolved,
     ContactProblem,
     ContactSolution,
     Forces,
     Projected,
+    feedback,
     linearised,
 )
 

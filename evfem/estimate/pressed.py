@@ -32,7 +32,7 @@ from evfem.contact.signorini import OPEN
 from evfem.estimate.parametric import SLIP_PER_FORCE, STEPS_BEFORE, Parametric, sliding
 from evfem.simulation.run import Run
 from evfem.solver.condensation import make_condensation
-from evfem.surface.edge import outline_nodes
+from evfem.surface.pad import outline_nodes
 from evfem.surface.surfaces import Flat
 
 FILE, FORMAT = "textures-pads.npz", "evfem-textures-pads-2"

@@ -22,20 +22,19 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.core import core_of, unseen
 from evfem.planning.drift import drifting
 from evfem.planning.parts import check_parts
-from evfem.planning.resolution import oscillating, too_fast, unresolved
+from evfem.planning.resolution import oscillating, said, too_fast, unresolved
 from evfem.planning.sense import doubts, locking, touching_traction, weakens
 from evfem.planning.timescales import left_out, time_scales
-from evfem.planning.way import said
 from evfem.protocols import TimeSignal
 from evfem.scene.scene import Scene
 from evfem.scene.spatial import check_space, memory
 from evfem.scene.terms import Boundary
 from evfem.surface.friction import Coulomb
 from evfem.tissue.dynamics import DYNAMICS
-from evfem.tissue.elements import elements_of_order
 from evfem.tissue.forms import Form
 from evfem.tissue.kernels.blocks import loops
 from evfem.tissue.laws import split
+from evfem.tissue.space import elements_of_order
 from evfem.tissue.splitlaw import nearly_incompressible
 from evfem.tissue.userforms import Trial, tried
 

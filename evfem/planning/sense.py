@@ -21,8 +21,8 @@ from evfem.mesh.mesh import Mesh
 from evfem.planning.resolution import way
 from evfem.scene.scene import Scene
 from evfem.surface.surfaces import Profile
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.laws import NeoHookean
+from evfem.tissue.space import ELEMENTS
 from evfem.tissue.splitlaw import nearly_incompressible, split
 
 #: shear modulus over that of Table 2 in a `FingerPad`, of what is hard when it is dry and of what is always

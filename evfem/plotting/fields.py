@@ -21,11 +21,42 @@ from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.figures import BOTH_SIGNS, EDGE, ONE_SIGN, STATUS, TISSUE
-from evfem.plotting.ground import Height
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+from collections.abc import Callable
+
+from evfem.errors import EvfemError
+
+Height = Callable[[Floats], Floats]
+
+
+def height_of(result: Result, frame: Frame) -> Height:
+    """Height (mm) of the surface at x (mm) of the laboratory, while the finger is as in `frame`."""
+    known = _from_scene(result)
+    return _from_gaps(result, frame) if known is None else known
+
+
+def _from_scene(result: Result) -> Height | None:
+    from evfem.scene.file import loads
+    from evfem.simulation.model import placed
+
+    try:
+        surface = loads(result.provenance.get("parameters", "")).ground
+        mesh = result.mesh
+        surface, _ = placed(surface, mesh.points[mesh.node_sets["pad"]])
+    except EvfemError:
+        return None
+    return lambda x: surface.y + surface.height(x)
+
+
+def _from_gaps(result: Result, frame: Frame) -> Height:
+    pad = np.flatnonzero(np.isfinite(frame.gap))
+    x, y = (result.mesh.points + frame.displacement)[pad].T
+    order = np.argsort(x)
+    return lambda at: np.interp(at, x[order], (y - frame.gap[pad])[order])
+
 
 STRESSES = tuple(f"cauchy_stress_{c}" for c in ("xx", "yy", "zz", "xy"))
 CELL_FIELDS = ("von_mises", *STRESSES, "J")

@@ -13,6 +13,7 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.plotting.fields import (
     TRACTIONS,
+    Height,
     Scale,
     Window,
     areas,
@@ -20,6 +21,7 @@ from evfem.plotting.fields import (
     draw_arrows,
     draw_outline,
     frame_of,
+    height_of,
     patches,
     rounds,
     scale_of,
@@ -28,7 +30,6 @@ from evfem.plotting.fields import (
     within,
 )
 from evfem.plotting.figures import EDGE, GROUND, STATUS, WIDTH, Panels, add_colorbar, axes_or_new, new_figure
-from evfem.plotting.ground import Height, height_of
 from evfem.plotting.labels import field_label, named
 from evfem.simulation.result import POINT_FIELDS, Frame, Result
 

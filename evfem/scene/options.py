@@ -9,7 +9,7 @@ from evfem.common.checks import GONE, Checked, Within, among, check_fields, numb
 from evfem.errors import ABSENT, InputError, quoted
 from evfem.solver.strategy import Strategy
 from evfem.tissue.dynamics import DYNAMICS
-from evfem.tissue.elements import ELEMENTS, elements_on
+from evfem.tissue.space import ELEMENTS, elements_on
 
 CONTACTS = ("exact", "penalty")
 PRECISIONS = ("single", "double")

@@ -36,10 +36,9 @@ from evfem.common.constants import (
     STEEP,
     TAKEN,
 )
-from evfem.contact.attracted import Roughness
 from evfem.contact.attraction import Attraction
 from evfem.contact.condensed import CondensedTangent
-from evfem.contact.signorini import OPEN, STICK
+from evfem.contact.signorini import OPEN, STICK, Roughness
 from evfem.solver.condensation import Singular, make_condensation
 from evfem.solver.interface import Interface
 from evfem.solver.state import Limits, Record, State, StepFailed, TangentPoint

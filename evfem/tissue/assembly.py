@@ -2,7 +2,7 @@ r"""One engine for every weak form: nodal forces :math:`\sum_q w B^T s`, tangent
 :math:`\sum_q w B^T D B`.
 
 The fluxes s = df/d(v, grad v, theta(v)) of a form are its values at unit test functions
-(`evfem.tissue.fields`); a complex step on each part of (u, grad u, theta) gives their derivatives
+(`evfem.tissue.forms`); a complex step on each part of (u, grad u, theta) gives their derivatives
 D. The rows B take the displacements of a cell's nodes to the parts. Where theta = Pi ln J is not
 linear in the displacements, the curvature of ln J joins the tangent. Arrays: C cells or facets, n
 nodes each, Q quadrature points, S samples of ln J, K parts, m of them per component; N nodes, E
@@ -20,7 +20,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.tensor import Array, cofactor, complex_step, det, identity, trace, transpose
-from evfem.tissue.fields import Field, Integrand, Parts, fluxes, fluxes_at_once
+from evfem.tissue.forms import Field, Integrand, Parts, fluxes, fluxes_at_once
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space, scatter
 

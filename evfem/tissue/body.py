@@ -15,11 +15,45 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.tissue.drag import Drag
 from evfem.tissue.dynamics import Dynamics
 from evfem.tissue.pattern import Pattern
 from evfem.tissue.space import Space
 from evfem.tissue.weakform import Tissue
+
+
+class Drag:
+    """Kelvin-Voigt stress and mass of a release (docs, Theory), with one rate and no time: nothing to choose.
+
+    The stress holds what deforms, down to single nodes; the mass, by which a shear wave crosses the body's
+    height in the relaxation time, what moves as a whole. Its speed is taken away at each step's beginning, so
+    a release never overshoots. A large rate leaves the body where it is.
+
+    `groups` are laws with a shear modulus and the cells they hold for.
+    """
+
+    def __init__(self, space: Space, groups: Sequence[tuple[Any, Ints]]) -> None:
+        modulus = np.zeros(len(space.nodes))
+        for law, cells in groups:
+            modulus[cells] = law.shear_modulus
+        height = float(np.ptp(space.mesh.points[:, 1]))
+        self._terms = Dynamics(space, modulus, modulus / height**2)
+
+    def begin(self, u: Floats, rate: float) -> None:
+        """Start a step of `rate` > 0 from displacements u (N, dim) at rest."""
+        self._terms.begin(u, np.zeros_like(u), 1.0 / rate)
+
+    def forces(self, u: Floats) -> Floats:
+        """Nodal forces (N, dim)."""
+        return self._terms.forces(u)
+
+    def add_tangent(self, u: Floats, pattern: Pattern, data: Floats) -> None:
+        """Add the tangent to the `data` of a pattern."""
+        self._terms.add_tangent(u, pattern, data)
+
+    def dissipation(self, u: Floats) -> float:
+        """What the drag dissipates in the step that ends at u: N mm, in the plane per mm of depth."""
+        moving = self._terms.kinetic_energy(self._terms.velocity(u))
+        return self._terms.dissipation(u) + 2.0 * moving
 
 
 class Body:

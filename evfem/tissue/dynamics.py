@@ -24,8 +24,7 @@ import numpy as np
 from evfem.common.arrays import Floats
 from evfem.tensor import ddot
 from evfem.tissue.assembly import Integral, points_of
-from evfem.tissue.fields import Parts
-from evfem.tissue.forms import deformation_gradient, green_strain, kelvin_voigt, mass
+from evfem.tissue.forms import Parts, deformation_gradient, green_strain, kelvin_voigt, mass
 from evfem.tissue.kernels.blocks import LANES, loops, padded
 from evfem.tissue.laws import split
 from evfem.tissue.pattern import Componentwise, Pattern

@@ -28,17 +28,17 @@ import numpy as np
 
 from evfem.common.checks import Within, check_fields, number
 from evfem.tensor import Array, ddot, det, identity, inv, outer, transpose
-from evfem.tissue.moduli import (
+from evfem.tissue.ogden import (
     POSITIVE,
     Bulk,
     Density,
     Isotropic,
+    Ogden,
     PoissonOrNone,
     Relaxation,
     bulk_modulus,
     check_volumetric,
 )
-from evfem.tissue.ogden import Ogden
 from evfem.tissue.splitlaw import SplitLaw, split
 
 __all__ = ["LAWS", "LinearElastic", "NeoHookean", "Ogden", "SplitLaw", "Yeoh", "split"]

@@ -29,6 +29,7 @@ points of ln J; N nodes; dim dimensions.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -38,10 +39,38 @@ import numpy as np
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
 from evfem.mesh.hexahedron import EDGES, FACES, PLACES
-from evfem.mesh.mesh import Mesh
+from evfem.mesh.mesh import CELLS, Mesh
 from evfem.tensor import det
-from evfem.tissue.elements import ELEMENTS
 from evfem.tissue.kernels.blocks import Cells, blocked, loops
+
+#: element -> (mesh kind, order of quadrature, how ln J is sampled)
+ELEMENTS: Mapping[str, tuple[str, int, str]] = {
+    "q1": ("quad", 3, "point"),
+    "q1_fbar": ("quad", 3, "centroid"),
+    "q2": ("quad9", 5, "point"),
+    "q2p1": ("quad9", 5, "linear"),
+    "p2": ("triangle6", 4, "point"),
+    "hex8": ("hexahedron", 3, "mean"),
+    "hex27p1": ("hexahedron27", 5, "linear"),
+}
+
+
+def elements_on(corners: int) -> tuple[str, ...]:
+    """Names of the elements on cells with that many corners (3, 4 or 8).
+
+    >>> elements_on(3), elements_on(4), elements_on(8)
+    (('p2',), ('q1', 'q1_fbar', 'q2', 'q2p1'), ('hex8', 'hex27p1'))
+    """
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].corners == corners)
+
+
+def elements_of_order(order: int) -> tuple[str, ...]:
+    """Names of the elements with cells of that order (1 or 2).
+
+    >>> elements_of_order(1)
+    ('q1', 'q1_fbar', 'hex8')
+    """
+    return tuple(name for name, (kind, *_) in ELEMENTS.items() if CELLS[kind].order == order)
 
 
 def scikit_mesh(mesh: Mesh) -> Any:

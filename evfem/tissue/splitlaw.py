@@ -33,8 +33,7 @@ from evfem.tensor import (
     symmetric_power,
     transpose,
 )
-from evfem.tissue.fields import Parts, fluxes
-from evfem.tissue.forms import Form
+from evfem.tissue.forms import Form, Parts, fluxes
 
 #: change of F and theta over which the stress of an energy is differenced
 DIFFERENCE_STEP = 4e-3

@@ -21,9 +21,8 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import Array, complex_step, difference
 from evfem.tissue.assembly import Points, UserIntegral, points_of
-from evfem.tissue.elements import ELEMENTS
-from evfem.tissue.fields import Field, Integrand, Parts, fluxes
-from evfem.tissue.space import Space, scikit_mesh, shape_functions, shape_gradients, shape_values
+from evfem.tissue.forms import Field, Integrand, Parts, fluxes
+from evfem.tissue.space import ELEMENTS, Space, scikit_mesh, shape_functions, shape_gradients, shape_values
 
 #: cells or facets that a form is tried on, size of the trial's random displacements and gradients
 PLACES, SIZE = 16, 0.1

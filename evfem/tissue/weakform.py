@@ -25,8 +25,7 @@ from evfem.errors import InputError, quoted
 from evfem.mesh.mesh import Mesh
 from evfem.tensor import det, identity
 from evfem.tissue.assembly import Integral, UserIntegral, gathered, points_of, projected
-from evfem.tissue.fields import Field, Parts
-from evfem.tissue.forms import deformation_gradient, hyperelastic, neo_hookean
+from evfem.tissue.forms import Field, Parts, deformation_gradient, hyperelastic, neo_hookean
 from evfem.tissue.kernels.blocks import LANES, blocked, loops, padded, unblocked
 from evfem.tissue.pattern import Componentwise, Pattern
 from evfem.tissue.space import Space, scatter

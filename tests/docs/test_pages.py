@@ -31,7 +31,8 @@ from evfem.simulation.result import COLUMNS
 from evfem.surface.friction import NamedFriction
 from evfem.sweeps import file as sweepfile
 from evfem.textures.importing import IMPORTERS
-from evfem.tissue import elements, space
+from evfem.tissue import space
+from evfem.tissue import space as elements
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -12,7 +12,7 @@ from tools.meshes import block
 import evfem as ev
 from evfem.electrostatics.laws import eps_0
 from evfem.planning.plan import plan
-from evfem.planning.way import remembers
+from evfem.planning.resolution import remembers
 from evfem.simulation.model import make_model
 
 pytestmark = pytest.mark.solver
