@@ -1,9 +1,7 @@
 r"""Electrostatic attraction of the pad: nodal forces (9a), (9b), (10) and their derivative.
 
-The attraction is a boundary traction that depends on the current gap, the weak form `attraction`
-below. What runs is its nodal rule: each pad node j carries the pressure p(g_j) of its current gap
-on its current projected length A_j. On linear edges that is the form with its quadrature points at
-the nodes; on quadratic edges the rule shares out the chord's projection instead of the curve's.
+Each pad node j carries the pressure p(g_j) of its current gap on its current projected length A_j, the nodal
+rule of the weak form `attraction` below (docs, Theory).
 
 Trial states that penetrate count as touching, g = 0.
 
@@ -45,9 +43,7 @@ TOUCHING = 1e-9
 
 @form
 def attraction(u: Any, v: Any, w: Any) -> Any:
-    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap
-    below X + u.
-    """
+    """p(g) v_y in the residual on the current projected width max(0, (F T)_x), with g the gap below X + u."""
     T = np.stack([-w.n[1], w.n[0]])
     width = positive_part(mul(deformation_gradient(u), T)[0])
     x, y = w.x[0] + u[0], w.x[1] + u[1]
@@ -103,8 +99,7 @@ class Attraction:
     def forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air
-        layer.
+        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air layer.
         """
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]

@@ -1,13 +1,8 @@
 r"""The linearised body as its contact candidates see it: a dense compliance, and the contact
 problem posed on it.
 
-With the condensed tangent S, the bone's known increment b and extra unknowns d (the bone's travel
-under a prescribed force, the squared voltage under a prescribed friction force) that push with p,
-
-.. math:: S_{cc}\,\Delta u_c = g_c - f_c + f_c^+ - S_{cb} b + p_c d, \qquad
-          S_{bc}\Delta u_c + S_{bb} b = g_b + F_b + p_b d .
-
-:math:`C = S_{cc}^{-1}` is kept with the factorisation. On a curved profile the contact force turns
+The compliance :math:`C = S_{cc}^{-1}` (`evfem.solver`) is kept with the factorisation.
+On a curved profile the contact force turns
 with the node, a follower force: :math:`df = \phi'(-\lambda_n t + \lambda_t n)\,dx`,
 :math:`\phi' = h''/(1 + h'^2)`; that stiffness changes in every iteration but touches only the
 nodes near contact, so it is put into their small block alone (`evfem.contact.follower`).
@@ -146,9 +141,8 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses
-    (c,), the extra unknowns, number of dense contact solves, and whether the negative stiffness
-    had to be scaled down.
+    """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses (c,), the
+    extra unknowns, number of dense contact solves, and whether the negative stiffness had to be scaled down.
     """
 
     moved: Floats
@@ -181,8 +175,7 @@ class CondensedTangent:
         return np.asarray((self.dim * near[:, None] + np.array([1, 0, 2])[: self.dim]).ravel())
 
     def among(self, near: Ints) -> Floats:
-        """Compliance among these candidates, in the order of `rows`; they are often those of the
-        last call.
+        """Compliance among these candidates, in the order of `rows`; they are often those of the last call.
         """
         key = near.tobytes()
         if key not in self._last:
@@ -287,9 +280,7 @@ class LinearContactStep:
         return np.einsum("ck,ck->c", normal[:, :2], moved.reshape(-1, self.body.dim)[:, 1::-1])
 
     def _free_motion(self) -> Floats:
-        """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1
-        + p).
-        """
+        """Candidates' motion without contact forces, and per unit of each extra unknown: (dim c, 1 + p)."""
         dim = self.body.dim
         right = self.residual[:-dim] - self._present - self.body.schur[:-dim, -dim:] @ self.bone
         return self.body.compliance @ np.column_stack(
@@ -303,9 +294,7 @@ class LinearContactStep:
         return np.concatenate([force[:, 1::-1], force[:, 2:]], axis=1).ravel()
 
     def _moved_by(self, near: Ints, pushed: Floats) -> Floats:
-        """Candidates' motion (dim c,) by forces on the near ones, in the order of
-        `CondensedTangent.rows`.
-        """
+        """Candidates' motion (dim c,) by forces on the near ones, in the order of `CondensedTangent.rows`."""
         force = np.zeros(self.body.dim * self.candidates.status.size)
         force[self.body.rows(near)] = pushed
         return self.body.compliance @ force

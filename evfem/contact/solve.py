@@ -15,14 +15,11 @@ No constant has to be chosen. What has not converged is never used. In three dim
 what the laws make of the last iteration's forces after the motion, then with the nodes that touched, and
 with all nodes, sticking: slips found by chance may drive it about, but nothing changes for nodes that stick.
 
-If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no
-solution, or the wrong one; its negative stiffness is then scaled to 0.9 of the critical value
-(`solve_with_attraction`).
+If the attraction weakens with the gap faster than the tissue stiffens, the linear problem has no solution, or
+the wrong one; its negative stiffness is then scaled to 0.9 of the critical value (`solve_with_attraction`).
 
-Sources: P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353,
-doi:10.1016/0045-7825(91)90022-X (projections and their linearisation); S. Hueeber, G. Stadler and
-B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572,
-doi:10.1137/060671061 (primal-dual active set).
+The projections' sources are in `evfem.contact.signorini`; primal-dual active set: S. Hueeber, G. Stadler,
+B. Wohlmuth, SIAM J. Sci. Comput. 30 (2008) 572, doi:10.1137/060671061.
 """
 
 from __future__ import annotations

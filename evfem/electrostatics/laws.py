@@ -20,8 +20,7 @@ cycle is::
 The second is our definition, which follows the law's derivation: nobody has defined it for
 alternating voltage in print. Without losses, l = 0, both are what stands above, bit for bit.
 
-`StrongTroxel` is electrostatics of rigid layers and a movable gap; `Kaczmarek` lets the layers
-stretch with the gap. Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
+Units: mm, N, MPa, V; ``eps_0`` in F/m is numerically N/V^2. Tractions are
 positive where they attract. Equation numbers are those of the paper on modelling and validating
 electrovibration displays that the project starts from. Every function takes scalars or arrays that
 broadcast, real or complex (for derivatives by complex step); scalars give a float.

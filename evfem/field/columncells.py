@@ -16,7 +16,7 @@ by two points of Gauss along either coordinate. All matrices are one product of 
 derivatives by X, h and Y at a fixed potential, which are virtual works, are read off. With complex
 permittivities the matrix is complex and symmetric, and the squares in forces are
 :math:`|\varphi_\xi|^2`, :math:`\mathrm{Re}\,\varphi_\xi \bar\varphi_\eta`, :math:`|\varphi_\eta|^2`
-with the real parts of the permittivities (`evfem.electrostatics.lossycolumns`).
+with the real parts of the permittivities (`evfem.field.columns`).
 """
 
 from __future__ import annotations

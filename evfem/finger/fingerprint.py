@@ -12,8 +12,7 @@ loop       distance from a ray over p, which begins at the core: ridges come in,
 arch       :math:`(z - h e^{-x^2/2w^2})/p`: ridges across that rise in the middle
 =========  ================================================================================
 
-The core is the lowest point of the pad; loop and arch have the sizes below (assumed). A measured
-print is a map of heights instead.
+The core is the lowest point of the pad; loop and arch have the sizes below (assumed).
 """
 
 from __future__ import annotations

@@ -1,14 +1,7 @@
 r"""The finger's finite elements in an equilibrium step (`evfem.solver.equilibrium`): factorise, solve
 contact, move.
 
-With the factorised (possibly older) tangent K of the tissue, condensed onto the candidates c and
-the bone b,
-
-.. math:: S_{cc}\,\Delta u_c + S_{cb}\,\Delta u_b = g_c + \lambda^+ - \lambda + \Delta f, \qquad
-          S_{bc}\,\Delta u_c + S_{bb}\,\Delta u_b = g_b + F_b .
-
-The compliance :math:`C = S_{cc}^{-1}` turns this into a contact problem for the new forces
-(`evfem.contact.condensed`). Algorithm (`FactorisedBody.advance`), one outer iteration::
+Algorithm (`FactorisedBody.advance`), one outer iteration::
 
     factorise at the iterate if the factorisation at hand has become too old
     g <- forward elimination of -R

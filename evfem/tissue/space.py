@@ -1,9 +1,7 @@
-r"""Displacement spaces: shape functions at quadrature points, and how an element measures its
-volume.
+r"""Displacement spaces: shape functions at quadrature points, and how an element measures its volume.
 
-An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak
-form (laws of small strain take the trace of the strain for ln J). The elements differ only in this
-measure:
+An element sees the change of volume through `theta`, which stands for :math:`\ln J` in its weak form (laws of
+small strain take the trace of the strain for ln J). The elements differ only in this measure:
 
 =========  ====================================================  =============================
 element    theta at a quadrature point                           locking at nu -> 1/2
@@ -16,15 +14,10 @@ hex8       ln det of the mean of F over the cell                 no
 hex27p1    L2 projection of ln J onto {1, X, Y, Z} of the cell   no
 =========  ====================================================  =============================
 
-On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test: there
-:math:`F^{-T}:\nabla v` of a constant F does not integrate to its value at the centroid. The mean
-deformation gradient does, by definition (with the mean shape gradients of Flanagan and Belytschko,
-10.1002/nme.1620170504); on quads the two are the same.
+On hexahedra that are no parallelepipeds, ln J at the centroid fails the patch test; the mean deformation
+gradient does not (mean shape gradients of Flanagan and Belytschko, 10.1002/nme.1620170504).
 
-`theta = Pi ln J(samples)` is linear in ln J, hence
-:math:`\delta\theta = \Pi\,(F^{-T}:\nabla\delta u)`, no unknown is added, the tangent is symmetric
-and the forces have a potential. Arrays: E cells, n nodes per cell, Q quadrature points, S sample
-points of ln J; N nodes; dim dimensions.
+Arrays: E cells, n nodes per cell, Q quadrature points, S sample points of ln J; N nodes; dim dimensions.
 """
 
 from __future__ import annotations
@@ -113,8 +106,7 @@ def straight_points(mesh: Mesh) -> Floats:
 
 
 def nodes_at(points: Floats, places: Floats) -> Ints:
-    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its
-    unknowns.
+    """Numbers of the points (N, dim) that lie at the places (M, dim), where scikit-fem has its unknowns.
 
     Equally many are paired in their order along an oblique line, which is theirs unless two lie
     at one place of it; a search tree finds the others. Raises `RuntimeError` where no point lies
