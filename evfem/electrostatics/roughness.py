@@ -2,10 +2,9 @@ r"""What a force law becomes on faces that touch: rough ones keep a gap, a core 
 
 **Rough faces** keep an air gap between them, in series with the solid layers.
 
-Skin and glass touch at their highest asperities; the mean separation s of their mean planes falls
-as the contact pressure p grows. A force law then sees the gap g + s (`evfem.contact.attraction`).
-Without it a node that touches an insulator of 1 um at 100 V is pulled by some 80 kPa, which no
-finger shows.
+Skin and glass touch at their highest asperities; the mean separation s of their mean planes falls as the
+contact pressure p grows. A force law then sees the gap g + s (`evfem.contact.attraction`). Without it a node
+that touches an insulator of 1 um at 100 V is pulled by some 80 kPa, which no finger shows.
 
 ==========================  ============================  ==========================================
 law                         s above p_c                   source
@@ -25,11 +24,12 @@ A part of one's own needs `separation(pressure)` (`evfem.protocols.RoughnessLaw`
 
 **A linear core** of a force law (`Cored`): below a gap a straight line of the same work takes its place.
 
-Where the traction falls faster than the mesh resolves, the work of adhesion counts, not the strength [1]_ [2]_
-(docs, Theory, a strong attraction on a mesh, has the equations). No law of the same work that is nowhere steeper
-and differs from p only below a gap differs from it less far. For given slope m, :math:`h^*` is the only root,
-found by Newton's method between bounds; it depends on the voltage, and is nothing where the law is not steeper
-than m. Below :math:`g_0`, where pressed rough faces come closer, the traction grows as the law's does.
+Where the traction falls faster than the mesh resolves, the work of adhesion counts, not the strength [1]_
+[2]_ (docs, Theory, a strong attraction on a mesh, has the equations). No law of the same work that is nowhere
+steeper and differs from p only below a gap differs from it less far. For given slope m, :math:`h^*` is the
+only root, found by Newton's method between bounds; it depends on the voltage, and is nothing where the law is
+not steeper than m. Below :math:`g_0`, where pressed rough faces come closer, the traction grows as the law's
+does.
 
 .. [1] K. L. Johnson, K. Kendall, A. D. Roberts, Proc. R. Soc. A 324 (1971) 301,
    doi:10.1098/rspa.1971.0141.

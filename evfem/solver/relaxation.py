@@ -12,10 +12,10 @@ Algorithm (`Relaxation.follow`), pseudo-transient continuation with the loads of
                 found, it is the end
             lower the rate, or raise it if the speed grows; give up below `DRAG_LEAST`
 
-Drag, not inertia: with it the stored energy, less the work of the loads, can only fall, and the path depends on
-no density. Viscosity damps relative motion, a mass at rest at the beginning of each step rigid motion. Only the
-ratio s of relaxation time and pseudo-time step enters, chosen as steps succeed. Each step is an equilibrium of
-contact, friction and attraction to the scene's tolerance.
+Drag, not inertia: with it the stored energy, less the work of the loads, can only fall, and the path depends
+on no density. Viscosity damps relative motion, a mass at rest at the beginning of each step rigid motion.
+Only the ratio s of relaxation time and pseudo-time step enters, chosen as steps succeed. Each step is an
+equilibrium of contact, friction and attraction to the scene's tolerance.
 
 In the first step of a release a hand with a mass or a damper moves on in its time, and charge flows in
 its own. Then the bone stays at that x, and each node keeps its charge, while the tissue comes to rest.
