@@ -99,7 +99,7 @@ class Attraction:
     def forces(
         self, position: Floats, voltage: float, touching: Any, pressing: Floats | None = None
     ) -> Floats:
-        """Nodal forces on the finger (P, dim); `touching` (P,) says who carries force without an air layer."""
+        """Nodal forces on the finger (P, dim); without an air layer only `touching` nodes (P,) have any."""
         pressed = None if pressing is None else pressing[None]
         return self.forces_along(position[None], np.array([voltage]), touching, pressed)[0]
 

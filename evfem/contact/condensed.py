@@ -175,7 +175,7 @@ class CondensedTangent:
         return np.asarray((self.dim * near[:, None] + np.array([1, 0, 2])[: self.dim]).ravel())
 
     def among(self, near: Ints) -> Floats:
-        """Compliance among these candidates, in the order of `rows`; they are often those of the last call."""
+        """Compliance among these candidates, in the order of `rows`; often those of the last call."""
         key = near.tobytes()
         if key not in self._last:
             rows = self.rows(near)
