@@ -1,6 +1,4 @@
-"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one
-sentence.
-"""
+"""The arguments of the command `evfem`: all commands and options, and mistakes in them as one sentence."""
 
 from __future__ import annotations
 
@@ -38,9 +36,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def _meant(message: str) -> str:
-    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run',
-    ...)".
-    """
+    """A guess at a misspelt choice from argparse's "invalid choice: 'rnu' (choose from 'run', ...)"."""
     found = re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message)
     close = get_close_matches(found[1], re.findall(r"\w+", found[2]), 1) if found else []
     return f"; did you mean {close[0]}?" if close else ""

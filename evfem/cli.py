@@ -1,5 +1,4 @@
-"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command
-that needs it.
+"""The command `evfem`: arguments in, exit status out. What is heavy is imported by the command that needs it.
 
 Exit status: 0 done, 1 checked ends differ, 2 bad input, 3 a step did not converge, 4 disk or folder
 failed, 130 interrupted.
@@ -99,9 +98,7 @@ def _warner(file: Path | None) -> Callable[..., None]:
 
 
 def _silence() -> None:
-    """Throw away what is left to print, so that the interpreter does not try once more when it
-    ends.
-    """
+    """Throw away what is left to print, so that the interpreter does not try once more when it ends."""
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -259,9 +256,7 @@ def _report(path: Path, rows: Sequence[Row], scene: Scene) -> int:
 
 
 class _Interruption:
-    """Ctrl-C or a request to end: ends the run at once, or at the end of the step where Python
-    drops what is raised, as it does in a `__del__`.
-    """
+    """Ctrl-C ends the run at once, or with the step where Python drops what is raised (in a `__del__`)."""
 
     def __init__(self) -> None:
         self.met = False

@@ -1,11 +1,9 @@
-"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every
-step.
+"""The folder of a run: history, fields, summary, picture and checkpoint, complete after every step.
 
-Every file is replaced in one step, so that a run killed at any moment leaves whole files and a
-checkpoint to go on from; what it was writing stays behind under a temporary name and is removed by
-the next run. Only files that evfem wrote are ever replaced or removed: the folder's `.evfem-files`
-lists their names (`evfem.common.listed`). `kept` and `saved` say what of an earlier run is
-there to go on from.
+Every file is replaced in one step, so that a run killed at any moment leaves whole files and a checkpoint to
+go on from; what it was writing stays behind under a temporary name and is removed by the next run. Only files
+that evfem wrote are ever replaced or removed: the folder's `.evfem-files` lists their names
+(`evfem.common.listed`). `kept` and `saved` say what of an earlier run is there to go on from.
 """
 
 from __future__ import annotations
@@ -60,11 +58,9 @@ LEFT = re.compile(rf"\.({OURS.pattern}|\.evfem-files)\.\d+\.tmp")
 
 @dataclass
 class RunFolder:
-    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the
-    first step on.
+    """An observer of `evfem.simulation.run` that keeps a folder up to date; it writes from the first step on.
 
-    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved`
-    returned.
+    `fields` and `plots` False leave the .vtu series and the picture out. `resume` is what `saved` returned.
     """
 
     path: Path
@@ -185,9 +181,7 @@ class RunFolder:
             _picture(result if result.depth is None else result.total, self.path / PICTURE)
 
     def completed(self) -> str:
-        """Write what is missing in the folder of a finished run, as far as its checkpoint has it;
-        returns a sentence about it.
-        """
+        """Write what is missing in a finished run's folder, as far as its checkpoint has it; says what."""
         without = _without_fields(self.path) if self.fields else ""
         told = [f"the run in {self.path} is complete"]
         if written := self._complete():
@@ -257,8 +251,7 @@ def saved(path: Path, scene: Scene) -> Saved | None:
     """The checkpoint of an interrupted run of `scene` in the folder `path`; None if a run began
     there, but was killed before its first step was stored.
 
-    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or
-    version.
+    Raises InputError where no run began, and for a damaged checkpoint or one of another scene or version.
     """
     if (path / STATE).is_file():
         try:
@@ -271,11 +264,9 @@ def saved(path: Path, scene: Scene) -> Saved | None:
 
 
 def kept(path: Path, scene: Scene) -> Saved | None:
-    """The finished run of `scene` in the folder `path`; None where nothing is there that could be
-    lost.
+    """The finished run of `scene` in the folder `path`; None where nothing is there that could be lost.
 
-    Raises InputError where results of another scene are, or of a run of this one that is not
-    finished.
+    Raises InputError where results of another scene are, or of a run of this one that is not finished.
     """
     _refuse_others(path)
     if not (path / STATE).is_file() and _without_a_row(path / HISTORY):
@@ -412,8 +403,7 @@ def table(rows: Sequence[Row], most: int = 12, depth: float | None = None) -> st
 
 
 def chosen(rows: Sequence[Row], most: int) -> list[int]:
-    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its
-    last.
+    """Numbers of the rows to show: about equally many of each motion, evenly spaced, with its last.
 
     >>> chosen([{"motion_index": int(i > 3)} for i in range(104)], 6)
     [0, 2, 3, 36, 70, 103]

@@ -185,9 +185,7 @@ class _Residuals:
         self.failed = ""
 
     def predicted(self, points: Sequence[Floats]) -> list[Floats]:
-        """What the runs say in place of each measured value, at each of the points; NaN where a
-        scene is not solved.
-        """
+        """What the runs say for each measured value at each point; NaN where a scene is not solved."""
         problem = self.problem
         values = [problem.parameters.values(z) for z in points]
         texts = [[problem.text(keys, one) for keys, _ in problem.runs] for one in values]
@@ -318,9 +316,7 @@ def _at_bounds(parameters: Parameters, z: Floats) -> list[str]:
 
 
 def _misfit(problem: _Problem, residuals: Floats) -> list[str]:
-    """A sentence where residuals are larger than the given standard deviations allow (chi-square
-    test at 1 %).
-    """
+    """A sentence where residuals are larger than the given sd allow (chi-square test at 1 %)."""
     from scipy.stats import chi2
 
     if not problem.provenance["sd"]:

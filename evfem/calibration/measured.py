@@ -39,9 +39,7 @@ SOLVED = 10.0
 
 @dataclass(frozen=True)
 class Along:
-    """What is asked of a run: values of `column` where the column `over` is `at`, in motion
-    `motion` or in all.
-    """
+    """What is asked of a run: `column` where the column `over` is `at`, in motion `motion` or in all."""
 
     column: str
     over: str
@@ -234,8 +232,7 @@ Measured = MeasuredCurve | MeasuredValues
 
 
 def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
-    """Values of a column of the history where the column `over` is `at` (N,), in a motion or in
-    all.
+    """Values of a column of the history where the column `over` is `at` (N,), in a motion or in all.
 
     The state before the motion is the last one of the motion before; before the first motion, if
     that is a press without voltage, it is zero. A solved column is known to `SOLVED` tolerances of

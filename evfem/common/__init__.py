@@ -1,3 +1,1 @@
-"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices,
-views.
-"""
+"""What every room uses: checks of input, tables, fingerprints, whole-or-nothing files, notices, views."""

@@ -1,9 +1,7 @@
-"""What the package tells a person who waits: lines, progress bars, and a status that goes when it
-is done.
+"""What the package tells a person who waits: lines, progress bars, and a status that goes when it is done.
 
-Lines and details are records of the logger `evfem`, so that a caller may show them in another way:
-INFO is worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to
-standard error.
+Lines and details are records of the logger `evfem`, so that a caller may show them in another way: INFO is
+worth a line, DEBUG only counts ("step 3 of 60"). Nothing is coloured. Everything goes to standard error.
 """
 
 from __future__ import annotations
@@ -21,8 +19,7 @@ LOG = logging.getLogger("evfem")
 
 
 def wrapped(text: str, stream: TextIO) -> str:
-    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep
-    their lines.
+    """`text` broken between words where `stream` is a terminal, as it is elsewhere: files keep their lines.
 
     >>> import io
     >>> wrapped("one sentence " * 20, io.StringIO()).count(chr(10))
@@ -104,9 +101,7 @@ class _NoBar:
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:
-    """A progress bar (tqdm) with the time that is left, in a notebook a widget; one that is not
-    `wanted` draws nothing, and does not load what would draw it.
-    """
+    """A progress bar (tqdm) with the time left, in a notebook a widget; without tqdm if not `wanted`."""
     if not wanted:
         return _NoBar()
     from tqdm.auto import tqdm

@@ -141,9 +141,7 @@ class Candidates:
 
 @dataclass(frozen=True, eq=False)
 class StepSolution:
-    """A solved linear step: displacements (dim c,), contact forces (c, dim) along n and t, statuses (c,), the
-    extra unknowns, number of dense contact solves, and whether the negative stiffness had to be scaled down.
-    """
+    """A solved linear step: displacements, contact forces and statuses of candidates, extra unknowns."""
 
     moved: Floats
     force: Floats
@@ -155,9 +153,7 @@ class StepSolution:
 
 @dataclass(frozen=True, eq=False)
 class CondensedTangent:
-    """The condensed tangent on (candidates, bone x, bone y[, bone z]) and the compliance of the
-    candidates, coupled by the attraction.
-    """
+    """Condensed tangent on (candidates, bone x, y[, z]) and compliance of the candidates, with attraction."""
 
     schur: Floats
     compliance: Floats
@@ -262,9 +258,7 @@ class LinearContactStep:
         return StepSolution(moved, force, status, found.extra, solves, found.reduced)
 
     def lacking(self, solution: StepSolution, travel: float) -> float:
-        """Force (N/mm) that the bone lacks, along the axis of the first unknown, when this step
-        has been solved with that unknown, a `travel` of the bone, given instead.
-        """
+        """Force (N/mm) that the bone lacks along the first unknown's axis, were its `travel` given."""
         unknown = self.unknowns[0]
         bone = self.bone.copy()
         bone[unknown.axis] += travel
@@ -386,9 +380,7 @@ class LinearContactStep:
         return S, share, wanted, carried
 
     def _held(self, pivot: Floats, free: Floats) -> Floats:
-        """The pivot without the zeros of a body that nothing holds, whose rounding may be negative: let it
-        fall, not rise. A condition keeps its own.
-        """
+        """The pivot without the zeros of a body that nothing holds, which is to fall, not to rise."""
         dim = self.body.dim
         axis = [unknown.axis - dim for unknown in self.unknowns]
         floor = UNHELD * np.abs(self.body.schur[axis][:, :-dim] @ free[:, 1:]).max(initial=0.0)

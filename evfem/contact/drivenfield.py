@@ -26,9 +26,7 @@ from evfem.field.columns import Columns, Nearby, mean_pull
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A sine of a cycle: its share of the squared effective voltage, and the complex relative
-    permittivities of insulator, gap and skin at its frequency.
-    """
+    """A sine of a cycle: share of the squared effective voltage, complex eps_r of insulator, gap, skin."""
 
     share: float
     insulator: complex

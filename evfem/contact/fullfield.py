@@ -1,12 +1,11 @@
 r"""The attraction of the pad from the full field instead of column by column.
 
-Below the part of the outline that faces the display (its flanks keep the column law) Poisson's
-problem is solved in insulator, air and stratum corneum, in columns that stand at the pad nodes,
-on quadratic edges between them too, and move with them (`evfem.field.columns`). The
-electrode is at the voltage, living tissue at 0; the skin's layer is as thick above each node as it
-is undeformed. Nodes that touch keep `SERIES_GAP` of the insulator's reduced thickness, and what
-rough faces keep, as a gap in series.
-Nodal forces are derivatives of the discrete energy
+Below the part of the outline that faces the display (its flanks keep the column law) Poisson's problem is
+solved in insulator, air and stratum corneum, in columns that stand at the pad nodes, on quadratic edges
+between them too, and move with them (`evfem.field.columns`). The electrode is at the voltage, living tissue
+at 0; the skin's layer is as thick above each node as it is undeformed. Nodes that touch keep `SERIES_GAP` of
+the insulator's reduced thickness, and what rough faces keep, as a gap in series. Nodal forces are derivatives
+of the discrete energy
 
 .. math:: W = \tfrac12 U^2 C(x, y), \qquad f_j = \frac{\partial W}{\partial (x_j, y_j)},
 
@@ -194,9 +193,7 @@ class FieldAttraction(Attraction):
         return forces
 
     def weights(self, position: Floats) -> Floats:
-        """Lengths (P,): half the distance of each column from the next ones, by the shape functions that
-        make its force nodal, and the columns' own on the flanks.
-        """
+        """Lengths (P,): half the distance to the next columns, on the flanks the columns' own."""
         lines = self.seen(position)
         half = 0.5 * np.diff(lines @ position[:, 0])
         own = lines.T @ (np.append(half, 0.0) + np.append(0.0, half))
@@ -253,9 +250,7 @@ class FieldAttraction(Attraction):
         return np.asarray(weakening * self.tangent_factor(position, voltage, touching, pressing))
 
     def beyond_trapezoidal(self, begin: Floats, end: Floats, voltages: tuple[float, float]) -> float:
-        """What the change of energy on the way between two positions (P, 2) has beyond the trapezoidal
-        work of the forces at its ends (N mm per mm of depth), the squared voltage growing evenly.
-        """
+        """Energy on the way between positions (P, 2) beyond the trapezoidal work (N mm per mm of depth)."""
         self.check(end)
         squared = [voltage**2 for voltage in voltages]
         before, after = self.solve(begin), self.solve(end)
@@ -295,9 +290,7 @@ class FieldAttraction(Attraction):
         return field, np.asarray(lines.T @ forces)
 
     def fringe_stiffness(self, position: Floats, voltage: float, pressing: Floats | None) -> Any:
-        """Derivative of `forces` by the node positions, sparse (2 P, 2 P), unknowns ordered (node,
-        component). Nodes that touch move along the surface alone: contact holds their gap.
-        """
+        """Derivative of `forces` by positions, sparse (2 P, 2 P); touching nodes move along the surface."""
         lines, frame = self.seen(position), surface_state(self.surface, position)
         nodes = in_line(self._plane, self.edges)
         closed, near = frame.gap <= TOUCHING, self._nearby(*self.outline(position, lines, pressing))
@@ -327,9 +320,7 @@ class FieldAttraction(Attraction):
     def _solved(
         self, x: Floats, levels: Floats, slope: Floats, near: Nearby | None = None
     ) -> tuple[Capacitance | None, Floats]:
-        """The field of an outline and its forces (L, 2) on the lines at 1 V, above a surface of that
-        slope (L,).
-        """
+        """Field of an outline and forces (L, 2) on the lines at 1 V, above a surface of that slope (L,)."""
         found = self._columns.solve(x, levels, self._electrodes, self.floating, near)
         along = found.by_x + slope * (found.by_level[0] + found.by_level[1])
         return found, 0.5 * np.stack([along, found.by_level[2:].sum(axis=0)], axis=1)
@@ -357,9 +348,7 @@ class FieldAttraction(Attraction):
         return float(self.surface.insulator.eps_r)
 
     def columns_of(self, insulator: complex, gap: complex, skin: complex) -> Columns:
-        """Columns of layers with these relative permittivities; without a skin's layer where it has no
-        thickness.
-        """
+        """Columns of layers with these relative permittivities; no skin's layer where it has no thickness."""
         if np.max(self.skin.thickness) > 0.0:
             return Columns((insulator, gap, skin), (INSULATOR, AIR, SKIN))
         return Columns((insulator, gap), (INSULATOR, AIR))
@@ -370,9 +359,7 @@ class FieldAttraction(Attraction):
         return self._lines if kept.size == self._lines.shape[0] else self._lines[kept]
 
     def outline(self, position: Floats, lines: Any, pressing: Floats | None = None) -> tuple[Floats, Floats]:
-        """x (L,) of columns at `lines` (L, P) and the curves' heights (n + 1, L): electrode, insulator,
-        skin, living tissue.
-        """
+        """x (L,) of columns at `lines` (L, P), heights (n + 1, L) of electrode, insulator, skin, tissue."""
         place = lines @ position
         frame = surface_state(self.surface, place)
         insulator = self.surface.insulator

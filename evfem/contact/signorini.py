@@ -35,10 +35,9 @@ gained. Tangent of a concave law, the first never falls below the second: one of
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.
 
-Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175,
-doi:10.1016/0045-7825(86)90095-2 (the frictional problem as complementarity); P. Alart and A.
-Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991) 353, doi:10.1016/0045-7825(91)90022-X
-(projections and their linearisation).
+Sources: A. Klarbring, Comput. Methods Appl. Mech. Eng. 58 (1986) 175, doi:10.1016/0045-7825(86)90095-2 (the
+frictional problem as complementarity); P. Alart and A. Curnier, Comput. Methods Appl. Mech. Eng. 92 (1991)
+353, doi:10.1016/0045-7825(91)90022-X (projections and their linearisation).
 """
 
 from __future__ import annotations
@@ -105,9 +104,7 @@ NO_NODES: Ints = np.zeros(0, dtype=np.int64)
 
 
 class ContactNotSolved(ArithmeticError):
-    """The sub-problem cycles: it has no solution near the start, or several. `softest` (k,): the last
-    statuses, those that keep changing open.
-    """
+    """The sub-problem cycles: no solution near, or several. `softest` (k,): statuses, cycling ones open."""
 
     def __init__(self, message: str, softest: Ints = NO_NODES) -> None:
         super().__init__(message)
@@ -188,9 +185,7 @@ class ContactProblem:
 
     @cached_property
     def gives_way(self) -> bool:
-        """Whether the body gives way the more, the more it is loaded: this compliance, which contains
-        the forces that turn with the profile, is not positive.
-        """
+        """Whether the body gives way the more, the more it is loaded: the compliance is not positive."""
         try:
             return not np.linalg.cholesky(self.under_forces + self.under_forces.T).size
         except np.linalg.LinAlgError:
@@ -209,9 +204,7 @@ class ContactProblem:
 
     @cached_property
     def own(self) -> tuple[Floats, Floats]:
-        """Size of each node's own compliance along the normal and, the largest one, along the tangents,
-        (k,), nowhere less than the fraction `DISC_OWN` of the mean.
-        """
+        """Size of each node's own compliance, normal and tangent, (k,), at least `DISC_OWN` of the mean."""
         i, C = self.dim * np.arange(self.size), self.under_forces
         shear = np.abs(C[i + 1, i + 1])
         if self.dim == 3:
@@ -230,9 +223,8 @@ class ContactProblem:
 
 @dataclass(frozen=True)
 class ContactSolution:
-    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns
-    (p,), new gaps and slips (m,), the number of dense solves, and whether the negative stiffness
-    had to be scaled down.
+    """Contact forces (m,), drops of the attraction (m,), statuses (k,), the extra unknowns (p,), new gaps and
+    slips (m,), the number of dense solves, and whether the negative stiffness had to be scaled down.
     """
 
     force: Floats

@@ -55,9 +55,7 @@ SCALINGS, SOFTER = 2, 1.1
 
 
 def solve_contact(problem: ContactProblem, status: Ints, force: Floats | None = None) -> ContactSolution:
-    """Signorini and Coulomb, started from `status` (k,) and, in three dimensions, contact forces (m,); raises
-    `ContactNotSolved` where no start ends.
-    """
+    """Signorini and Coulomb from `status` (k,) and, in space, forces (m,); raises `ContactNotSolved`."""
     total, softest = 0, status
     for start in _starts(problem, status, np.zeros(problem.start.size) if force is None else force):
         forces, found, solves, softest = _newton(problem, start)

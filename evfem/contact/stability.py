@@ -40,9 +40,7 @@ ATTRACTION = "the attraction grows as the gap closes"
 
 @dataclass(frozen=True)
 class Verge:
-    """How close an equilibrium is to its loss, 1: how fast what takes it away grows relative to
-    what holds the tissue; and the force that works most in it, in words.
-    """
+    """How close an equilibrium is to its loss, at 1, and the force that takes most of it, in words."""
 
     share: float
     cause: str
@@ -79,9 +77,7 @@ def _shear_ratio(step: LinearContactStep) -> Floats:
 
 
 def _freed(step: LinearContactStep, slipping: Ints, opened: Ints) -> Floats:
-    """Compliance (f, f) of the slips and gaps of these nodes, with everything held that contact
-    holds, and the bone free where a force on it is prescribed.
-    """
+    """Compliance (f, f) of these slips and gaps, contact held, the bone free where it is loaded."""
     known = step.candidates
     C, bone = _compliance(step), _bone(step)
     closed, stick = np.flatnonzero(known.status != OPEN), np.flatnonzero(known.status == STICK)

@@ -87,9 +87,7 @@ def _phi(z: Any) -> tuple[Any, Any, Any]:
 
 
 def _difference(f: tuple[Any, Any], rates: tuple[Any, Any]) -> Any:
-    """Divided difference of a function over two rates; A is a multiple of one where they are one,
-    and it does not count.
-    """
+    """Divided difference of a function over two rates, times A; the derivative where they are one."""
     apart = rates[0] - rates[1]
     same = apart == 0.0
     return np.where(same, 0.0, (f[0] - f[1]) / np.where(same, 1.0, apart))
@@ -106,9 +104,7 @@ def _contour() -> tuple[Any, Any]:
 
 @dataclass(frozen=True)
 class Relaxing:
-    """A layer: `thickness` (mm), permittivity at high frequency, conductivity over eps_0 `kappa`
-    (1/s), and Debye poles as columns `strength` (K,) and `tau` (K,) in s.
-    """
+    """A layer: `thickness` (mm), eps_r, `kappa` = sigma/eps_0 (1/s), Debye `strength`, `tau` (K,) in s."""
 
     thickness: Values
     eps_inf: Values
@@ -147,9 +143,7 @@ class Relaxing:
         return np.einsum("ks...,k...->s...", tau / (1.0 + s * tau), polarisation)
 
     def polarised(self, s: Any, weight: Any, field: Any) -> Any:
-        """Polarisations (K, ...) under a field with the transform (S, ...) at s, by their sum over
-        the contour with the weight (S, ...).
-        """
+        """Polarisations (K, ...) under a field with transform (S, ...), summed over the contour by weight."""
         strength, tau = self.poles(s)
         return np.einsum("ks...,s...->k...", weight * strength / (1.0 + s * tau), field)
 
@@ -272,9 +266,7 @@ class Sandwich:
         return np.concatenate([np.broadcast_to(charges[:2], (2, *polarised.shape[1:])), polarised])
 
     def _fields(self, gap: Any, start: Any, volts: Any, s: Any) -> tuple[Any, Any]:
-        """The transforms (S, ...) of the three fields at s under the voltage's, and their derivatives
-        by the gap.
-        """
+        """Transforms (S, ...) at s of the three fields under the voltage's, and derivatives by the gap."""
         first, third = self._polarisations(start)
         left, right = self.skin.left(s, first) + start[0] / s, self.insulator.left(s, third) - start[1] / s
         Y_1, Y_3 = self.skin.admittance(s), self.insulator.admittance(s)
@@ -287,9 +279,7 @@ class Sandwich:
         return fields, (steeper / Y_1, steeper / Y_2, steeper / Y_3)
 
     def _moved(self, s: Any, weight: Any, fields: tuple[Any, Any, Any]) -> Any:
-        """What the transforms (S, ...) of the three fields add to the state (M, ...), by the sum over
-        the contour with the `weight` (S, ...).
-        """
+        """What transforms (S, ...) of the fields add to the state (M, ...), summed by `weight`."""
         E_1, E_2, E_3 = fields
         share = weight / s
         first = np.sum(share * (self.skin.kappa * E_1 - self.leak * E_2), axis=0)
@@ -344,9 +334,7 @@ class Sandwich:
         return end + decay * (1.0 - end) + both * (slope - slow * (1.0 - end))
 
     def eigenvalues(self, gap: Any) -> tuple[Any, Any]:
-        """The slower and the faster of the two rates (1/s, not positive) at a fixed `gap` (mm),
-        without poles.
-        """
+        """The slower and the faster rate (1/s, not positive) at a fixed `gap` (mm), without poles."""
         (a11, a12, a21, a22), _ = self._system(gap)
         square = (0.5 * (a11 - a22)) ** 2 + a12 * a21
         root = np.sqrt(np.where(np.real(square) > 0.0, square, 0.0))
@@ -378,9 +366,7 @@ def _lifted(values: Any, axes: int) -> Any:
 def stack_of(
     skin: Layer, insulator: Layer, *, frequency: float | None, gap_conductivity: float, gap_eps_r: float
 ) -> Sandwich:
-    """The layers of a voltage that is resolved in time, as their charges see them. `frequency` (Hz) is the
-    voltage's, None of a direct one.
-    """
+    """The layers as their charges see them. `frequency` (Hz) is the voltage's, None of a direct one."""
     if not (relaxes(skin) or relaxes(insulator)):
         given = {"gap_conductivity": gap_conductivity, "gap_eps_r": gap_eps_r}
         return Sandwich.of(skin, insulator, frequency=frequency, **given)

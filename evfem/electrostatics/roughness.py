@@ -190,9 +190,7 @@ RoughnessGap = Annotated[
 
 
 def separation_derivative(law: RoughnessLaw, pressure: Values) -> Values:
-    """ds/dp in mm/MPa of any law: its own, else a complex step on `separation`, or a difference
-    over `PRESSURE_STEP`.
-    """
+    """ds/dp in mm/MPa of any law: its own, a complex step, or a difference over `PRESSURE_STEP`."""
     own = getattr(law, "separation_derivative", None)
     if own is not None:
         return own(pressure)
@@ -217,9 +215,7 @@ class Line(NamedTuple):
 
 
 class Cored:
-    """`law` with a core no steeper than `steepest` (MPa/mm), or of the `length` (mm) that is given, for
-    faces that are closed at the gap `closed` (mm).
-    """
+    """`law` with a core no steeper than `steepest` (MPa/mm), or of `length` (mm), shut at `closed` (mm)."""
 
     def __init__(self, law: ForceLaw, closed: Values, steepest: Values, length: float | None = None) -> None:
         self.law, self.closed = law, np.asarray(closed, dtype=float)

@@ -309,9 +309,7 @@ class Sampled:
         return self.rate / self.voltage.size if self.repeat else None
 
     def powers(self) -> tuple[float, Floats, Floats] | None:
-        """Effective voltage (V), orders and shares: straight lines between the samples, whose transform is
-        that of the samples times sinc^2, over and over.
-        """
+        """Effective voltage (V), orders and shares of straight lines between samples, repeated."""
         if not self.repeat:
             return None
         size = self.voltage.size

@@ -122,9 +122,7 @@ class Cells:
         return result
 
     def potential(self, strips: Lowest | None, floating: bool) -> Any:
-        """Potential (L, rows): 1 on the lowest curve, or as the strips hold it, and 0 on the highest one,
-        or, `floating`, at the constant at which it has no charge.
-        """
+        """Potential (L, rows): 1 on the lowest curve (or strips), 0 on the highest; `floating`: no charge."""
         given = np.zeros((2, self.lines, self.per_line))  # for the electrodes, and for 1 on the highest curve
         given[1, :, -1] = 1.0
         given[0, :, 0] = float(strips is None)
@@ -148,9 +146,7 @@ class Cells:
         return cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
 
     def corrected(self, phi: Floats, factor: Floats) -> Floats:
-        """Potential (L, rows) from that of cells that nearly are these and their `factor`, by two steps:
-        exact to the second order in the difference.
-        """
+        """Potential (L, rows) from the `factor` of nearly these cells, by two steps: of second order."""
         from scipy.linalg import cho_solve_banded
 
         for _ in range(2):

@@ -43,9 +43,7 @@ from evfem.field.columncells import AT, WEIGHTS, Cells
 
 @dataclass(frozen=True, eq=False)
 class MeanPull:
-    """Mean forces (L, 2) on the pad at the lines, in N per mm of depth at 1 V effective; `phi`
-    (L, rows) is the complex potential at 1 V, `y` (L, rows) where.
-    """
+    """Mean forces (L, 2) on the pad at the lines, N per mm at 1 V; potential `phi` (L, rows) at `y`."""
 
     forces: Floats
     phi: Floats
@@ -94,9 +92,7 @@ class Capacitance:
 
 @dataclass(frozen=True, eq=False)
 class Nearby:
-    """What solutions of outlines close to a solved one start from: its potential `phi` (L, rows) and the
-    factor of its matrix.
-    """
+    """Start for outlines close to a solved one: its potential `phi` (L, rows) and its matrix's factor."""
 
     phi: Floats
     factor: Floats
@@ -104,9 +100,7 @@ class Nearby:
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Layers of relative permittivity `eps_r` (n,), from the electrode up, each with rows at the
-    shares `shares[l]` of its height, from 0 to 1.
-    """
+    """Layers of relative permittivity `eps_r` (n,), upwards; rows at the `shares[l]` of the height."""
 
     eps_r: tuple[complex, ...]
     shares: tuple[Floats, ...]
@@ -208,9 +202,7 @@ class Strips:
         return np.asarray(np.append(own[0], 0.0) + np.append(0.0, own[1]))
 
     def energy(self, phi: Floats) -> tuple[float, Floats]:
-        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,): the
-        electrodes stay where they are when the lines move.
-        """
+        """The integral for potentials (L,) of the lowest row, and its derivative by x (L,) of the lines."""
         beyond = phi[:-1, None] * self.shapes[0] + phi[1:, None] * self.shapes[1] - self.voltage
         rise = np.diff(phi)
         value = np.sum(self.weight * self.width[:, None] * beyond**2) + np.sum(self.along * rise**2)

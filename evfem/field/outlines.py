@@ -48,9 +48,7 @@ TURN = np.radians(15.0)
 
 @dataclass(frozen=True)
 class Run:
-    """A piece of an outline between two walls: points `x`, `height` (mm); of rank 2 with the
-    `shares` of its height, left and right, at which its lower block ends.
-    """
+    """A piece of an outline between walls: points `x`, `height` (mm); of rank 2 with block `shares`."""
 
     x: Floats
     height: Floats
@@ -220,9 +218,7 @@ def _without_repetitions(x: Floats, height: Floats) -> Floats:
 
 
 def _ranked(piece: Run, left: float | None, right: float | None) -> list[Run]:
-    """The piece with its rank; `left` and `right` are the shares of its height where lower
-    neighbours end.
-    """
+    """The piece with its rank; `left` and `right` are the shares of its height where lower neighbours end."""
     if left is None and right is None:
         return [piece]
     if left is not None and right is not None:

@@ -123,9 +123,7 @@ def _between(grid: Floats, places: Floats) -> tuple[Any, Floats]:
 
 
 def faded(depth: Floats, share: Floats) -> Floats:
-    """Depths that come to nothing towards the edge of the fine rectangle; `share` (..., 2) is the
-    place between its middle, 0, and its edges, 1.
-    """
+    """Depths fading to the fine rectangle's edge; `share` (..., 2): 0 in its middle, 1 at its edges."""
     fade = quintic((1.0 - np.abs(share)) / (1.0 - FULL))
     return np.asarray(depth * fade[..., 0] * fade[..., 1])
 

@@ -192,9 +192,7 @@ class Fingertip(LayeredFinger):
         return Ridges(self.ridge_height, self.ridge_width, *shape, full=0.0, end=1.0)
 
     def _grid(self, outer: Ellipsoid) -> Grid:
-        """Columns of the rectangle: fine where ridges cross them, with lines on crests and grooves
-        of parallel ones.
-        """
+        """Columns of the rectangle: fine under ridges, with lines on crests and grooves of parallel ones."""
         divisions = TIP_RESOLUTIONS[self.resolution]
         fine = self.ridges not in ("across", "none"), self.ridges not in ("along", "none")
         (across, *x), (along, *z) = (
@@ -212,9 +210,7 @@ class Fingertip(LayeredFinger):
         return 0.0 if self.ridges == "none" else self.cells_per_ridge or by_resolution
 
     def _lines(self, axis: float, parallel: bool, plain: int) -> tuple[int, float, float]:
-        """Columns of the rectangle at the bone over an axis (mm), and its two ends over the axis:
-        `plain` of them, or nine times as many at the surface as ridges need.
-        """
+        """Columns of the rectangle at the bone (mm) and its ends: `plain`, or nine times that for ridges."""
         if plain:
             return plain, -RECTANGLE, RECTANGLE
         step = 18.0 * self.ridge_width / self.ridge_cells

@@ -1,6 +1,4 @@
-"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its
-lower side.
-"""
+"""The outline of a finger pad's cross-section: an ellipse, and fingerprint ridges cut into its lower side."""
 
 from __future__ import annotations
 
@@ -13,9 +11,7 @@ from evfem.common.arrays import Floats
 
 @dataclass(frozen=True)
 class Ellipse:
-    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x
-    axis.
-    """
+    """Ellipse with semi-axes a, b (mm) around (0, `centre`); eccentric angle theta from the +x axis."""
 
     a: float
     b: float
@@ -42,9 +38,7 @@ class Ellipse:
         return centre + away / np.hypot(away[:, 0] / self.a, away[:, 1] / self.b)[:, None]
 
     def evenly(self, start: float, end: float, count: int) -> Floats:
-        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between
-        them.
-        """
+        """`count` + 1 eccentric angles from `start` to `end` with equal lengths of arc between them."""
         fine = np.linspace(start, end, 2001)
         middle = 0.5 * (fine[1:] + fine[:-1])
         speed = np.hypot(self.a * np.sin(middle), self.b * np.cos(middle))

@@ -123,9 +123,7 @@ class Section:
 
 
 def _heights(n: int, total: float, first: float, fixed: Mapping[int, float]) -> Floats:
-    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from
-    `first`.
-    """
+    """Heights of `n` rows: `fixed` ones (row -> height), the others in geometric progression from `first`."""
     heights = np.zeros(n)
     for row, height in fixed.items():
         heights[row] = np.clip(height, 0.4 * total / n, max(1.3 / n, 0.35) * total)
@@ -177,9 +175,7 @@ class Columns:
         self.splits[middle - fine : middle + fine] = 9
 
     def _angles(self, base: int, around: list[int]) -> tuple[Floats, list[int]]:
-        """Eccentric angles of the base columns' borders, and the number of columns of each
-        stretch.
-        """
+        """Eccentric angles of the base columns' borders, and the number of columns of each stretch."""
         outer, edge = self.section.outer, self._edge
         x = self.first_x + self.step * np.arange(base + 1)
         pad = -np.arccos(x / outer.a)

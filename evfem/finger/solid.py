@@ -128,9 +128,7 @@ class Solid:
         return Mesh(points, _right_handed(points, cells), kind, region, names, sets)
 
     def _joined(self, rows: int, per_cell: int, order: int) -> tuple[Floats, Ints, Ints]:
-        """The five patches with their common nodes once: places (N, 4) as (unit vector, row),
-        cells, and the row of each cell.
-        """
+        """The five patches, common nodes once: places (N, 4) as (unit vector, row), cells, rows of cells."""
         grid = self.grid
         across, along = (n * per_cell for n in grid.columns)
         sides = grid.sides * per_cell
@@ -156,9 +154,7 @@ class Solid:
         return np.column_stack([p, -np.sqrt(1.0 - p * p - q * q), q])
 
     def _side(self, parameters: Floats, axis: int, end: int) -> Floats:
-        """Unit vectors (N, 3) of the patch beyond the rectangle's edge at the `end` (0 low, 1
-        high) of an `axis` (0 x, 1 z): v goes from that edge to the rim along great circles.
-        """
+        """Unit vectors (N, 3) of the patch beyond the `end` (0 or 1) of an `axis` (0 x, 1 z), v outwards."""
         u, v = parameters[:, 0], parameters[:, 1]
         on_edge = np.full((len(u), 2), float(end))
         on_edge[:, 1 - axis] = u

@@ -56,9 +56,7 @@ def load_drift(finger: FingerPad, friction: float, load: float, modulus: float) 
 
 
 def drifting(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> Iterator[str]:
-    """A sentence for the first slide after a press to a force whose held indentation lets the load
-    drift.
-    """
+    """A sentence for the first slide after a press to a force whose held indentation lets the load drift."""
     if not isinstance(scene.finger, FingerPad) or not scene.ground.is_flat:
         return
     friction = float(np.max(scene.ground.friction_coefficient(way(scene, mesh, STEP))))

@@ -1,5 +1,4 @@
-"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its
-reason.
+"""What a scene needs, decided before anything is solved: terms, unknowns and solver, each with its reason.
 
 `make_model` builds what the plan says, so the printout and the run cannot disagree.
 """
@@ -128,9 +127,7 @@ def scene_mesh(scene: Scene) -> tuple[Mesh, str]:
 
 
 def plan_on(scene: Scene, mesh: Mesh, element: str) -> Plan:
-    """The plan of a scene whose mesh is already there; raises InputError for parts that no run
-    could use.
-    """
+    """The plan of a scene whose mesh is already there; raises InputError for parts that no run could use."""
     check_parts(scene, mesh.dim)
     check_space(scene, mesh)
     for name in ("pad", "bone"):

@@ -77,10 +77,9 @@ PER_PERIOD = 20.0
 def unresolved(scene: Scene, mesh: Mesh) -> str | None:
     """A sentence if the surface is sharper or rougher than the node spacing of the pad, else None.
 
-    Compared are the profile's height in the middle between two nodes with the mean of its heights
-    below them, and its slope there with that from node to node, all along the way. Noise of a scan
-    hardly shows in the heights, but contact acts along the slope: nodes that follow it stick and
-    slip one by one.
+    Compared are the profile's height in the middle between two nodes with the mean of its heights below them,
+    and its slope there with that from node to node, all along the way. Noise of a scan hardly shows in the
+    heights, but contact acts along the slope: nodes that follow it stick and slip one by one.
     """
     surface: Any = scene.ground
     if surface.is_flat or not len(edges := _pad_edges(mesh)):
@@ -113,9 +112,7 @@ def unresolved(scene: Scene, mesh: Mesh) -> str | None:
 
 
 def _pad_edges(mesh: Mesh) -> Ints:
-    """Ends (K, 2) of the pad's edges; in three dimensions of those of its faces that run more
-    across than along.
-    """
+    """Ends (K, 2) of the pad's edges; in space of its faces' that run more across than along."""
     if mesh.dim == 2:
         return mesh.edges_of("pad")[:, :2]
     faces = mesh.faces_of("pad")[:, :4]

@@ -49,9 +49,7 @@ WAY_STEP = 0.02
 
 
 def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, ...]:
-    """A sentence for everything in a scene that may be meant, but hardly is; `moduli` are the
-    shear moduli (MPa) of the materials.
-    """
+    """A sentence for what may be meant, but hardly is; `moduli` are the materials' shear moduli (MPa)."""
     lengths = (*_small(scene), *_large(scene, mesh, min(moduli.values())), *_other_units(scene, mesh))
     return (
         *_hard(scene, mesh, moduli),
@@ -63,9 +61,7 @@ def doubts(scene: Scene, mesh: Mesh, moduli: Mapping[str, float]) -> tuple[str, 
 
 
 def locking(element: str, materials: Mapping[str, Any], dim: int) -> Iterator[str]:
-    """A sentence for a material so nearly incompressible that an element which measures the volume
-    at every point locks: forces many times too large, or no equilibrium.
-    """
+    """A sentence for a nearly incompressible material in an element that locks."""
     if ELEMENTS[element][2] != "point":
         return
     locked = [name for name, law in materials.items() if nearly_incompressible(split(law, dim), dim, LOCKED)]
@@ -164,9 +160,7 @@ def touching_traction(scene: Scene) -> float | None:
 
 
 def _unbearable(scene: Scene) -> Iterator[str]:
-    """An attraction of touching skin beyond what any load presses it with, where a fingertip is pressed;
-    of a mesh, which may be anything, the run's own forces tell.
-    """
+    """Where a fingertip is pressed: an attraction of touching skin beyond what any load presses with."""
     if isinstance(scene.finger, MeshedFinger) or not any((c.depth or 0.0) > 0.0 for c in scene.courses):
         return
     traction = touching_traction(scene)
@@ -178,9 +172,7 @@ def _unbearable(scene: Scene) -> Iterator[str]:
 
 
 def weakens(scene: Scene) -> bool:
-    """Whether friction falls with the speed somewhere up to ten times the fastest motion's: a node that is
-    let go is faster than the bone.
-    """
+    """Whether friction falls with the speed somewhere up to ten times the fastest motion's."""
     law, fastest = scene.friction_law, max(course.speed or 0.0 for course in scene.courses)
     if not (scene.has_friction and getattr(law, "timed", False)):
         return False
@@ -203,9 +195,7 @@ def _hovering(scene: Scene, mesh: Mesh) -> Iterator[str]:
 
 
 def _stays_up(scene: Scene, mesh: Mesh, gap: float) -> bool:
-    """Whether a pad whose undeformed outline is `gap` (mm) off the first touch surely does not come down:
-    nothing attracts or loads it.
-    """
+    """Whether a pad `gap` (mm) off the first touch surely stays up: nothing attracts or loads it."""
     if gap < 0.0 or scene.electrics.acts or scene.forms:
         return False
     surface: Any = scene.ground

@@ -94,9 +94,7 @@ def _mechanics(scene: Scene) -> str:
 
 
 def slowest_swing(scene: Scene) -> float:
-    """Lowest frequency (Hz) at which the attraction swings: twice the voltage's, or that itself where
-    it has a bias, or even harmonics.
-    """
+    """Lowest frequency (Hz) of the attraction: twice the voltage's; once with a bias or even harmonics."""
     at, found = scene.electrics.frequency or 0.0, powers(scene.voltage)
     odd = found is None or not (found[1] % 2.0 == 0.0).any()
     return 2.0 * at if odd else at

@@ -95,9 +95,7 @@ def frame_of(result: Result, number: int) -> Frame:
 
 
 def rounds(mesh: Mesh) -> Ints:
-    """Nodes of each cell once around (E, corners or twice as many), middle nodes between their
-    corners.
-    """
+    """Nodes of each cell once around (E, corners or twice as many), middle nodes between their corners."""
     m = mesh.corners
     if mesh.order == 1:
         return mesh.cells
@@ -185,9 +183,8 @@ class Scale:
 def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float | None = None) -> Scale:
     """The scale of a field for the values that are shown, from their smallest to their largest.
 
-    A wished end takes the place of one of these. A field with a sign has as much of its colours
-    on either side of its middle, unless both ends are wished. Raises InputError unless vmin is
-    below vmax.
+    A wished end takes the place of one of these. A field with a sign has as much of its colours on either
+    side of its middle, unless both ends are wished. Raises InputError unless vmin is below vmax.
 
     >>> scale_of("von_mises", np.array([0.1, 0.4]), vmin=0.0)
     Scale(cmap='viridis', low=0.0, high=0.4, extend='neither')
@@ -217,9 +214,7 @@ def scale_of(field: str, values: Floats, vmin: float | None = None, vmax: float 
 
 
 def shown_values(mesh: Mesh, frame: Frame, field: str, window: Window) -> Floats:
-    """Values inside a window (left, right, bottom, top in mm): of the cells whose middle is there,
-    of nodes, of the pad's nodes for a field of the pad.
-    """
+    """Values inside a window (left, right, bottom, top in mm): of cells, nodes, or the pad's nodes."""
     place, values = mesh.points + frame.displacement, values_of(frame, field)
     if field in CELL_FIELDS:
         return values[within(place[mesh.cells].mean(axis=1), window)]
@@ -235,9 +230,7 @@ def within(place: Floats, window: Window) -> Any:
 
 
 def draw_outline(ax: Axes, mesh: Mesh, frame: Frame, field: str, scale: Scale) -> Any:
-    """The tissue in one pale colour and the pad's outline in the colours of the field (a
-    LineCollection).
-    """
+    """The tissue in one pale colour and the pad's outline in the colours of the field (a LineCollection)."""
     from matplotlib.collections import LineCollection, PolyCollection
 
     points = mesh.points + frame.displacement

@@ -63,10 +63,9 @@ def deformed(
     `shear_traction`, `electrostatic_traction`, `gap`, `contact_status`) colours its outline;
     tractions on the finger are arrows too, the longest where they are largest.
 
-    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right,
-    bottom, top) in mm shows that. Colours go from `vmin` to `vmax`, by default over what is shown.
-    Thin lines are borders of regions. Returns the axes; raises InputError for another field or
-    frame.
+    `near="contact"` is a close-up of what touches, or of the smallest gap; a window (left, right, bottom,
+    top) in mm shows that. Colours go from `vmin` to `vmax`, by default over what is shown. Thin lines are
+    borders of regions. Returns the axes; raises InputError for another field or frame.
     """
     check_field(field)
     check_plane(result.mesh)
@@ -215,9 +214,7 @@ def _whole(points: Floats, height: Height) -> Window:
 
 
 def _close(points: Floats, frame: Frame, height: Height, flat: float) -> Window:
-    """What touches, or the node with the smallest gap; `flat` is the window's height over its
-    width.
-    """
+    """What touches, or the node with the smallest gap; `flat` is the window's height over its width."""
     touching = frame.contact_status > 0
     if not touching.any():
         touching = frame.gap == np.nanmin(frame.gap)

@@ -63,9 +63,7 @@ def footprint(
 
 @dataclass(frozen=True, eq=False)
 class SkinView:
-    """A frame of a result in three dimensions, and the field that its skin is coloured by; with the
-    methods of `evfem.plotting.finger.View`.
-    """
+    """A frame of a result in space and the field on its skin; methods as `evfem.plotting.finger.View`."""
 
     result: Result
     frame: Frame

@@ -73,9 +73,7 @@ class Electrics:
 
     @cached_property
     def voltage(self) -> Any:
-        """The voltage as the run follows it: the scene's own, or where its drive is resolved that of
-        the moment, or of a signal that repeats the effective one for its mean over the cycle.
-        """
+        """The voltage as the run follows it: of the moment where it is resolved, else the effective one."""
         drive = self.drive
         if drive is not None and not drive.resolved and (found := powers(self.given)) is not None:
             return found[0]
@@ -114,9 +112,7 @@ class Electrics:
 
     @cached_property
     def attraction(self) -> tuple[Any, Layers]:
-        """The law and the layers of the attraction: of the mean over the cycle, or where the drive is
-        resolved without what conducts, which moves the charges instead.
-        """
+        """Law and layers of the attraction: over the cycle, or, resolved, without what conducts."""
         solids = (self.skin, self.insulator)
         if self.drive is None:
             return self.law, Layers.of(*solids)

@@ -1,5 +1,4 @@
-"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the
-file.
+"""Scene files: TOML to `Scene` and back; every mistake is one sentence that names the key in the file.
 
 Relative paths in a file are relative to the file. Limits: a scene of 4 MB and one million steps,
 csv files of 64 MB and one million rows, meshes of 128 MB (`evfem.mesh.file`). What is written

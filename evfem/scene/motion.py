@@ -1,6 +1,4 @@
-"""What the finger does: press, slide, hover, wait, and voltage ramps; frozen and validated (mm,
-N/mm, V, s). A run and its plan know no kind: each motion gives its `Course`.
-"""
+"""What the finger does (mm, N/mm, V, s); a run knows no kind, each motion gives its `Course`."""
 
 from __future__ import annotations
 

@@ -110,9 +110,7 @@ class Solver:
 
 @dataclass(frozen=True)
 class Output(Checked):
-    """Which fields are kept. What is left open `evfem run` chooses so that its files of fields stay small
-    (`evfem.export.FieldFiles`).
-    """
+    """Which fields are kept; left open, `evfem run` keeps their files small (`evfem.export.FieldFiles`)."""
 
     every: Annotated[
         int | None,

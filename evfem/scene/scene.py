@@ -1,5 +1,4 @@
-"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing
-computed.
+"""What is simulated: a finger, a surface, a voltage and motions; frozen, validated, nothing computed.
 
 Units mm, N, MPa, V, s; forces of the plane model are per mm of depth (N/mm). The bone translates
 by (`position`, -(`indentation` + g0)), g0 being the smallest vertical gap of the undeformed
@@ -195,9 +194,7 @@ class Scene:
         return sum(motion.steps for motion in self.motion)
 
     def with_term(self, form: Form, on: Region | Boundary) -> Scene:
-        """A copy of the scene with `form` added to the internal residual over the region or
-        boundary `on`.
-        """
+        """A copy of the scene with `form` added to the internal residual over the region or boundary `on`."""
         if not isinstance(form, Form):
             raise InputError("form", quoted(form), "a function marked with @evfem.form")
         if not isinstance(on, (Region, Boundary)):

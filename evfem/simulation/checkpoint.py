@@ -1,11 +1,9 @@
-"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would
-have done.
+"""From a run to the arrays of its checkpoint and back, so that a resumed run repeats what it would have done.
 
-Beside the state a run carries over from step to step: the contact candidates, the substep that
-worked last, the works so far with the forces that they go on from, and a factorisation made some
-steps ago. Of the last one the checkpoint keeps where it was made; a resumed run makes it there
-again, and the iterations that follow are the same to the last bit (with one thread, on the same
-machine and backend).
+Beside the state a run carries over from step to step: the contact candidates, the substep that worked last,
+the works so far with the forces that they go on from, and a factorisation made some steps ago. Of the last
+one the checkpoint keeps where it was made; a resumed run makes it there again, and the iterations that follow
+are the same to the last bit (with one thread, on the same machine and backend).
 """
 
 from __future__ import annotations
@@ -44,9 +42,7 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
-    """What a solver takes with it to the next step; of the same shapes with and without a
-    factorisation.
-    """
+    """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
     at, nowhere = carried.tangent_point, np.zeros_like(state.u)
     return {
         "candidates": carried.candidates,
@@ -148,9 +144,7 @@ class Checkpoint:
     _texts: list[tuple[Row, str]] = field(default_factory=list, repr=False, compare=False)
 
     def write(self, scene_digest: str, arrays: Mapping[str, np.ndarray], rows: Sequence[Row]) -> None:
-        """Store the state in one step; the file before stays as it is if the disk refuses
-        (StorageError).
-        """
+        """Store the state in one step; the file before stays as it is if the disk refuses (StorageError)."""
         header = {"format": np.array(CHECKPOINT_FORMAT), "scene": np.array(scene_digest)}
         header["version"] = np.array(evfem.__version__)
         header["rows"] = np.array(self._text_of(rows))
@@ -165,9 +159,7 @@ class Checkpoint:
         return f"[{', '.join(text for _, text in self._texts[: len(rows)])}]"
 
     def read(self, scene_digest: str) -> Saved:
-        """The state of the same scene. Raises InputError for another scene's, another version's or
-        a damaged file.
-        """
+        """The state of the same scene. InputError for another scene's, another version's, a damaged file."""
         allowed = "a checkpoint of the same scene and version"
         arrays = load_arrays(self.path, "checkpoint", CHECKPOINT_FORMAT)
         try:

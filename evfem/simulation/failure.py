@@ -1,6 +1,4 @@
-"""What is said of a step that failed: which force wins and where, if no equilibrium is near, and
-what may be tried.
-"""
+"""What is said of a failed step: which force wins and where, if no equilibrium is near, what to try."""
 
 from __future__ import annotations
 

@@ -36,11 +36,9 @@ def origin() -> dict[str, Any]:
 
 
 def provenance(scene: Scene, mesh: Mesh, solver: Mapping[str, Any]) -> dict[str, Any]:
-    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for
-    JSON.
+    """Versions, parameters, fingerprints and the solver's own record, in plain values ready for JSON.
 
-    `parameters` is the scene as TOML, or its representation where it holds a law or form of the
-    user's own.
+    `parameters` is the scene as TOML, or its representation where it holds a law or form of the user's own.
     """
     from evfem.scene.written import dump
 

@@ -1,5 +1,4 @@
-"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came
-about.
+"""What a run leaves behind: a history with one row per step, fields of some steps, and how it came about.
 
 Units mm, N/mm, MPa, V, s; energies in N (N mm per mm of depth); N, mm2 and mJ in `Result.total`.
 Files are .npz without pickled objects.
@@ -98,13 +97,11 @@ def _component(name: str) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Result(History):
-    """Every column of the history as an array over the steps, the frames kept, the mesh and the
-    provenance.
+    """Every column of the history as an array over the steps, the frames kept, the mesh and the provenance.
 
     Forces are per mm of depth; `total` has them in N where the scene says how deep the finger is.
-    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are
-    the sums of the contact forces on the finger, +y and -x components; `electrostatic_force` is
-    the downward attraction.
+    `applied_force` is the downward force on the bone; `normal_force` and `tangential_force` are the sums of
+    the contact forces on the finger, +y and -x components; `electrostatic_force` is the downward attraction.
 
     Of a finger in three dimensions forces are in N, and `in_space` has its further columns
     (`SPATIAL`): `position_z`, components of the tangential forces, and the contact areas. There
@@ -121,9 +118,7 @@ class Result(History):
     def from_rows(
         cls, rows: Sequence[Row], frames: Sequence[Frame], mesh: Mesh, provenance: dict[str, Any]
     ) -> Result:
-        """A result from rows as the solver reports them; each row has exactly the keys of
-        `COLUMNS`.
-        """
+        """A result from rows as the solver reports them; each row has exactly the keys of `COLUMNS`."""
         for row in rows:
             if not columns_of(row):
                 odd = sorted(set(row) ^ set(COLUMNS))
@@ -176,23 +171,17 @@ class Result(History):
 
     @property
     def load_drift(self) -> float:
-        """Largest relative change of the load where the indentation was held after a press; 0 where
-        the load was.
-        """
+        """Largest relative change of the load at held indentation after a press; 0 if it was held."""
         return load_drift(self.rows)
 
     @property
     def contact_area(self) -> Floats:
-        """Gross contact area (mm2): `contact_width` over the depth. Raises InputError without one,
-        unless the finger is one in three dimensions.
-        """
+        """Gross contact area (mm2): in the plane `contact_width` times depth; InputError without a depth."""
         return self.in_space["contact_area"] if self.in_space else self.total.contact_width
 
     @property
     def real_contact_area(self) -> Floats:
-        """Real contact area (mm2): `real_contact_width` over the depth. Raises InputError without
-        one, unless the finger is one in three dimensions.
-        """
+        """Real contact area (mm2): in the plane `real_contact_width` times depth, or InputError."""
         return self.in_space["real_contact_area"] if self.in_space else self.total.real_contact_width
 
     @property
@@ -296,9 +285,7 @@ class Result(History):
         return found
 
     def save(self, path: str | Path) -> None:
-        """Write everything to one .npz file, in one step. Raises StorageError when the disk
-        refuses, and InputError for the ending of another format.
-        """
+        """Write one .npz file, in one step. Raises StorageError, and InputError for another ending."""
         check_ending(path, ".npz", "to_csv writes the history, export.paraview the fields")
         arrays: dict[str, np.ndarray] = {"format": np.array(RESULT_FORMAT)}
         arrays |= {f"history/{name}": np.array(self[name]) for name in self.columns}

@@ -34,11 +34,10 @@ share that telescopes; then the work of nodes that land, leave or begin to slip;
 adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
 with the step, and is ``integrator_dissipation``.
 
-A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous
-stresses are, where time stops), and the end is far away however small the part. Then L does not
-fall with the step. It is the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and
-either the body, the loads at their final values, moves along forces that grow faster than the
-tissue's,
+A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
+where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
+the energy set free, and ``snap_dissipation``. A part snaps if L > 0 and either the body, the loads at their
+final values, moves along forces that grow faster than the tissue's,
 
 .. math:: \Delta f\cdot w < [f_e(u_1) - f_e(u_0 + \Delta b)]\cdot w + \text{(friction, likewise)}, \qquad
           w = \Delta u - \Delta b,
@@ -130,9 +129,8 @@ SLIDE, PART = _gauss(4)
 
 @dataclass(frozen=True, eq=False)
 class Books:
-    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those
-    of the user's forms, stored energy of the tissue, that of the interface's springs, kinetic
-    energy.
+    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those of the
+    user's forms, stored energy of the tissue, that of the interface's springs, kinetic energy.
     """
 
     forces: Floats
@@ -342,9 +340,7 @@ class Part:
 
     @cached_property
     def _slip(self) -> Floats:
-        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they
-        left.
-        """
+        """Slip along the profile (P,) in mm of nodes that slip at the end, or did so before they left."""
         old, new, interface = self.old, self.new, self.model.equilibrium.interface
         stretch = [interface.surface_at(state).stretch for state in (old, new)]
         slip = 0.5 * (stretch[0] + stretch[1]) * (self.x[1] - self.x[0])
@@ -389,9 +385,7 @@ class Part:
         return lost > 0.5 * SNAP * abs(work) or work < self._pulled_along(along[self.model.pad.nodes])
 
     def _pulled_along(self, along: Floats) -> float:
-        """Work of the change of attraction and friction on the way `along` (P, dim) that the bone
-        does not go, the loads at their final values.
-        """
+        """Work of attraction and friction on the way `along` (P, dim) without the bone, under end loads."""
         model, old, new = self.model, self.old, self.new
         carried = replace(old, u=old.u + (new.bone - old.bone))
         work = 0.0

@@ -1,5 +1,4 @@
-r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction
-force.
+r"""What is prescribed in a step: the bone's height or the force on it, the voltage or the friction force.
 
 A control says which part of the step is known; where a force is prescribed instead, it gives the
 extra unknown with the equation that settles it (`evfem.contact.condensed.ExtraUnknown`), its share
@@ -17,10 +16,9 @@ control             known                        unknown                       e
 `FollowFriction`    voltage at either bound      squared voltage between them  F_x = force
 ==================  ===========================  ============================  ====================
 
-Without charges between the layers attraction is proportional to the squared voltage, so that this
-unknown enters linearly. A control
-of one's own (a spring behind the bone, a prescribed charge) is a class with the methods of
-`HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
+Without charges between the layers attraction is proportional to the squared voltage, so that this unknown
+enters linearly. A control of one's own (a spring behind the bone, a prescribed charge) is a class with the
+methods of `HeightControl` or `VoltageControl`; `docs/howto/extend.md` builds one.
 """
 
 from __future__ import annotations
@@ -54,9 +52,7 @@ AT_ZERO, AT_LIMIT, UNKNOWN = "at zero", "at limit", "unknown"
 
 
 class HeightControl:
-    """How high the bone stands: prescribed, or settled by an equation; here by nothing. `free`: whether it is
-    an unknown of the step.
-    """
+    """How the bone's height is settled: prescribed, here, or by an equation. `free`: it is an unknown."""
 
     free = False
 
@@ -113,8 +109,7 @@ class Force(HeightControl):
 
 class Loose(Indentation):
     """A finger that carries no force and that nothing touches stays at `height`, where it is when a step
-    begins; touched on the way, by a crest or by tissue that recovers, it gives way
-    (`Equilibrium.step`).
+    begins; touched on the way, by a crest or by tissue that recovers, it gives way (`Equilibrium.step`).
 
     >>> Loose(0.3).towards(Force(0.0), 0.5)
     Force(force=0.0)
@@ -143,9 +138,7 @@ class VoltageProblem:
 
 @dataclass(frozen=True)
 class DrivenStep:
-    """A solved contact step, the change of the unknown of the voltage in it (kV^2 or kV), and the state
-    for the backward solve per unit of it where it has changed.
-    """
+    """A solved step, the change of the voltage's unknown (kV^2 or kV), the state for the backward solve."""
 
     solution: StepSolution
     change: float = 0.0
@@ -248,9 +241,7 @@ class Met(VoltageControl):
 
 @dataclass(frozen=True)
 class KeptCharge(Met):
-    """The electrode has the `charge` over eps_0 (V, in space V mm), or None keeps the one that it had. The
-    unknown is the voltage in kV, for the charge is linear in it.
-    """
+    """The electrode has `charge` over eps_0 (V, in space V mm), None: as before. Unknown: voltage in kV."""
 
     charge: float | None = None
 
@@ -333,9 +324,7 @@ class FollowFriction(VoltageControl):
         return DrivenStep(found, change, unit)
 
     def accepts(self, forward: float, reaction: Floats, slack: float) -> bool:
-        """At a bound the force may miss the wish in the direction that the bound forbids to
-        correct; else the voltage becomes an unknown again.
-        """
+        """At a bound the force may miss the wish as the bound forbids, else the voltage is unknown again."""
         if self.free:
             return True
         lacking = forward * (self.force - reaction[0])

@@ -52,9 +52,7 @@ FOLDED = "there is no equilibrium near here without the outline folding over its
 
 
 class Equilibrium:
-    """Finds equilibria of a body on a surface, with or without attraction, one step after the
-    other.
-    """
+    """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
     def __init__(
         self,
@@ -97,9 +95,7 @@ class Equilibrium:
         return self.interface.contact_forces(state)
 
     def attraction_at(self, old: State, state: State, voltage: float) -> Floats:
-        """Attraction on the pad nodes (P, 2) in the configuration of `state`; who touches is taken
-        from `old`, the last converged state.
-        """
+        """Attraction on the pad nodes (P, 2) in `state`; who touches is taken from `old`, accepted last."""
         if self.attraction is None:
             return np.zeros_like(state.contact_force)
         return Seen.of(self.attraction, self.interface, state, old.touching).forces(voltage)
@@ -205,9 +201,7 @@ class Equilibrium:
         raise StepFailed(f"no equilibrium in {len(residuals)} iterations", residuals)
 
     def _accepted(self, old: State, state: State, target: Target) -> State:
-        """The balanced state with what body, friction and hand remember of it; raises where its outline
-        crosses itself or it is not stable.
-        """
+        """The balanced state with memories of body, friction, hand; raises where crossed or not stable."""
         place = self.interface.fold(state)
         if place is not None:
             raise Folded(FOLDED.format(place), self.record.residuals)
@@ -224,9 +218,7 @@ class Equilibrium:
         return target.drive.accepts(forward, state.reaction, slack)
 
     def obeys_contact(self, old: State, state: State) -> bool:
-        """Whether contact and friction hold at the present positions; a node that penetrates
-        becomes a candidate.
-        """
+        """Whether contact and friction hold here; a node that penetrates becomes a candidate."""
         penetration = self.interface.shallowest_penetration(state)
         if penetration is not None:
             self.body.admit(state, penetration)

@@ -98,9 +98,7 @@ class FactorisedBody:
         return state
 
     def _first_guess(self, state: State, target: Target) -> State:
-        """Where iterations begin: the present state moved on along its last increment, or with the
-        bone if nothing touches.
-        """
+        """Where iterations begin: the last increment once more, or moved with the bone if nothing touches."""
         state = replace(state, voltage=target.drive.guess(state.voltage))
         if state.touching.any():
             return self._extrapolated(state, target)
@@ -108,9 +106,7 @@ class FactorisedBody:
         return replace(state, u=state.u + (bone - state.bone), bone=bone)
 
     def _extrapolated(self, state: State, target: Target) -> State:
-        """As far along the last increment of the displacements as the bone's next one is along its
-        last.
-        """
+        """As far along the last increment of the displacements as the bone's next one is along its last."""
         node = self.body.space.mesh.node_sets["bone"][0]
         last, way = state.last_increment[node], target.way(state.bone)
         axis = int(np.argmax(np.abs(way)))
@@ -158,9 +154,7 @@ class FactorisedBody:
         return max(float(free / largest), target.drive.lacking(self._seen(state)))
 
     def _rounding(self, state: State) -> float:
-        """Forces (N/mm) below which the balance is rounding: of displacements that contain the
-        bone's travel, of the stresses of the stiffest cells, and of the attraction.
-        """
+        """Forces (N/mm) below which the balance is rounding: of displacements, stresses and attraction."""
         epsilon = float(np.finfo(float).eps)
         travel = max(4.0 * float(np.abs(state.bone).max()), self.interface.length)
         rounding = epsilon * self.linearisation.stiffest * travel
@@ -191,9 +185,7 @@ class FactorisedBody:
         return self._mixed(state, after, target)
 
     def _mixed(self, state: State, after: State, target: Target) -> State:
-        """Anderson's combination of `after` with the iterates before; `after` itself if that goes too far.
-        Prescribed values are copied exactly.
-        """
+        """Anderson's combination of `after` with iterates before; `after` if too far. Prescribed: exact."""
         mixed = self._anderson.next_iterate(state, after)
         if mixed is not after and self._goes_too_far(state, mixed, target):
             self._anderson.reset()
@@ -206,16 +198,12 @@ class FactorisedBody:
         return replace(mixed, bone=bone, voltage=voltage)
 
     def _goes_too_far(self, state: State, mixed: State, target: Target) -> bool:
-        """Whether a combination of iterates turns cells inside out, or the bone leaves: where nothing holds
-        it, all steps are equally long, and combined they lead anywhere.
-        """
+        """Whether a combination turns cells inside out, or takes away a bone that nothing holds."""
         travel = abs(float(mixed.bone[1] - state.bone[1])) if target.height.free else 0.0
         return travel > self.travel.longest or not self.body.tissue.smallest_J(mixed.u) > SMALLEST_J
 
     def _grown(self, old: State, state: State, target: Target, balance: Balance, after: State) -> State:
-        """The next iterate, where candidates follow the contact: nodes that have sunk in on the way join
-        them, and where they are many, the way is gone again with them.
-        """
+        """The next iterate; nodes that sank in become candidates, many of them start the way again."""
         if not self.interface.follows:
             return after
         for _ in range(GROWING):
@@ -327,9 +315,7 @@ class FactorisedBody:
         return fraction
 
     def verge(self, state: State, target: Target) -> Verge | None:
-        """Which force takes the equilibrium `state` its stability on the way to `target`: there, or
-        where the way leads to, for the curvature of a profile may jump. None in three dimensions.
-        """
+        """Which force takes `state` its stability on the way to `target`; None in three dimensions."""
         if state.bone.size == 3:
             return None
         ahead = self.begin(state, target, frozen=False, start=state)

@@ -100,9 +100,7 @@ AT_REST: Floats = np.zeros(3)
 
 @dataclass(frozen=True)
 class Grip:
-    """A hand in one step: the drive's x at its end, its seconds, and before it x of drive and bone
-    (mm) and the bone's velocity (mm/s).
-    """
+    """A hand in one step: drive's x at its end, seconds; before: x of drive, bone (mm), velocity (mm/s)."""
 
     hand: Hand
     drive: float = 0.0
@@ -151,9 +149,7 @@ class Grip:
         return float(self.force(x) - reaction[0])
 
     def unbalanced(self, x: float, reaction: Floats) -> float:
-        """The force that is `missing` beyond rounding, not negative: in a short time a hand with a
-        mass is stiff. Each of the four places has a rounding of its own, half an epsilon.
-        """
+        """The force `missing` beyond rounding, not negative: each of the four places rounds by itself."""
         largest = max(abs(place) for place in (x, self.drive, *self.before[:2]))
         rounding = 2.0 * float(np.finfo(float).eps) * self.stiffness * largest
         return max(abs(self.missing(x, reaction)) - rounding, 0.0)

@@ -38,13 +38,12 @@ from evfem.surface.skin import Skin
 class Pins:
     """Nodes that a jump of friction holds back during one step; `x` (P,) is nan for free nodes.
 
-    A node slides up to a jump to higher friction and stays there, its shear force growing from the
-    lower to the higher limit, before it slides on. Taken at the node's own x the coefficient then
-    has no consistent value on either side: the iterations put the node before the jump, behind it,
-    before it again. Such a node is pinned to the jump, a hair inside the rougher side, where it
-    sticks with the higher coefficient. It is released when its shear force falls below the lower
-    limit. A node that began the step on the rougher side is not held: it leaves it and slides on, or
-    it stays there.
+    A node slides up to a jump to higher friction and stays there, its shear force growing from the lower to
+    the higher limit, before it slides on. Taken at the node's own x the coefficient then has no consistent
+    value on either side: the iterations put the node before the jump, behind it, before it again. Such a node
+    is pinned to the jump, a hair inside the rougher side, where it sticks with the higher coefficient. It is
+    released when its shear force falls below the lower limit. A node that began the step on the rougher side
+    is not held: it leaves it and slides on, or it stays there.
     """
 
     def __init__(self, jumps: Floats, size: int) -> None:
@@ -83,9 +82,7 @@ class Pins:
         self._side = side
 
     def release(self, limit: Floats, shear: Floats, weak: float) -> bool:
-        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were
-        any.
-        """
+        """Let go of nodes whose shear force is below the lower `limit` (P,); says whether there were any."""
         return self.let_go(self.held & (np.abs(shear) < limit - weak))
 
     def let_go(self, loose: Any) -> bool:
@@ -153,9 +150,7 @@ class Interface:
         return self.points + u[self.pad.nodes]
 
     def surface_at(self, state: State) -> SurfaceState:
-        """The surface below the pad nodes; that of the last two states is kept, for the balance, the
-        contact problem, the acceptance and the ledger all ask for it.
-        """
+        """The surface below the pad nodes, kept for the last two states, which many ask for."""
         for u, found in self._seen:
             if u is state.u:
                 return found
@@ -164,9 +159,7 @@ class Interface:
         return found
 
     def resting(self, state: State) -> Floats:
-        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface:
-        below a thin insulator the rounding of their gaps would be a force.
-        """
+        """Current positions of the pad nodes (P, dim), the touching ones exactly on the surface."""
         position = self.positions(state.u)
         touching = state.status != OPEN
         position[touching, 1] -= self.surface_at(state).gap[touching]
@@ -253,9 +246,7 @@ class Interface:
         return seen if found is None else replace(seen, withheld=found[0][nodes], left=found[1][nodes])
 
     def withheld(self, state: State) -> Floats:
-        """What a core of the attraction withholds of the pull on the closed pad nodes, and of what presses
-        them (P,) in N/mm.
-        """
+        """What a core of the attraction withholds of pull and pressing force of closed nodes (P,), N/mm."""
         found = self.restored(state.voltage)
         if found is None:
             return np.zeros(len(self.points))
@@ -264,9 +255,7 @@ class Interface:
         return np.where(state.touching, with_core(pressure, *found) * share, 0.0)
 
     def lengths(self, position: Floats) -> Floats:
-        """What of the pad its nodes at positions (P, dim) stand for (P,): lengths in the plane, mm, areas in
-        three dimensions, mm2; nowhere quite nothing.
-        """
+        """What the pad's nodes at positions (P, dim) stand for (P,): mm, in space mm2; never quite 0."""
         least = (SHORTEST_LENGTH * self.length) ** (self.dim - 1)
         return np.maximum(self.pad.tributary(position), least)
 
@@ -275,9 +264,7 @@ class Interface:
         return self.lengths(self.positions(state.u))
 
     def shares_at(self, part: tuple[State, State], x: Floats) -> Floats:
-        """The same where the nodes are at x (P,), on a part of a run between two states; in three
-        dimensions its mean over the part.
-        """
+        """The same at x (P,), on a part between two states; in space its mean over the part."""
         if self.dim == 2:
             return self.lengths(x[:, None])
         old, new = part
@@ -294,9 +281,7 @@ class Interface:
         return replace(state, age=self.age(old))
 
     def resistance(self, part: tuple[State, State], x: Floats, normal: Floats, slip: Floats) -> Floats:
-        """Largest shear forces of the pad nodes (P,) at x (P,) under contact forces (P,), on a part of a
-        run between two states in which they slip by (P,).
-        """
+        """Largest shear forces of the pad nodes (P,) at x under contact forces (P,), slipping by (P,)."""
         old, new = part
         mu = self.friction(old, np.arange(x.size), x)
         if self.law is None:
@@ -305,9 +290,7 @@ class Interface:
         return replace(seen, normal=normal, length=self.shares_at(part, x)).bound(self.law)
 
     def _origin(self, old: State) -> Floats:
-        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds
-        a node.
-        """
+        """Where slip is counted from (P,): the last accepted x, or the jump of friction that holds a node."""
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
@@ -334,9 +317,7 @@ class Interface:
         return float(gap[sunk].max()) if sunk.any() else None
 
     def _strayed(self, old: State, state: State, x: Floats) -> Any:
-        """Pinned nodes (P,) that have slipped away to where the coefficient is another one, or whose
-        interface has yielded to where it does not hold them.
-        """
+        """Pinned nodes (P,) that slipped to another coefficient, or whose interface no longer holds them."""
         nodes = np.arange(x.size)
         pinned = self.friction(old, nodes, np.where(self.pins.held, self.pins.x, x))
         here, slips = self.friction(old, nodes, x), state.status >= FORWARD
@@ -386,16 +367,12 @@ class Interface:
 
 
 class PenaltyInterface(Interface):
-    """An interface that yields: 1 / (penalty x tributary length) of compliance per node;
-    `penalties` in N/mm3 along normal and tangent.
-    """
+    """An interface that yields by 1 / (penalty x tributary length) per node; N/mm3, normal and tangent."""
 
     penalties: tuple[float, float] = (np.inf, np.inf)
 
     def compliance(self, old: State) -> Floats:
-        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last
-        step.
-        """
+        """Compliance (P, 2) along normal and tangent in mm per N/mm, from the lengths at the last step."""
         return 1.0 / np.outer(self.shares(old), self.penalties)
 
 

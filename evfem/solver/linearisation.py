@@ -73,9 +73,7 @@ def steadied(gain: Floats) -> Floats:
 
 
 class Linearisation:
-    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in
-    them.
-    """
+    """Candidates, factorisation and condensed tangent of a body, and the attraction's part in them."""
 
     def __init__(
         self,
@@ -114,9 +112,7 @@ class Linearisation:
             self.fringes, self._made_at = False, None
 
     def start_clock(self, old: State, duration: float) -> None:
-        """Start the clock of a step; a factorisation made for a much longer or shorter one is of
-        no use.
-        """
+        """Start the clock of a step; a factorisation made for a much longer or shorter one is of no use."""
         dynamics = self.body.dynamics
         self._outdated |= self.body.drag_rate != self._drag_rate
         if dynamics is None:
@@ -128,9 +124,7 @@ class Linearisation:
         dynamics.begin(old.u, old.velocity, duration)
 
     def choose_candidates(self, state: State, reach: float) -> None:
-        """Make every free pad node with a gap below `reach` (mm) a contact candidate, generously
-        if the present set does not do, and at once those that the scene's deepest press may reach.
-        """
+        """Make nodes with a gap below `reach` (mm) candidates, and those that the deepest press reaches."""
         position = self.interface.positions(state.u)
         gap = np.where(self.pad.free, self.interface.surface_at(state).gap, np.inf)
         weakening = self.negative_stiffness(state)
@@ -150,9 +144,7 @@ class Linearisation:
         self.factor = None
 
     def _follow(self, state: State, gap: Floats, steep: Any) -> None:
-        """Let the candidates follow the contact: what touches, has sunk in or is strongly attracted,
-        and half as many others with the smallest gaps (P,). What has left is let go, once in a step.
-        """
+        """Let the candidates follow the contact, and half as many others; what left is let go once a step."""
         needed = self.pad.free & ((gap <= 0.0) | (state.status != OPEN) | steep)
         if self.candidates.size and needed[self.candidates].sum() == needed.sum():
             return
@@ -169,9 +161,7 @@ class Linearisation:
         self.factor = None
 
     def refactorise_if_needed(self, state: State, history: list[float]) -> bool:
-        """Factorise at the present state where there is no factorisation, the old one stalls, or a
-        new one saves iterations; says whether it did.
-        """
+        """Factorise if there is no factorisation, it stalls, or a new one saves; says whether it did."""
         same, self._status = np.array_equal(self._status, state.status), state.status
         if self._has_fringes(state) and in_vain(history, same):
             self._outdated |= not self.fringes
@@ -217,9 +207,7 @@ class Linearisation:
         self.record.factorisations += 1
 
     def _weaken(self, upper: Floats, state: State) -> None:
-        """Subtract the negative attraction stiffness of open nodes that are no candidates, limited so
-        that the matrix stays positive definite: a body bears more than its shear modulus over its height.
-        """
+        """Take the attraction's stiffness of other open nodes off the matrix, kept positive definite."""
         most = HELD * self.softest * self.pad.tributary(self.interface.positions(state.u))
         weakening = np.minimum(self.negative_stiffness(state), most)
         weakening[self.candidates] = 0.0
@@ -233,9 +221,7 @@ class Linearisation:
 
     @property
     def reusable(self) -> TangentPoint | None:
-        """Where the factorisation was made that the next step may use, if there is one: that of the
-        field's own stiffness serves one step alone.
-        """
+        """Where the factorisation that the next step may use was made; the field's own serves one step."""
         return None if self.factor is None or self.fringes else self._made_at
 
     def restore(self, state: State, at: TangentPoint) -> None:

@@ -27,9 +27,7 @@ from evfem.tissue.weakform import Tissue
 
 @dataclass(frozen=True, eq=False)
 class Pressure:
-    """The tissue's pressure as an unknown beside the displacements, if it is nearly incompressible
-    and not without (0, 0) values.
-    """
+    """The pressure as an unknown beside u, if nearly incompressible and not without (0, 0) values."""
 
     tissue: Tissue
     linearisation: Linearisation
@@ -54,9 +52,7 @@ class Pressure:
         return self.tissue.pressure(state.u) - state.pressure if self.active else NO_PRESSURE
 
     def further_forces(self, state: State, misfit: Floats) -> Floats | None:
-        """Nodal forces (N, 2) of the misfit along the older tangent's volume less those along the
-        present one; None where both are the same.
-        """
+        """Forces (N, 2) of the misfit along the older tangent's volume less the present one's, or None."""
         at = self.linearisation.reusable
         if not self.active or at is None or at.u is state.u:
             return None

@@ -66,18 +66,14 @@ LIFTED = (
 
 @dataclass
 class Relaxation:
-    """Releases `body`; `solve` finds the equilibrium at a target from a state, drag included; `charged`
-    where charge flows.
-    """
+    """Releases `body`; `solve` finds an equilibrium with drag from a state; `charged`: charge flows."""
 
     body: Body
     solve: Callable[[State, Target], State]
     charged: bool = False
 
     def applies(self, target: Target) -> bool:
-        """Whether the tissue takes no time on its way to `target`, so that nothing but an equilibrium is
-        asked for.
-        """
+        """Whether the tissue takes no time on its way to `target`: only an equilibrium is asked for."""
         return target.duration == 0.0 or self.body.dynamics is None
 
     def follow(self, state: State, target: Target, accept: Callable[[State, State], object]) -> State:
@@ -123,9 +119,7 @@ class Relaxation:
         return target if timed else replace(target, duration=0.0)
 
     def _dragged(self, state: State, target: Target, begin: Floats, pace: Pace) -> State | None:
-        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and a slower pace, where
-        it failed.
-        """
+        """The equilibrium with drag that holds the body at `begin` (N, dim); None, and slower, if failed."""
         self.body.release(begin, pace.rate)
         try:
             return self.solve(state, target)
@@ -139,9 +133,7 @@ class Relaxation:
 
     @property
     def _imperfection(self) -> Floats:
-        """A shear (N, dim) by `IMPERFECTION` along x that leaves the top where it is, larger on the right, so
-        that it has a part of symmetric motions and of antisymmetric ones.
-        """
+        """A shear (N, dim) by `IMPERFECTION` along x, fixed on top, larger on the right: without symmetry."""
         points = self.body.space.mesh.points
         height, shear = float(np.ptp(points[:, 1])), np.zeros_like(points)
         depth = (points[:, 1].max() - points[:, 1]) / height

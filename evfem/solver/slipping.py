@@ -75,9 +75,7 @@ class Returned:
         self._change[c] = np.nan_to_num(change)
 
     def slopes(self, c: Ints, slip: Floats, tangent: Floats, chord: Floats) -> Floats:
-        """With which of these slopes (k,) by the speed the friction of the nodes c (k,) grows, at an
-        iterate with slips (k,), 0 where they stick.
-        """
+        """With which slopes (k,) friction of nodes c (k,) grows, at slips (k,); 0 where they stick."""
         near = np.abs(slip - self._slip[c]) < NEAR * np.abs(slip)
         steepest = np.maximum(np.maximum(chord, tangent), self._slope[c])
         slope = np.where(self.nodes[c] & ~near, steepest, tangent)
@@ -88,9 +86,7 @@ class Returned:
 
 
 def speed_under(law: FrictionLaw, seen: Slipping, force: Floats, fastest: Floats) -> Floats:
-    """Speeds (k,) in mm/s, up to `fastest` (k,), at which the friction of nodes is `force` (k,) in N/mm,
-    by bisection; 0 where rest bears it or no such speed does.
-    """
+    """Speeds (k,) in mm/s, up to `fastest` (k,), of friction `force` (k,) in N/mm, by bisection; else 0."""
     low, high = np.zeros_like(force), np.array(fastest)
     within = (replace(seen, speed=low).bound(law) < force) & (replace(seen, speed=high).bound(law) >= force)
     for _ in range(HALVINGS if within.any() else 0):

@@ -80,10 +80,9 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class TangentPoint:
-    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,)
-    when the step began, whether the attraction was frozen, the time step's displacements at its
-    beginning (N, dim) and its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if
-    that is an unknown.
+    """Where a tangent was taken: displacements u (N, dim), voltage, which pad nodes touched (P,) when the
+    step began, whether the attraction was frozen, the time step's displacements at its beginning (N, dim) and
+    its seconds, the pad nodes' statuses (P,), and the pressure (E, Q) if that is an unknown.
     """
 
     u: Floats
@@ -98,9 +97,7 @@ class TangentPoint:
 
 @dataclass(frozen=True, eq=False)
 class Reusable:
-    """What a solver takes with it from step to step: the contact candidates (numbers of pad
-    nodes), where its factorisation was made if it has one, and the seconds of the last time step.
-    """
+    """What a solver takes from step to step: candidates, where it factorised, the last step's seconds."""
 
     candidates: Ints
     tangent_point: TangentPoint | None
@@ -119,9 +116,7 @@ class Limits:
 
 @dataclass
 class Record:
-    """Work done: iterations, factorisations and dense contact solves, counted since the start; and
-    the residuals of the last step.
-    """
+    """Work done since the start: iterations, factorisations, dense solves; residuals of the last step."""
 
     iterations: int = 0
     factorisations: int = 0

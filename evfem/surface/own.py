@@ -48,9 +48,7 @@ def completed(surface: Surface) -> CompleteSurface:
 
 @dataclass(frozen=True)
 class OwnSurface:
-    """A user's surface `own` with derivatives, and with what it does not say itself taken from
-    `plain`.
-    """
+    """A user's surface `own` with derivatives, and with what it does not say itself taken from `plain`."""
 
     own: Any
     plain: Flat

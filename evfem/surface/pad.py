@@ -22,8 +22,7 @@ from evfem.mesh.mesh import Mesh
 
 
 def outline_nodes(mesh: Mesh) -> Ints:
-    """Mesh numbers (P,) of the nodes on `pad` along the outline, in growing x on the side that
-    faces down.
+    """Mesh numbers (P,) of the nodes on `pad` along the outline, in growing x on the side that faces down.
 
     On quadratic meshes ends and middles of edges alternate. Raises InputError where the pad is not
     one open line.
@@ -59,8 +58,7 @@ class Pad:
     """Pad nodes of a mesh, their edges as indices into them, and which of them may touch (those
     not on the bone).
 
-    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free`
-    (P,) bool.
+    `nodes` (P,) mesh numbers; `edges` (K, 2|3) indices into `nodes`: start, end[, middle]; `free` (P,) bool.
     """
 
     nodes: Ints
@@ -92,9 +90,7 @@ class Pad:
         return fold(position, self.segments, touching, down)
 
     def length(self, x: Floats) -> Floats:
-        """Tributary length of every node projected on x, where the outline faces down, in mm: (...,
-        P) for x (..., P).
-        """
+        """Tributary length on x where the outline faces down, in mm: (..., P) for x (..., P)."""
         rows = x.reshape(-1, x.shape[-1])
         width = np.maximum(rows[:, self.edges[:, 1]] - rows[:, self.edges[:, 0]], 0.0)
         shared = width[:, :, None] * self.shares
@@ -112,9 +108,7 @@ class Pad:
         return of, 2 * moved, value
 
     def length_gradient(self, x: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node,
-        value).
-        """
+        """Derivative of the tributary lengths with respect to x, as triplets (node, moved node, value)."""
         start, end = self.edges[:, :1], self.edges[:, 1:2]
         facing = (x[end] > x[start]) * self.shares
         of = np.broadcast_to(self.edges, facing.shape).ravel()
@@ -248,9 +242,7 @@ def make_pad(mesh: Mesh) -> Pad:
 
 
 def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
-    """Pad nodes (P,), its edges or faces by their places among them, and which follow no bone (P,);
-    raises InputError where no outer side belongs to the pad.
-    """
+    """Pad nodes (P,), edges or faces among them, and who follow no bone (P,); InputError without a pad."""
     of, side = (mesh.edges_of, "edge") if mesh.dim == 2 else (mesh.faces_of, "face")
     sides = of("pad") if "pad" in mesh.node_sets else np.zeros((0, 2), dtype=np.int64)
     if not len(sides):
@@ -263,9 +255,7 @@ def sides_of_pad(mesh: Mesh) -> tuple[Ints, Ints, Any]:
 
 @dataclass(frozen=True)
 class SurfaceState:
-    """The surface below (or above) the pad nodes: vertical gap, gap along the normal, slope and
-    curvature, all (P,).
-    """
+    """The surface below (or above) the pad nodes: gap, normal gap, slope, curvature, all (P,)."""
 
     gap: Floats
     slope: Floats
@@ -287,9 +277,7 @@ class SurfaceState:
 
 
 def surface_state(surface: Any, position: Floats) -> SurfaceState:
-    """Surface frame at current node positions (P, dim); `surface` has y set, so that h(x) =
-    surface.y + surface.height(x).
-    """
+    """Surface frame at node positions (P, dim); h(x) = surface.y + surface.height(x)."""
     x = position[:, 0]
     if surface.is_flat:
         zero = np.zeros_like(x)

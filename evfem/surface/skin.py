@@ -57,9 +57,7 @@ class Skin:
         return first, second
 
     def tributary(self, position: Floats) -> Floats:
-        """Tributary area of every node projected on the display, where the skin faces down, in
-        mm2: (..., P) for positions (..., P, 3).
-        """
+        """Tributary area on the display where the skin faces down, mm2: (..., P) for (..., P, 3)."""
         first, second = self._ways(position)
         area = np.maximum(first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0], 0.0)
         shared = np.einsum("...kg,gm->...km", area, self._gauss[0])
@@ -69,9 +67,7 @@ class Skin:
         return np.asarray(found.reshape(position.shape[:-1]))
 
     def tributary_gradient(self, position: Floats) -> tuple[Ints, Ints, Floats]:
-        """Derivative of the tributary areas, as triplets (node, moved unknown, value); unknown 3 j
-        + a is component a of node j.
-        """
+        """Derivative of the tributary areas as triplets (node, moved unknown 3 j + a, value)."""
         first, second = self._ways(position)
         facing = first[..., 0] * second[..., 1] > first[..., 1] * second[..., 0]
         value, slope = self._gauss
@@ -109,9 +105,7 @@ class Skin:
         return np.stack([first, about, opposite])[:, found]
 
     def spacing_at(self, position: Floats) -> Floats:
-        """How far the nodes are from their neighbours (P,) in mm, projected on the display: the shorter
-        way of the two, which crosses the ridges of a pad.
-        """
+        """Distance of nodes from their neighbours (P,) in mm on the display: the shorter of the two ways."""
         before, node, after = self._rows
         flat, found = position[:, [0, 2]], np.full(self.nodes.size, self.spacing(position))
         np.minimum.at(found, node, 0.5 * np.linalg.norm(flat[after] - flat[before], axis=1))

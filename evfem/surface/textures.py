@@ -100,9 +100,7 @@ class Grating(RigidSurface):
         set_frozen(self, groove_width=groove, wall_width=wall)
 
     def _wall(self, x: Array) -> tuple[Array, Array, Array]:
-        """Place s (...) on the wall, 0 on ridges and 1 in grooves, whether it is on a wall, and
-        the sign (...) of ds/dx.
-        """
+        """Place s (...) on the wall, 0 on ridges, 1 in grooves; whether on a wall; sign (...) of ds/dx."""
         assert self.groove_width is not None
         assert self.wall_width is not None
         from_ridge = x - self.period * (np.round(np.real(x) / self.period - self.phase) + self.phase)

@@ -1,11 +1,10 @@
 """What a sweep leaves on disk: a file per point, one table of all, and how they came about.
 
-A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on,
-or one changed in other points, finds it again. Every file is written whole or not at all. The
-table is `sweep.csv` (and `sweep.parquet` where pyarrow is installed), a row per point;
-`sweep.json` has the provenance, from the start, so that the folder can tell which sweep was its
-last. Only files that a sweep wrote are ever replaced or removed: `.evfem-sweep` lists their names
-(`Listed`), a point's file says so itself.
+A point's file is named by the fingerprint of its scene, outputs and version: a sweep that goes on, or one
+changed in other points, finds it again. Every file is written whole or not at all. The table is `sweep.csv`
+(and `sweep.parquet` where pyarrow is installed), a row per point; `sweep.json` has the provenance, from the
+start, so that the folder can tell which sweep was its last. Only files that a sweep wrote are ever replaced
+or removed: `.evfem-sweep` lists their names (`Listed`), a point's file says so itself.
 """
 
 from __future__ import annotations
@@ -39,10 +38,7 @@ STATUS = ("done", "refused", "not_converged", "failed")
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a point: `status` done, refused (by the scene reader), not_converged or
-    failed, the outputs of a point that is done, and its message: why it is not, or what its result
-    warns of.
-    """
+    """What became of a point: done, refused, not_converged or failed, its outputs and its message."""
 
     status: str
     seconds: float
@@ -51,17 +47,13 @@ class Answer:
 
     @property
     def final(self) -> bool:
-        """Whether computing it again would give the same: not so where a process died or the
-        memory ended.
-        """
+        """Whether computing it again would give the same: not so where a process died or the memory ended."""
         return self.status != "failed"
 
 
 @dataclass(frozen=True)
 class SweepFolder:
-    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all
-    points.
-    """
+    """A folder of a sweep. `resume` keeps the points of another one in it, `overwrite` removes all points."""
 
     path: Path
     resume: bool = False

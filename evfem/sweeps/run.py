@@ -1,6 +1,4 @@
-"""Run a sweep: many scenes side by side, each recorded as soon as it is finished, in one table at
-the end.
-"""
+"""Run a sweep: many scenes side by side, each recorded as soon as it is finished, in one table at the end."""
 
 from __future__ import annotations
 
@@ -90,9 +88,7 @@ Job = tuple[str, str, tuple[str, ...]]  # scene as text, folder of its paths, ou
 
 @dataclass(frozen=True, eq=False)
 class SweepResult:
-    """The table of a sweep: `rows` in the order of the points, with the keys `columns`, and
-    provenance. `units` has those of the outputs: over the depth where the scenes have one.
-    """
+    """The table of a sweep: `rows` in the order of the points, keys `columns`, and provenance."""
 
     columns: tuple[str, ...]
     rows: list[dict[str, Any]]
@@ -133,18 +129,16 @@ def sweep(
     scheduler: str | None = None,
     progress: bool = False,
 ) -> SweepResult:
-    """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of
-    all.
+    """Run every point of a sweep (`Sweep`, or the path of a sweep file) and return the table of all.
 
-    The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and
-    a file per point; what is finished there is not computed again. A folder with points of another
-    sweep is refused, unless `resume` says to keep them or `overwrite` to remove all points.
-    `workers` processes (None: one per core; 1: none but this one) or the Dask cluster at the
-    address `scheduler` ("local" starts one) do the work; the numbers are the same. A point that
-    the scene reader refuses, that does not converge or that fails otherwise is a row with its
-    status and message; the message of one that is done is what its result warns of. Raises
-    InputError if no point at all is a valid scene, StorageError when the disk refuses or another
-    sweep is at work in the folder.
+    The folder `out` gets `sweep.csv`, `sweep.parquet` where pyarrow is installed, `sweep.json` and a file per
+    point; what is finished there is not computed again. A folder with points of another sweep is refused,
+    unless `resume` says to keep them or `overwrite` to remove all points. `workers` processes (None: one per
+    core; 1: none but this one) or the Dask cluster at the address `scheduler` ("local" starts one) do the
+    work; the numbers are the same. A point that the scene reader refuses, that does not converge or that
+    fails otherwise is a row with its status and message; the message of one that is done is what its result
+    warns of. Raises InputError if no point at all is a valid scene, StorageError when the disk refuses or
+    another sweep is at work in the folder.
 
     >>> from evfem.sweeps.file import loads as read
     >>> text = '''
@@ -333,9 +327,7 @@ def answered(text: str, folder: str, ask: Callable[[Result], dict[str, float | N
 
 
 def output(result: Result, name: str) -> float | None:
-    """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no
-    number.
-    """
+    """COLUMN.STATISTIC of a result, or COLUMN.STATISTIC.N over its motion N; None where it is no number."""
     column, statistic, *motion = name.split(".")
     values = np.asarray(getattr(result, column), dtype=float)
     if motion:

@@ -65,10 +65,9 @@ def header_of(path: Path) -> list[str]:
 class Image(Heights, kind="image"):
     """A line through a grey image, along its width: white lies `depth` above black.
 
-    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest
-    value are then black and white (`evfem.common.pictures`); colours are turned to grey, transparent
-    points are gaps. How deep something is cannot be read off a picture, and the provenance says that
-    `depth` was set.
+    Pictures of 8 and 16 bits, and those of floats and longer integers, whose smallest and largest value are
+    then black and white (`evfem.common.pictures`); colours are turned to grey, transparent points are gaps.
+    How deep something is cannot be read off a picture, and the provenance says that `depth` was set.
     """
 
     pixel: Annotated[float, number("a width above zero", POSITIVE, "mm"), "width of a pixel of an image"]

@@ -1,9 +1,8 @@
 """The deformable finger as one system: which unknowns it has, its internal forces and its tangent.
 
-The bone is rigid and translates, so all its nodes share dim unknowns and the reduced unknowns are
-(free nodes' displacements, bone x, y[, z]); forces of the bone's nodes add up to the reaction.
-User forms (`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the
-internal forces.
+The bone is rigid and translates, so all its nodes share dim unknowns and the reduced unknowns are (free
+nodes' displacements, bone x, y[, z]); forces of the bone's nodes add up to the reaction. User forms
+(`evfem.tissue.forms`) and time (`evfem.tissue.dynamics`) are further terms of the internal forces.
 """
 
 from __future__ import annotations
@@ -151,9 +150,7 @@ class Body:
 
 
 def translated(u: Floats, way: Floats) -> Floats:
-    """Displacements (N, dim) and a translation (dim,) of all, axis by axis: numpy takes five times as
-    long over rows of two numbers.
-    """
+    """u (N, dim) plus a translation (dim,), axis by axis: five times as fast as over short rows."""
     moved = np.empty_like(u)
     for axis, share in enumerate(way):
         np.add(u[:, axis], share, out=moved[:, axis])

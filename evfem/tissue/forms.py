@@ -1,9 +1,8 @@
 r"""Weak forms: how one is written, and those that the package itself is about.
 
-A form is a function f(u, v, w) of the displacement u, the test function v and the context w. It
-returns the integrand of a residual, linear in v, over the reference configuration; arrays have
-tensor axes first, then those of the points. Its nodal forces and their tangent come from
-`evfem.tissue.assembly`.
+A form is a function f(u, v, w) of the displacement u, the test function v and the context w. It returns the
+integrand of a residual, linear in v, over the reference configuration; arrays have tensor axes first, then
+those of the points. Its nodal forces and their tangent come from `evfem.tissue.assembly`.
 
 As f is linear in v, its values at unit test functions are its fluxes s = df/d(v, grad v, theta(v)). The parts
 of one point are stacked in the order (r, i): r = 0 for the value, then one r for each direction X_r of the
@@ -30,9 +29,7 @@ Integrand = Callable[[Any, Any, Any], Any]
 
 
 class Field(np.ndarray[Any, Any]):
-    """What a form sees as u or v: the value (dim, ...) with `grad` (dim, dim, ...) and `theta`
-    (...).
-    """
+    """What a form sees as u or v: the value (dim, ...) with `grad` (dim, dim, ...) and `theta` (...)."""
 
     _grad: Array | None = None
     _theta: Array | None = None
@@ -102,10 +99,7 @@ def fluxes(form: Integrand, parts: Parts, x: Array, w: Any) -> Array:
 
 
 def fluxes_at_once(form: Integrand, parts: Parts, x: Array, w: Any) -> Array:
-    """The same for all test functions in one call, which have an axis of their own before (C, Q):
-    forms of arrays with any number of trailing axes can do it, and share what does not depend on
-    v.
-    """
+    """The same for all test functions in one call, on an axis before (C, Q), sharing what has no v."""
     units = np.eye(len(x))[:, :, None, None]
     value = form(parts.field(x[:, None]), parts.field(units), w)
     return np.broadcast_to(np.asarray(value), x.shape)
@@ -128,8 +122,7 @@ class Form:
 
 
 def form(function: WeakForm) -> Form:
-    """Mark `function(u, v, w)` as a weak form: the residual's integrand; its tangent comes by
-    complex step.
+    """Mark `function(u, v, w)` as a weak form: the residual's integrand; its tangent comes by complex step.
 
     `u` and `v` are the displacement (mm) and its test function with gradient, over a region also
     with the element's volume measure `theta`; `w` carries the coordinates; the integral is taken
@@ -165,9 +158,7 @@ def green_strain(F: Array) -> Array:
 
 @form
 def neo_hookean(u: Any, v: Any, w: Any) -> Any:
-    """mu F : grad v + (lambda theta - mu) dtheta(v); theta = Pi ln J is the element's volume
-    measure.
-    """
+    """mu F : grad v + (lambda theta - mu) dtheta(v); theta = Pi ln J is the element's volume measure."""
     F = deformation_gradient(u)
     return w.mu * ddot(F, grad(v)) + (w.lmbda * u.theta - w.mu) * v.theta
 
@@ -181,9 +172,7 @@ def hyperelastic(u: Any, v: Any, w: Any) -> Any:
 
 @form
 def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
-    """F S : grad v with S = 2 eta (E - E_0) / dt, over one step of backward Euler that began with
-    E_0.
-    """
+    """F S : grad v with S = 2 eta (E - E_0) / dt, over one step of backward Euler that began with E_0."""
     F = deformation_gradient(u)
     S = 2.0 * w.eta / w.step * (green_strain(F) - w.strain0)
     return ddot(mul(F, S), grad(v))
@@ -191,7 +180,5 @@ def kelvin_voigt(u: Any, v: Any, w: Any) -> Any:
 
 @form
 def mass(u: Any, v: Any, w: Any) -> Any:
-    """rho u . v: its tangent is the consistent mass matrix M, inertia is M (u - u_0 - dt v_0) /
-    dt^2.
-    """
+    """rho u . v: its tangent is the consistent mass matrix M, inertia is M (u - u_0 - dt v_0) / dt^2."""
     return w.density * dot(u, v)

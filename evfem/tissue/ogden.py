@@ -47,9 +47,7 @@ def bulk_modulus(mu: float, nu: float | None, bulk: float | None) -> float:
 
 @dataclass(frozen=True)
 class Isotropic(Checked):
-    """Parameters of the laws that are given by Young's modulus and Poisson's ratio at small
-    strain.
-    """
+    """Parameters of the laws that are given by Young's modulus and Poisson's ratio at small strain."""
 
     E: Young
     nu: Poisson
@@ -177,9 +175,7 @@ class Ogden:
         return self._stress(F, theta, 3.0 - len(F))
 
     def split_tangent(self, F: Array, theta: Array) -> tuple[Array, Array, Array]:
-        """Second derivatives of W at real F and theta: A (d, d, d, d, ...), c (d, d, ...), k
-        (...).
-        """
+        """Second derivatives of W at real F and theta: A (d, d, d, d, ...), c (d, d, ...), k (...)."""
         return stepped_tangent(self.split_stress, F, theta)
 
     def split_sigma_zz(self, F: Array, theta: Array) -> Array:

@@ -87,9 +87,7 @@ def scikit_mesh(mesh: Mesh) -> Any:
 
 
 def straight_points(mesh: Mesh) -> Floats:
-    """Where the nodes would be if every edge were straight, (N, dim); tells nodes apart whatever
-    the curvature.
-    """
+    """Where the nodes would be if every edge were straight, (N, dim): tells them apart when curved."""
     points = mesh.points.copy()
     if mesh.order == 2 and mesh.corners == 8:
         corner = mesh.points[mesh.cells[:, :8]]
@@ -130,9 +128,7 @@ def nodes_at(points: Floats, places: Floats) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Gradients:
-    """Shape gradients at some points of every cell: in the reference cell, `reference` (Q, n, dim),
-    and `inverse` (E, Q, dim, dim) = d xi / dX of the map to the mesh.
-    """
+    """Shape gradients at points of cells: `reference` (Q, n, dim), `inverse` (E, Q, dim, dim) = d xi / dX."""
 
     reference: Floats
     inverse: Floats
@@ -319,9 +315,7 @@ def shape_gradients(basis: Any) -> Floats:
 
 
 def check_orientation(mesh: Mesh, determinant: Floats) -> None:
-    """Refuse inverted cells by the sign of det dX/dxi (E, Q): scikit-fem takes its absolute value,
-    so they would pass silently.
-    """
+    """Refuse inverted cells by the sign of det dX/dxi (E, Q), of which scikit-fem takes the size."""
     sign = np.sign(determinant)
     bad = np.flatnonzero((sign * np.median(sign, axis=1, keepdims=True) <= 0).any(axis=1))
     if bad.size:
