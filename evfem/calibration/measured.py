@@ -232,12 +232,11 @@ Measured = MeasuredCurve | MeasuredValues
 
 
 def along(result: Result, column: str, over: str, at: Floats, motion: int | None = None) -> Floats:
-    """Values of a column of the history where the column `over` is `at` (N,), in a motion or in all.
+    """Values of a column where the column `over` is `at` (N,), in a motion or in all.
 
-    The state before the motion is the last one of the motion before; before the first motion, if
-    that is a press without voltage, it is zero. A solved column is known to `SOLVED` tolerances of
-    the solver: a place that much beyond its end is at the end, and less is no advance. Raises
-    InputError where `over` turns round, and for places beyond it.
+    Before the motion is the last state of the one before; before a first press without voltage it is zero.
+    Columns are known to `SOLVED` tolerances: a place that little beyond the end is at it. Raises InputError
+    where `over` turns round, and beyond it.
     """
     from scipy.interpolate import PchipInterpolator
 

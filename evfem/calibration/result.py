@@ -73,10 +73,8 @@ class FitResult:
         return loads(tomli_w.dumps(self.tables), self.paths, str(self.provenance.get("fit", "fit")))
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Lowest and highest value of each parameter with that confidence (0 to 1), by Student's
-        distribution.
-
-        What they assume stands in `evfem.calibration.confidence`.
+        """Ends of each parameter's interval with that confidence (0 to 1) by Student's distribution
+        (`confidence`).
         """
         from scipy.stats import t
 

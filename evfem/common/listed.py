@@ -13,14 +13,12 @@ from evfem.errors import StorageError
 
 
 class Listed:
-    """The names of the files that evfem wrote in a folder, and the list of them there; a line that
-    is no name of the pattern `ours` counts for nothing.
+    """The names of the files that evfem wrote in a folder, those of the pattern `ours`, and the list of them
+    there.
 
-    A name comes into the list with the first writing of its file: without the end of its line
-    before the file takes its place, with it after. Where a kill left a line open, the file is
-    evfem's unless what was to become it is still there under its temporary name. What is removed
-    goes under a temporary name first, too. So a file of somebody else is never taken for evfem's,
-    and none of evfem's for somebody else's, whenever the kill came.
+    A name is listed before its file takes its place, and its line ended after: a file of an open line is
+    evfem's unless its temporary file is still there. What is removed goes under a temporary name first. So no
+    file is taken for somebody else's, whenever a kill came.
     """
 
     def __init__(self, manifest: Path, ours: re.Pattern[str]) -> None:

@@ -90,14 +90,7 @@ class _NoBar:
     def __exit__(self, *reason: object) -> None:
         return
 
-    def update(self, steps: int = 1) -> None:
-        """Steps are done."""
-
-    def set_postfix_str(self, text: str, refresh: bool = True) -> None:
-        """Something to say behind the bar."""
-
-    def close(self) -> None:
-        """No more to come."""
+    update = set_postfix_str = close = staticmethod(lambda *told, **how: None)
 
 
 def bar(total: int, unit: str, done: int = 0, wanted: bool = True) -> Any:

@@ -70,10 +70,8 @@ def _here(function: Callable[[Any], Any], tasks: Mapping[Any, Any]) -> Iterator[
 
 
 class Worker:
-    """A process that calls `function(line, *arguments)`, `line` being the other end of `self.line`.
-
-    It is a fresh interpreter with the BLAS on one thread, leaves Ctrl-C to the process that made
-    it, and ends with that one, however it went.
+    """A process that calls `function(line, *arguments)`, `line` being the other end of `self.line`: a fresh
+    interpreter with the BLAS on one thread, without Ctrl-C, that ends with the process that made it.
     """
 
     def __init__(self, function: Callable[..., None], *arguments: Any) -> None:
@@ -92,10 +90,8 @@ class Worker:
 
 
 def blas_limits(threads: int | None = 1) -> threadpool_limits:
-    """The limit of every BLAS to so many threads, from now on or of a block.
-
-    A limit holds for what is loaded, and scipy has another BLAS than numpy: one that comes later has
-    all cores, and its idle threads spin. MKL has its own limit, `Pardiso` sets it.
+    """The limit of every BLAS loaded by now, scipy's too, to so many threads, from now on or of a block; MKL
+    has its own limit, `Pardiso` sets it.
     """
     import scipy.linalg  # noqa: F401
 

@@ -1,12 +1,10 @@
 """Charges of the pad nodes under a voltage that is resolved in time: internal variables of the attraction.
 
 Each node is a stack of stratum corneum, gap and insulator (`evfem.electrostatics.relaxation`) on its
-tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them.
-A step goes in two parts: the pad moves with the charges and the voltage that it had, the charge of
-each node r A staying what it is while A changes; then, in its new place, charge flows for the
-seconds of the step while the voltage goes straight to its new value. So the charges at the end are
-a function of gap and voltage, the force law sees their effective voltage, and contact and Newton
-stay as they are. Nothing is committed before a step is accepted.
+tributary length A: M = 2 charges, and where dielectrics relax their polarisations with them. In a step first
+the pad moves with its charges and voltage, r A of each node staying what it is while A changes; then charge
+flows for the seconds of the step while the voltage goes straight to its new value. So the end's charges are a
+function of gap and voltage, and contact and Newton stay as they are.
 
 The balance of a step, each term from its own integral::
 
@@ -122,10 +120,8 @@ class Charging:
         return np.asarray(at.length * by_gap), np.broadcast_to(by_length, at.gap.shape)
 
     def energy_density(self, at: Charged) -> Floats:
-        """Energy of the field in skin, gap and insulator of every node (P,), N mm per mm^2.
-
-        It is also what the field would do as work, with given charges of the nodes and a given
-        voltage, per mm that a node's tributary length grows.
+        """Energy of the field at every node (P,), N mm per mm^2: also the field's work per mm of tributary
+        length.
         """
         return np.asarray(eps_0 * self.stack.energy(at.gap, at.voltage, at.charges))
 

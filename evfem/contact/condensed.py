@@ -50,17 +50,14 @@ LOST_STABILITY = "the body gives way the more, the more it is loaded"
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
-    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in three dimensions.
+    """What is known of the c candidate nodes at the iterate; d = 1 in the plane, 2 in space (forces there in
+    N).
 
-    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d)
-    along normal and tangents in N/mm (N in three dimensions), statuses (c,), friction coefficients (c,) and
-    their slopes over x (c,) in 1/mm. `interface_compliance` (c, 1 + d) in mm per N/mm along normal and
-    tangents: 0 for exact contact, 1 / (penalty x tributary length) for the penalty variant, which thereby
-    needs no other solver. A law of friction other than Coulomb's gives its derivative by the
-    contact force as the coefficient, and beside it `cohesion` (c,) in N/mm and how much friction
-    grows with the slip of the step, `slip_stiffness` (c,) in N/mm per mm. The attraction weakens
-    with a node's gap by `negative_stiffness` (c,) N/mm per mm and is stronger by `gain_on_closing`
-    (c,) N/mm where the gap is closed; `roughness` says how it depends on the contact force.
+    The `surface` below them, slips since the last accepted state (c, d) in mm, contact forces (c, 1 + d) in
+    N/mm, statuses (c,), friction coefficients (c,) and slopes over x (c,) in 1/mm. `interface_compliance` (c,
+    1 + d) in mm per N/mm: 0, or 1 / (penalty x tributary length). A law of friction gives its derivative by
+    the contact force as the coefficient, `cohesion` (c,) in N/mm, and the growth with the slip,
+    `slip_stiffness` (c,) in N/mm per mm. Attraction: see `AttractionStiffness`.
     """
 
     surface: SurfaceState
@@ -126,11 +123,9 @@ class Candidates:
     def friction_growth(self, own: Floats) -> Floats:
         """That part of it which is friction: change of the shear force per x displacement, (c, d).
 
-        `own` (c,) is the compliance of each node along x. Where friction falls along the way
-        faster than the tissue stiffens, a node snaps forward and has no equilibrium at the slope:
-        its friction is then left at the present coefficient, and the iterations go the way of the
-        snap. Friction that rises along the way holds, whatever the body alone would do: the own
-        compliance of a squeezed pad, which only its contact holds, is negative.
+        `own` (c,) is each node's compliance along x. Where friction falls faster than the tissue stiffens, a
+        node snaps forward: its friction stays at the present coefficient. Friction that rises along the way
+        holds in any case.
         """
         growth = self.shear_direction * (self.friction_slope * self.force[:, 0])[:, None]
         if self.slip_stiffness is not None:

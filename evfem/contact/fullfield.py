@@ -225,10 +225,9 @@ class FieldAttraction(Attraction):
     ) -> Floats:
         """Factor (P,) of the column law's derivatives: the squared share of the voltage below a node.
 
-        Between rough faces it is the ratio of the field's force on the node to the columns', at most 1:
-        on a summit, whose neighbours stand off, the field pulls less and also gains less as the faces
-        come closer. Without rough faces the forces are no measure of the derivatives: beside a node
-        that touches, the field may pull less than columns and yet weaken faster with the gap.
+        Between rough faces it is the ratio of the field's force to the columns', at most 1: on a summit the
+        field pulls less, and gains less. Without them a field may pull less and yet weaken faster with the
+        gap.
         """
         if self.roughness is None:
             return self.share(position[:, 0]) ** 2

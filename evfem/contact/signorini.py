@@ -25,12 +25,10 @@ for any positive r; taken is the inverse of the node's own compliance. Where the
 areas that follow the nodes, that may vanish or be negative: r is then bounded by what is usual among the
 nodes, and g = 0 to rounding stays a small p.
 
-The attraction of an open node weakens with its gap: a negative stiffness k_e. How much weaker it
-has become, its drop f, is one more unknown of the node, f = k_e (g - g_ref). A closed node needs
-none, its gap is known: the attraction is what it is at g = 0. So a thin insulator's steep law acts
-only where it can. Between rough faces it also grows with what presses the node (`Roughness`): a
-closed node moves the body with (1 - kappa) lam_n, and one that opens loses what its contact force
-gained. Tangent of a concave law, the first never falls below the second: one of the two holds.
+The attraction of an open node weakens with its gap, a negative stiffness k_e; its drop f = k_e (g - g_ref) is
+one more unknown of the node. A closed node needs none. Between rough faces attraction also grows with what
+presses the node (`Roughness`): a closed node moves the body with (1 - kappa) lam_n, an opening one loses what
+that gained.
 
 A bound of friction that is no multiple of the contact force (`evfem.surface.friction`) is linear
 here: mu lam_n + c, with `cohesion` c, takes the place of mu lam_n.

@@ -120,12 +120,9 @@ def solve_with_attraction(
 ) -> ContactSolution:
     """Contact of a pad whose open nodes are attracted, started from statuses (k,) and forces (m,).
 
-    If the attraction weakens with the gap faster than the tissue stiffens (the pad snaps), the
-    linear problem has no solution or the wrong one. Its negative stiffness is then scaled to
-    `STABLE` of the critical value, which goes the right way in small steps: of the body as its
-    closed nodes hold it, then as those hold it that do not keep changing, at last of the much softer
-    one without them. The law of friction is taken by its tangents first, then by its chords: the
-    tangent of one that levels off soon grows so fast that there may be no solution.
+    If the attraction weakens faster than the tissue stiffens, its negative stiffness is scaled to `STABLE` of
+    the critical value, right in small steps: of the body held by its closed nodes, then by those that do not
+    keep changing, at last by none. Friction is taken by its tangents first, then by its chords.
     """
     laws = (problem,) if problem.chords is None else (problem, problem.by_chords)
     if not attraction.negative_stiffness.any() and attraction.roughness is None:

@@ -50,9 +50,9 @@ its end. Energy and loss per area over eps_0 are
 .. math:: \tfrac12\sum_j d_j\Big(\varepsilon_\infty E^2 + \sum_k p_k^2/\Delta_k\Big)_j, \qquad
           \sum_j d_j\Big(\kappa E^2 + \sum_k \tau_k\dot p_k^2/\Delta_k\Big)_j .
 
-A force law sees the layers with their permittivity at the voltage's frequency (static without one) and
-the voltage that makes the same field in the gap. A dielectric that is no sum of Debye poles is fitted
-by one (`debye_layer`). Lengths in mm, charges and polarisations over eps_0 in V/mm,
+A force law sees the layers with their permittivity at the voltage's frequency (static without one) and the
+voltage of the same field in the gap. Other dielectrics are fitted by Debye poles (`debye_layer`).
+Lengths in mm, charges and polarisations over eps_0 in V/mm,
 rates in 1/s. Arguments broadcast; gaps may have a small imaginary part (for derivatives).
 """
 
@@ -161,11 +161,9 @@ class Relaxing:
 
 @dataclass(frozen=True)
 class Sandwich:
-    """Layers in series as the charges see them: `skin`, `insulator`, the gap's conductivity over eps_0
-    `leak` (1/s), the reduced thickness (mm) of both that force laws see, `reference`, and the gap's
-    permittivity. Numbers, or without poles arrays over nodes.
-
-    The state (M, ...) has the two charges, then the polarisations of skin and insulator.
+    """Layers in series as the charges see them: `skin`, `insulator`, the gap's conductivity over eps_0 `leak`
+    (1/s) and permittivity, the reduced thickness (mm) that laws see, `reference`. The state (M, ...) has the
+    two charges, then the polarisations of skin and insulator.
     """
 
     skin: Relaxing

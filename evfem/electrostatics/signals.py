@@ -180,11 +180,9 @@ class Amplifier:
             above("slew", self.slew, 0.0, "a rate in V/s above zero, or None")
 
     def limit(self, profile: VoltageProfile, speed: float | None = None) -> VoltageProfile:
-        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s).
-
-        Both are exact: rows are added where the profile crosses the limit, and where the
-        amplifier, which moves towards the target as fast as it can, catches up with it. Raises
-        InputError for a slew without a speed.
+        """The profile cut off at +-voltage_max, then followed no faster than `slew` at `speed` (mm/s), both
+        exactly: with rows where it crosses the limit or catches up. Raises InputError for a slew without a
+        speed.
         """
         cut = self._clipped(profile)
         if self.slew is None:

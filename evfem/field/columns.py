@@ -153,11 +153,9 @@ class Columns:
 
 
 class Strips:
-    """Electrodes that end somewhere. A share `THIN` of the lowest layer, of thickness d, is taken to the
-    second order in its thickness: where the potential above it is phi, and w is the share of electrode
-    within d to either side, of voltage V, its energy is eps times the integral of
-    w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2. So plates stay exact, the field at an edge is smoothed
-    over that thickness, and the energy changes smoothly when lines move over an edge.
+    """Electrodes that end somewhere: in a share `THIN` of the lowest layer, of thickness d, the energy is eps
+    times the integral of w (phi - V)^2 / d + (1 - 2 w / 3) d phi'^2, w being the share of electrode within d
+    to either side. Plates stay exact, edges are smoothed over d, and lines may move over them.
     """
 
     def __init__(self, x: Floats, electrodes: Floats, depth: float, eps_r: complex) -> None:

@@ -21,15 +21,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats, Ints
 from evfem.errors import InputError
-from evfem.field.outlines import (
-    Outline,
-    Run,
-    corner_sizes,
-    graded,
-    right_angle,
-    spread,
-    spread_around,
-)
+from evfem.field.outlines import Outline, Run, corner_sizes, graded, right_angle, spread, spread_around
 
 #: how fast cells grow away from a corner, per length
 GROWTH = 0.7

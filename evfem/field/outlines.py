@@ -1,11 +1,9 @@
 """Outlines of grounded bodies above a slab: polylines with vertical walls, their ends and corners.
 
-An outline is what its points say: straight between them, vertical where an x is repeated. One that
-is periodic repeats from its last x on; where its two heights differ there is a wall. One that is
-not ends in the open air: the body is what lies between the outline and the straight line between
-its ends (stretched over what rises above it), so a flat outline is a thin sheet and one with end
-walls a bar. Where both ends rise more steeply than `FLANK`, without being walls, they are flanks of
-a body that is symmetric about that line: the lower half of a cylinder stands for the cylinder.
+An outline is straight between its points, vertical where an x is repeated. A periodic one repeats from its
+last x on, with a wall where its two heights differ. Another one ends in the open air: the body lies between
+it and the straight line between its ends; ends steeper than `FLANK`, but no walls, are flanks of a body
+symmetric about it.
 
 At a corner whose air angle is w the potential grows like r^(pi/w), so the field is singular where
 w > pi; `corner_sizes` says how small cells must be there.

@@ -17,13 +17,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from evfem.common.checks import (
-    check_fields,
-    instance,
-    one_of,
-    set_frozen,
-    yes_or_no,
-)
+from evfem.common.checks import check_fields, instance, one_of, set_frozen, yes_or_no
 from evfem.common.views import short
 from evfem.errors import ABSENT, InputError, Mistakes, quoted
 from evfem.finger.layers import NAIL, thickness_of

@@ -114,9 +114,7 @@ class Fingertip(LayeredFinger):
         "pattern of the fingerprint ridges, or a measured print",
     ] = "along"
     resolution: Annotated[
-        str,
-        one_of(*TIP_RESOLUTIONS),
-        "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more",
+        str, one_of(*TIP_RESOLUTIONS), "smooth about 5k, 12k, 43k nodes; with ridges 22k, 34k, 115k and more"
     ] = "medium"
     length: Annotated[float, between(16.0, 32.0, "mm"), "full length of the ellipsoid"] = 22.5
     bone_length: Annotated[float, between(6.0, 28.0, "mm"), "full length of the bone"] = 17.0

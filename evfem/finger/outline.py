@@ -48,13 +48,12 @@ class Ellipse:
 
 @dataclass(frozen=True)
 class Ridges:
-    """Profile of the ridges over the abscissa x of the ellipse (mm): how deep a point lies below
-    the crest line.
+    """Depth below the crest line over the abscissa x of the ellipse (mm).
 
     t = |x - crest| / (pitch/2) runs from 0 at a crest to 1 in a groove; crests at x = (k + phase) pitch.
-    Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped (`crest` > 0): crest and groove are
-    flat over these fractions of the pitch, and depth = height (1 - cos(pi s)) / 2 on the walls, s from 0 to
-    1. The depth is multiplied by a fade: 1 up to |x| = `full`, a quintic step down to 0 at |x| = `end`.
+    Rounded (`crest` = 0): depth = height * t**exponent. Flat-topped: crest and groove are flat over these
+    fractions of the pitch, depth = height (1 - cos(pi s)) / 2 on the walls. Faded from |x| = `full` to `end`
+    by a quintic step.
     """
 
     height: float

@@ -33,10 +33,9 @@ TRANSITION = 2.4
 class Divisions:
     """How finely to divide, in quadratic cells (twice as many linear ones).
 
-    `per_ridge`: columns per ridge in the finest zone (a third of it beyond, a ninth in the depth);
-    `transitions`: the rows in which columns merge, as (name of the layer, row in it), negative
-    from its end; base columns: `side` from the zone's end to the widest point, `upper` from there
-    to the nail's edge, `nail` along the nail. The rows of the layers stand in `LAYERS`.
+    `per_ridge`: columns per ridge in the finest zone; `transitions`: rows in which columns merge, as (layer,
+    row in it); base columns: `side` from the zone's end to the widest point, `upper` to the nail's edge,
+    `nail` along it.
     """
 
     per_ridge: int

@@ -74,9 +74,8 @@ class Relief(Protocol):
 class Grid:
     """How the disc is divided, in quadratic cells (twice as many linear ones).
 
-    `columns` of the rectangle across and along, as they are at the bone; in the rows `merging[0]`
-    three columns across become one, in `merging[1]` along. `sides`: cells from the rectangle to
-    the rim. The rectangle lies between `low` and `high`, each (p, q).
+    `columns` of the rectangle at the bone; rows in which three columns merge across, `merging[0]`, and along,
+    `merging[1]`; `sides`: cells from the rectangle, between `low` and `high`, each (p, q), to the rim.
     """
 
     columns: tuple[int, int]

@@ -317,7 +317,4 @@ def _solver(scene: Scene, mesh: Mesh, terms: tuple[Term, ...]) -> tuple[str, ...
     steps = said(scene)
     if steps:
         lines.append(steps)
-    return (
-        *lines,
-        f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction",
-    )
+    return (*lines, f"every accepted step: residual below {scene.solver.tolerance:g} of the largest reaction")

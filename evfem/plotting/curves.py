@@ -76,11 +76,8 @@ TWO = 2.0  # standard deviations: the band that residuals of the given sd rarely
 
 
 def abscissa(result: Result) -> str:
-    """The column that a picture is drawn over: what all motions change, the time if the finger
-    waits, else the step.
-
-    Presses are drawn over the indentation, slides over the position (along the finger over
-    `position_z`), voltage ramps over the voltage.
+    """The column that a picture is drawn over: of presses the indentation, of slides the position (or
+    `position_z`), of voltage ramps the voltage, of waits the time, else the step.
     """
     kinds = set(result.motion)
     wished = {"press": "indentation", "voltage": "voltage"}

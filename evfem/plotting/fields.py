@@ -114,10 +114,8 @@ def areas(outlines: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Triangles (T, 3) between V vertices: every region has vertices of its own.
-
-    `nodes` (V,) are the mesh nodes of the vertices, `cells` (E, n) the vertices of each cell in the
-    order of the mesh.
+    """Triangles (T, 3) between V vertices, own ones in each region; mesh `nodes` (V,) of the vertices,
+    vertices of the `cells` (E, n).
     """
 
     nodes: Ints

@@ -153,9 +153,4 @@ def _around(place: Floats, margin: float) -> Window:
     """A window around points (n, 2), with so much of their width beyond them."""
     low, high = place.min(axis=0), place.max(axis=0)
     wide = margin * max(float(np.max(high - low)), 1e-3)
-    return (
-        float(low[0] - wide),
-        float(high[0] + wide),
-        float(low[1] - wide),
-        float(high[1] + wide),
-    )
+    return (float(low[0] - wide), float(high[0] + wide), float(low[1] - wide), float(high[1] + wide))

@@ -13,15 +13,7 @@ from functools import cached_property
 from itertools import accumulate
 from typing import Annotated, Any, Protocol, runtime_checkable
 
-from evfem.common.checks import (
-    Within,
-    check_fields,
-    number,
-    one_of,
-    real,
-    set_frozen,
-    yes_or_no,
-)
+from evfem.common.checks import Within, check_fields, number, one_of, real, set_frozen, yes_or_no
 from evfem.common.digest import digest
 from evfem.common.views import called, changed, short, table
 from evfem.electrostatics.drive import Drive

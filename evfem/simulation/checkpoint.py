@@ -26,7 +26,7 @@ from evfem.simulation.ledger import Ledger
 from evfem.simulation.model import Model
 from evfem.simulation.result import Row, Saved
 from evfem.simulation.works import Books
-from evfem.solver.state import NO_PRESSURE, Reusable, State, TangentPoint
+from evfem.solver.state import Reusable, State, TangentPoint
 
 CHECKPOINT_FORMAT = "evfem-checkpoint-5"
 ANOTHER = "a run of another scene"
@@ -43,36 +43,22 @@ def state_arrays(state: State) -> dict[str, Any]:
 
 def reusable_arrays(state: State, carried: Reusable) -> dict[str, Any]:
     """What a solver takes with it to the next step; of the same shapes with and without a factorisation."""
-    at, nowhere = carried.tangent_point, np.zeros_like(state.u)
-    return {
-        "candidates": carried.candidates,
-        "factorised": np.array(at is not None),
-        "factor_u": nowhere if at is None else at.u,
-        "factor_begin": nowhere if at is None else at.begin,
-        "factor_voltage": np.array(0.0 if at is None else at.voltage),
-        "factor_duration": np.array(0.0 if at is None else at.duration),
-        "factor_frozen": np.array(False if at is None else at.frozen),
-        "factor_touching": np.zeros(state.status.size, dtype=bool) if at is None else at.touching,
-        "factor_status": np.zeros_like(state.status) if at is None else at.status,
-        "factor_pressure": NO_PRESSURE if at is None else at.pressure,
-        "duration": np.array(carried.duration),
+    at, status = carried.tangent_point, state.status
+    begun = np.zeros_like(state.u)
+    nowhere = TangentPoint(begun, 0.0, status != status, False, begun, 0.0, np.zeros_like(status))
+    made_at = {
+        f"factor_{spec.name}": np.asarray(getattr(at or nowhere, spec.name)) for spec in fields(nowhere)
     }
+    own = {"candidates": carried.candidates, "duration": np.array(carried.duration)}
+    return {**own, "factorised": np.array(at is not None), **made_at}
 
 
 def reusable_of(arrays: Mapping[str, np.ndarray]) -> Reusable:
     """What the solver had taken with it, from the arrays of a checkpoint."""
     at = None
     if arrays["factorised"]:
-        at = TangentPoint(
-            u=arrays["factor_u"],
-            voltage=float(arrays["factor_voltage"]),
-            touching=arrays["factor_touching"],
-            frozen=bool(arrays["factor_frozen"]),
-            begin=arrays["factor_begin"],
-            duration=float(arrays["factor_duration"]),
-            status=arrays["factor_status"].astype(np.int64),
-            pressure=arrays["factor_pressure"],
-        )
+        parts: dict[str, Any] = {spec.name: arrays[f"factor_{spec.name}"] for spec in fields(TangentPoint)}
+        at = TangentPoint(**{name: plain(part) for name, part in parts.items()})
     return Reusable(arrays["candidates"].astype(np.int64), at, float(arrays["duration"]))
 
 

@@ -23,16 +23,14 @@ The history has
   :math:`\lambda_n` growing evenly: never negative, and as exact where a node begins to slip as elsewhere;
 - ``viscous_dissipation`` :math:`D_v = \int S_v : \Delta E`, never negative.
 
-What separates them is found term by term, without the work of the bone, and so closes the books
-only where the forces of the accepted states balance:
+What separates them is found term by term, without the work of the bone:
 
 .. math:: L = (\bar f\cdot\Delta u - \Delta\psi - \Delta T - D_v) + (-\bar\lambda\cdot\Delta u - D_f)
           + (W_e - \bar f_e\cdot\Delta u) .
 
-First what tissue and backward Euler lose on the way, of the mass :math:`|\Delta v|_M^2/2` and a
-share that telescopes; then the work of nodes that land, leave or begin to slip; then what the way
-adds to the attraction's work. Over a motion the sum falls with the square of the step, in time
-with the step, and is ``integrator_dissipation``.
+What tissue and backward Euler lose on the way, the work of nodes that land, leave or begin to slip, and what
+the way adds to the attraction's work. Over a motion the sum falls with the square of the step, in time with
+the step, and is ``integrator_dissipation``.
 
 A quasi-static part may contain a **snap**: stability is lost on the way (or speeds and viscous stresses are,
 where time stops), and the end is far away however small the part. Then L does not fall with the step. It is
@@ -62,13 +60,9 @@ the tributary lengths A, :math:`\int w\,dA` with its energy w per area, which a 
 leaves out. This holds for Strong and Troxel's law, which is the pressure of that field, and lacks the
 work on a roughness gap that changes with the load.
 
-Under another law these four columns are 0, for there is no balance to tell. A pressure
-:math:`p = \varepsilon_0 V^2 f(g)/2` is the work of a source whose charge per area is
-:math:`-\partial\Pi/\partial V = \varepsilon_0 V L(g)`, L' = -f. Kaczmarek's law has
-:math:`L = \ln[(g + D)/(g + s)]/(D - s)` instead of 1/(g + s), with which the balance closes as long as
-no charge crosses a layer. But then skin and insulator hold the voltage s L V, and a closed gap keeps
-the rest, (1 - s L) V, across no thickness: the field there, and with it the current of a leak, is
-infinite. So no displacement is both that of the law and that of layers that conduct.
+Under another law these columns are 0. Kaczmarek's is the work of a source with the charge per area
+eps_0 V ln[(g + D)/(g + s)]/(D - s), but leaves a closed gap a voltage across no thickness: with a leak no
+displacement is both that of the law and that of layers that conduct.
 
 The first part begins without any load: voltage and user's forms count as raised within it.
 """

@@ -31,13 +31,7 @@ import numpy as np
 
 from evfem.common.arrays import Floats
 from evfem.common.constants import KILOVOLT
-from evfem.contact.condensed import (
-    CondensedTangent,
-    Condition,
-    ExtraUnknown,
-    LinearContactStep,
-    StepSolution,
-)
+from evfem.contact.condensed import CondensedTangent, Condition, ExtraUnknown, LinearContactStep, StepSolution
 from evfem.contact.signorini import STICK
 from evfem.electrostatics.signals import Reading, Seen, electrode_charge, smallest_gap
 from evfem.solver.hand import Grip

@@ -33,16 +33,7 @@ from evfem.electrostatics.signals import Seen
 from evfem.solver.control import Force, GivenVoltage, Indentation, Loose, Target, sticks
 from evfem.solver.factorised import FactorisedBody
 from evfem.solver.interface import Interface
-from evfem.solver.state import (
-    NO_AGE,
-    NO_CHARGES,
-    Balance,
-    Folded,
-    Limits,
-    Reusable,
-    State,
-    StepFailed,
-)
+from evfem.solver.state import NO_AGE, NO_CHARGES, Balance, Folded, Limits, Reusable, State, StepFailed
 from evfem.solver.strategy import stuck
 
 #: why an equilibrium is refused that the body leaves
@@ -55,11 +46,7 @@ class Equilibrium:
     """Finds equilibria of a body on a surface, with or without attraction, one step after the other."""
 
     def __init__(
-        self,
-        body: FactorisedBody,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: FactorisedBody, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.interface, self.attraction, self._size = interface, attraction, body.size
         self.body, self.record = body, body.record

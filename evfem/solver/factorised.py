@@ -66,11 +66,7 @@ class FactorisedBody:
     """The finger's finite elements: contact is solved on their condensed tangent."""
 
     def __init__(
-        self,
-        body: Body,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.size, self.pad = body.space.size, interface.pad

@@ -17,14 +17,7 @@ from typing import Any
 import numpy as np
 
 from evfem.common.arrays import Floats, Ints
-from evfem.common.constants import (
-    CHANGES,
-    HAIR,
-    NEIGHBOURS,
-    SHORT_RAMP,
-    SHORTEST_LENGTH,
-    SMALLEST_FORCE,
-)
+from evfem.common.constants import CHANGES, HAIR, NEIGHBOURS, SHORT_RAMP, SHORTEST_LENGTH, SMALLEST_FORCE
 from evfem.contact.condensed import Candidates
 from evfem.contact.signorini import FORWARD, OPEN, STICK, sizes
 from evfem.protocols import FrictionLaw

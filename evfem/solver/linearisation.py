@@ -76,11 +76,7 @@ class Linearisation:
     """Candidates, factorisation and condensed tangent of a body, and the attraction's part in them."""
 
     def __init__(
-        self,
-        body: Body,
-        interface: Interface,
-        attraction: Attraction | None,
-        limits: Limits,
+        self, body: Body, interface: Interface, attraction: Attraction | None, limits: Limits
     ) -> None:
         self.body, self.interface, self.attraction, self.limits = body, interface, attraction, limits
         self.pad = interface.pad

@@ -106,9 +106,7 @@ class AdhesiveFriction(NamedFriction, kind="adhesive"):
         float, _PRESSURE, "shear traction that every place in real contact carries beside mu p"
     ]
     full: Annotated[
-        float | None,
-        _PRESSURE,
-        "contact pressure at which real contact is complete; without it the strength",
+        float | None, _PRESSURE, "contact pressure at which real contact is complete; without it the strength"
     ] = None
     timed = False
 
