@@ -177,9 +177,7 @@ class Stepping(Protocol):
     """An observer that is told of every converged step, and may end the run by raising `evfem.StopRun`."""
 
     def step(self, row: Mapping[str, Any], frame: Any, checkpoint: Callable[[], dict[str, Any]], /) -> None:
-        """`row` is the step's row of the history, `frame` its fields (None on steps without),
-        `checkpoint()` gives the arrays to resume from.
-        """
+        """`row` of the history, `frame` its fields or None, `checkpoint()` gives arrays to resume from."""
 
 
 class Finishing(Protocol):

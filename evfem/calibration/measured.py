@@ -201,9 +201,7 @@ class MeasuredValues:
 
     @classmethod
     def from_csv(cls, path: str | Path, sd: float | None = None) -> MeasuredValues:
-        """The values in a file with the header `KEY,...,OUTPUT` or `KEY,...,OUTPUT,sd`:
-        `electrostatics.voltage,motion.0.gap,electrostatic_force.last`.
-        """
+        """The values in a file with the header `KEY,...,OUTPUT[,sd]`, keys as `motion.0.gap`."""
         table = read_table(Path(path), "data")
         spread = sd if "sd" not in table else table.pop("sd")
         *keys, last = table

@@ -73,9 +73,7 @@ class FitResult:
         return loads(tomli_w.dumps(self.tables), self.paths, str(self.provenance.get("fit", "fit")))
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
-        """Ends of each parameter's interval with that confidence (0 to 1) by Student's distribution
-        (`confidence`).
-        """
+        """Ends of each parameter's interval with that confidence (0 to 1) by Student's distribution."""
         from scipy.stats import t
 
         confidence = real("confidence", confidence, "a number between 0 and 1", lambda c: 0.0 < c < 1.0)

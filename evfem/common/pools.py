@@ -70,9 +70,7 @@ def _here(function: Callable[[Any], Any], tasks: Mapping[Any, Any]) -> Iterator[
 
 
 class Worker:
-    """A process that calls `function(line, *arguments)`, `line` being the other end of `self.line`: a fresh
-    interpreter with the BLAS on one thread, without Ctrl-C, that ends with the process that made it.
-    """
+    """A fresh interpreter, BLAS on one thread, without Ctrl-C, that calls `function(line, *arguments)`."""
 
     def __init__(self, function: Callable[..., None], *arguments: Any) -> None:
         self.line, theirs = Pipe()
@@ -90,9 +88,7 @@ class Worker:
 
 
 def blas_limits(threads: int | None = 1) -> threadpool_limits:
-    """The limit of every BLAS loaded by now, scipy's too, to so many threads, from now on or of a block; MKL
-    has its own limit, `Pardiso` sets it.
-    """
+    """Limits every BLAS loaded by now, scipy's too, to so many threads; MKL has its own limit."""
     import scipy.linalg  # noqa: F401
 
     return threadpool_limits(limits=threads)

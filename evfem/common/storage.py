@@ -105,9 +105,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def _lock(folder: Path) -> int | None:
-    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no
-    locks. Own: filelock would be one more package, and a file in the folder.
-    """
+    """Descriptor of the folder, locked until it is closed; None, and a notice, where there are no locks."""
     try:
         from fcntl import LOCK_EX, LOCK_NB, flock
     except ModuleNotFoundError:  # Windows

@@ -120,9 +120,7 @@ class Charging:
         return np.asarray(at.length * by_gap), np.broadcast_to(by_length, at.gap.shape)
 
     def energy_density(self, at: Charged) -> Floats:
-        """Energy of the field at every node (P,), N mm per mm^2: also the field's work per mm of tributary
-        length.
-        """
+        """Energy of the field at every node (P,), N mm per mm^2; its work per mm of tributary length."""
         return np.asarray(eps_0 * self.stack.energy(at.gap, at.voltage, at.charges))
 
     def field_energy(self, at: Charged) -> float:

@@ -86,9 +86,7 @@ class Candidates:
         return axes
 
     def follower_rate(self, own: Floats) -> Floats:
-        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d): it turns with
-        the profile, and friction grows where its coefficient does; `own` (c,) as for `friction_growth`.
-        """
+        """Change of the contact force (y, x[, z]) per x displacement of its node, (c, 1 + d); `own` (c,)."""
         axes = self.axes
         rate = self.surface.curvature / self.surface.stretch**2
         turned = rate[:, None] * (self.force[:, 1:2] * axes[:, 0] - self.force[:, :1] * axes[:, 1])
@@ -104,9 +102,7 @@ class Candidates:
         return np.where(slips[:, None], self.force[:, 1:], 0.0) / np.where(slips, shear, 1.0)[:, None]
 
     def by_chords(self, near: Ints, compliance: Floats) -> Floats | None:
-        """Coefficients (k,) of the `near` nodes by the chords of their friction law from no force to the
-        present one, none so steep that friction presses a slipping node on without end; None for Coulomb's.
-        """
+        """Coefficients (k,) of `near` nodes by the chords of their friction law, not too steep, or None."""
         if self.cohesion is None:
             return None
         normal, along, n = (
@@ -182,9 +178,7 @@ class CondensedTangent:
 
 @dataclass(frozen=True, eq=False)
 class Condition:
-    """A linear equation for an extra unknown: `row` (m,) times the displacements of candidates and bone, and
-    `share` (p,) times the unknowns of the step, this one last, shall be `wanted`.
-    """
+    """`row` (m,) times displacements of candidates and bone plus `share` (p,) times unknowns is `wanted`."""
 
     row: Floats
     share: Floats
@@ -345,9 +339,7 @@ class LinearContactStep:
     def _bone_balance(
         self, rows: Ints, free: Floats, near: tuple[Floats, Floats], follower: FollowerStiffness
     ) -> tuple[Floats, Floats, Floats] | None:
-        """Balance of the bone along the unknowns' axes, as the equations that settle them: what forces on
-        these rows of the candidates and what the unknowns add, and what is missing without both.
-        """
+        """The bone's balance along the unknowns' axes: by forces on candidates, unknowns, and what lacks."""
         if not self.unknowns:
             return None
         C, W = near

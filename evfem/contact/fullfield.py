@@ -81,9 +81,7 @@ def in_sight(places: Floats) -> Ints:
 
 
 def facing(pad: Pad, points: Floats) -> Ints:
-    """Pad edges (K,), from left to right, of the chain that faces the display below the lowest node;
-    `points` (P, 2) of the pad undeformed. Its ends are where the flanks begin.
-    """
+    """Edges (K,), left to right, of the chain below the lowest node's flanks; `points` (P, 2) undeformed."""
     way = points[pad.edges[:, 1]] - points[pad.edges[:, 0]]
     after = {int(edge[0]): k for k, edge in enumerate(pad.edges)}
     before = {int(edge[1]): k for k, edge in enumerate(pad.edges)}
@@ -108,9 +106,7 @@ def in_line(pad: Pad, edges: Ints) -> Ints:
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """Lower and upper bound of a capacitance in F per m of depth (N/V^2); the lower one is the
-    column law's.
-    """
+    """Bounds of a capacitance in F per m of depth (N/V^2), the lower by the column law."""
 
     lower: float
     upper: float
@@ -377,9 +373,7 @@ class FieldAttraction(Attraction):
         return certificate(x, levels[1:3], self.surface.insulator, skin, self._columns.eps_r[1].real)
 
     def check(self, position: Floats) -> None:
-        """Raise Unresolved if the capacitance under the pad at `position` (P, 2) is not between its
-        bounds.
-        """
+        """Raise Unresolved if the capacitance at `position` (P, 2) is not between its bounds."""
         if self._electrodes is not None or self.floating:
             return  # the bounds are those of a grounded pad over one electrode
         bounds = self.bounds(*self.outline(position, self.seen(position)))

@@ -84,9 +84,7 @@ def _starts(problem: ContactProblem, status: Ints, force: Floats) -> Iterator[Pr
 
 
 def _newton(problem: ContactProblem, found: Projected) -> tuple[Forces | None, Projected, int, Ints]:
-    """The forces, or None where it does not end within `ACTIVE_SET_LIMIT` solves, what the laws make of
-    them, the number of solves, and the last statuses (k,) where those that keep changing are open.
-    """
+    """Forces or None, what the laws make of them, the number of solves, last statuses (k,), cycling open."""
     met, alone, late, softest = set[bytes](), set[bytes](), False, found.status
     for solves in range(1, ACTIVE_SET_LIMIT + 1):
         try:
@@ -169,9 +167,7 @@ def _feedback(problem: ContactProblem, attraction: AttractionStiffness, status: 
 
 
 def _passing(before: Projected, after: Projected) -> Projected:
-    """The same, in the plane with nodes that pass through slip as they close, one that sticks beside a
-    pulling shear force would seem to open, and through stick from one slip to the other.
-    """
+    """The same; in the plane closing nodes and changes of the slip's side pass through slip, or stick."""
     if after.z.shape[1] == 2:
         return after
     way = after.z[:, 0]

@@ -103,9 +103,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class CycleMean:
-    """A force law over the cycle of a voltage with several harmonics: the sum of its tractions
-    times `weights` (H,), over layers whose first axis is that of the harmonics.
-    """
+    """A force law over a cycle of harmonics: tractions times `weights` (H,), the layers' first axis."""
 
     law: ForceLaw
     weights: Any

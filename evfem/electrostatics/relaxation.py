@@ -177,9 +177,7 @@ class Sandwich:
         cls, skin: Layer, insulator: Layer, *, frequency: Values | None, gap_conductivity: Values,
         gap_eps_r: float = 1.0,
     ) -> Sandwich:  # fmt: skip
-        """Without poles, from two solid layers: dielectrics among them by permittivity and conductivity at
-        `frequency` (Hz), or without one if they depend on it by their conductivity alone.
-        """
+        """Without poles, of two solid layers; dielectrics at `frequency` (Hz), or by conductivity alone."""
         (eps_1, sigma_1), (eps_3, sigma_3) = (constants(layer, frequency) for layer in (skin, insulator))
         # a layer as its displacement sees it: reduced thickness, permittivity 1, relaxation rate
         first = Relaxing(skin.thickness / eps_1, 1.0, sigma_1 / (eps_0 * eps_1))
@@ -237,9 +235,7 @@ class Sandwich:
         return self.skin.loss(E_1, first) + gap * self.leak * E_2**2 + self.insulator.loss(E_3, third)
 
     def after(self, gap: Any, charges: Any, before: Values, after: Values, seconds: Values) -> Any:
-        """State (M, ...) that `charges` become at a fixed `gap` (mm) in so many `seconds`, the
-        voltage going straight from `before` to `after` (V).
-        """
+        """State (M, ...) of `charges` after `seconds` at `gap` (mm), voltage from `before` to `after` (V)."""
         if self.states == 2:
             return self._exactly(gap, charges, before, after, seconds)
         axes = np.broadcast(gap, before, after, seconds, charges[0]).ndim
@@ -317,9 +313,7 @@ class Sandwich:
         return np.stack(np.broadcast_arrays(*result))
 
     def step_response(self, gap: Any, time: Values) -> Any:
-        """Without poles the effective voltage at `time` (s) after a step of 1 V from no charge: straight
-        from its start, its first slope and its end, so that it decays to rounding of itself.
-        """
+        """Without poles effective voltage at `time` (s) after 1 V from no charge, by start, slope, end."""
         k1, k2, k3 = self.rates
         slow, fast = self.eigenvalues(gap)
         skin, air, film = self._reduced(gap)

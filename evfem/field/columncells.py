@@ -67,9 +67,7 @@ class Lowest(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Products of a potential's derivatives at the points of all cells (2, 2, E, R), times weights and
-    the real parts of the permittivities: by xi, twice by xi and eta, by eta.
-    """
+    """A potential's squared derivatives at the points (2, 2, E, R), weighted: by xi, xi and eta, eta."""
 
     along: Floats
     mixed: Floats

@@ -46,9 +46,7 @@ SMALLEST_SHAPE, THICKEST = 0.02, 0.7
 
 @dataclass(frozen=True)
 class TipDivisions:
-    """How finely to divide, in quadratic cells: columns of a smooth pad across and along, cells on
-    each side of the rectangle of `evfem.finger.solid`, columns per parallel and per curved ridge.
-    """
+    """How finely to divide, in quadratic cells: columns, sides of the rectangle, columns per ridge."""
 
     across: int
     along: int

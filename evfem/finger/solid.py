@@ -104,9 +104,7 @@ class Solid:
     posture: float = 0.0
 
     def mesh(self, order: int) -> Mesh:
-        """Hexahedra of `order` 1 or 2, the latter with half the divisions and mid-nodes on the
-        true surfaces.
-        """
+        """Hexahedra of `order` 1, or 2 with half the divisions and mid-nodes on the true surfaces."""
         per_cell = 3 - order
         rows = [n * per_cell for n in self.rows]
         places, cells, row = self._joined(sum(rows), per_cell, order)

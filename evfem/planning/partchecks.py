@@ -36,9 +36,7 @@ STEPS, LEVEL, SLOPE = (1e-4, 1e-2), 1e-4, 0.3
 
 
 def evaluated(key: str, what: str, function: Callable[[Array], Any], at: Array) -> Array:
-    """The values of a user's function; InputError where it raises anything, or they are not finite
-    numbers.
-    """
+    """The values of a user's function; InputError where it raises, or they are not finite."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:

@@ -121,9 +121,7 @@ def _pad_edges(mesh: Mesh) -> Ints:
 
 
 def too_fast(scene: Scene) -> str | None:
-    """A sentence if a motion's steps are too long for a voltage over time, else None: the attraction has up
-    to twice its frequency, and what is above half the rate of the steps appears below it (aliasing).
-    """
+    """A sentence if a motion's steps are too long for twice a voltage's highest frequency, else None."""
     signal = scene.electrics.voltage
     if not isinstance(signal, TimeSignal) or not signal.highest_frequency > 0.0:
         return None
@@ -140,9 +138,7 @@ def too_fast(scene: Scene) -> str | None:
 
 
 def oscillating(scene: Scene, mesh: Mesh) -> Iterator[str]:
-    """A sentence for hand and tissue if a motion's steps are longer than their period: of its mass on its
-    spring; of the softest layer in shear, about 4 h sqrt(rho / G). Overdamped, neither has one.
-    """
+    """A sentence for hand and tissue if steps are longer than their period, 4 h sqrt(rho / G) of tissue."""
     longest, step = _longest(scene)
     for what, period in _periods(scene, mesh):
         if step > period:

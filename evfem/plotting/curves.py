@@ -76,9 +76,7 @@ TWO = 2.0  # standard deviations: the band that residuals of the given sd rarely
 
 
 def abscissa(result: Result) -> str:
-    """The column that a picture is drawn over: of presses the indentation, of slides the position (or
-    `position_z`), of voltage ramps the voltage, of waits the time, else the step.
-    """
+    """What a picture is drawn over: what all motions change, the time if the finger waits, or the step."""
     kinds = set(result.motion)
     wished = {"press": "indentation", "voltage": "voltage"}
     name = wished.get(next(iter(kinds)), "position") if len(kinds) == 1 else "position"

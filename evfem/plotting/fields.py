@@ -114,9 +114,7 @@ def areas(outlines: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Triangles (T, 3) between V vertices, own ones in each region; mesh `nodes` (V,) of the vertices,
-    vertices of the `cells` (E, n).
-    """
+    """Triangles (T, 3) between V vertices, own ones in each region: mesh `nodes` (V,), `cells` (E, n)."""
 
     nodes: Ints
     triangles: Ints

@@ -31,9 +31,7 @@ SKIN = 0.4
 
 @dataclass(frozen=True)
 class Electrics:
-    """Law, drive, the scene's own voltage and that of its ramps (V), and the solid layers: the stratum
-    corneum, with a usual thickness where only the mesh knows it (`above`), and the insulator.
-    """
+    """Law, drive, voltages (V) and solid layers; the skin has a usual thickness until `above` a mesh."""
 
     law: Any
     drive: Drive | None
@@ -142,9 +140,7 @@ class Electrics:
 
     @property
     def permittivities(self) -> list[tuple[float, complex, complex, complex]]:
-        """Of each harmonic of a drive its share of the squared effective voltage, and the complex relative
-        permittivities of insulator, gap and skin at its frequency; for voltages without a direct part.
-        """
+        """Of a drive's harmonics: share of the squared voltage, complex eps_r of insulator, gap, skin."""
         drive, at, found = self.drive, self.frequency, []
         assert drive is not None
         assert at is not None

@@ -98,9 +98,7 @@ def _gauss(points: int) -> tuple[Floats, Floats]:
 
 
 def _along(ends: tuple[float, ...]) -> tuple[Floats, Floats]:
-    """Places and weights on the way, eight between each pair of `ends`, dense at its begin and end,
-    where the attraction changes fastest; the weights contain the derivative of the places.
-    """
+    """Places and weights (with their derivative), eight between `ends`, dense where attraction changes."""
     at, weight = _gauss(8)
     begin, length = np.array(ends[:-1])[:, None], np.diff(ends)[:, None]
     at, weight = (begin + length * at).ravel(), (length * weight).ravel()
@@ -123,9 +121,7 @@ SLIDE, PART = _gauss(4)
 
 @dataclass(frozen=True, eq=False)
 class Books:
-    """What the books know of an accepted state: internal forces (N, dim) of tissue and time, those of the
-    user's forms, stored energy of the tissue, that of the interface's springs, kinetic energy.
-    """
+    """Of an accepted state: internal and users' forces (N, dim), energies of tissue, springs, motion."""
 
     forces: Floats
     given: Floats
@@ -231,9 +227,7 @@ class Part:
         return float(SHARE @ values)
 
     def _work_of_charged(self, charging: Charging, moved: Floats) -> float:
-        """Work of the attraction while the pad moves (P, dim) with the charges and the voltage
-        that it had.
-        """
+        """Work of the attraction while the pad moves (P, dim) with its old charges and voltage."""
         begin, seconds = charging.old, charging.seconds
         charging.begin(begin, 0.0)
         work = self._on_the_way(moved, (begin.voltage, begin.voltage))

@@ -133,9 +133,7 @@ class Pardiso:
         return handle, kind, (*matrix, *control)
 
     def factorise(self, upper: Floats) -> None:
-        """Factorise new values of the pattern; raises `Singular` if even the indefinite
-        factorisation fails.
-        """
+        """Factorise new values; raises `Singular` if even the indefinite factorisation fails."""
         shift = shift_of_kept(self.pattern, self.kept, upper)
         self._values = upper.copy()
         self._values[self.pattern.diagonal[self.kept]] += shift

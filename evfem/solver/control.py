@@ -140,9 +140,7 @@ class DrivenStep:
 
 
 class VoltageControl:
-    """What the voltage is: prescribed, or settled by an equation between bounds; here `voltage` (V), else the
-    largest allowed one. Whether friction `follows` from it, and whether it is an unknown now, `free`.
-    """
+    """How the voltage is settled: here `voltage` (V), prescribed or the largest; `free` if unknown."""
 
     follows: Any = False
     free: Any = False

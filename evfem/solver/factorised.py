@@ -51,9 +51,7 @@ from evfem.tissue.body import Body
 
 @dataclass(frozen=True, eq=False)
 class Update:
-    """What a linear step changes: the solved contact, the bone (2,) and the displacements (N, 2)
-    in mm, the unknown of the voltage; and the fraction of it that may be taken.
-    """
+    """A linear step's changes: contact, bone (2,), displacements (N, 2) in mm, voltage; the usable part."""
 
     contact: StepSolution
     bone: Floats

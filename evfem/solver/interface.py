@@ -177,9 +177,7 @@ class Interface:
     def candidates(
         self, old: State, state: State, c: Ints, negative_stiffness: Floats, gain_on_closing: Floats
     ) -> Candidates:
-        """What the contact problem has to know of the candidates c (numbers of pad nodes); of
-        every pad node the attraction's `negative_stiffness` (P,) and `gain_on_closing` (P,).
-        """
+        """What the contact problem has to know of candidates c; of all nodes their attraction's change."""
         position, surface = self.positions(state.u)[c], self.surface_at(state).of(c)
         compliance = self.compliance(old)[c]
         slip = self.slip(old, state)[c] - compliance[:, 1:] * old.contact_force[c, 1:]
@@ -287,9 +285,7 @@ class Interface:
         return np.where(self.pins.held, self.pins.x, self.positions(old.u)[:, 0])
 
     def compliance(self, old: State) -> Floats:
-        """Compliance of the interface (P, dim) along normal and tangent in mm per N/mm: 0, contact
-        is exact.
-        """
+        """Compliance of the interface (P, dim), normal and tangent, in mm per N/mm: 0, contact is exact."""
         return np.zeros_like(old.contact_force)
 
     def friction(self, old: State, nodes: Ints, x: Floats) -> Floats:

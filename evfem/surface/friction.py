@@ -167,9 +167,7 @@ KINDS = NamedFriction.kinds
 
 
 def with_core(pressure: Floats, withheld: Values, left: Values) -> Floats:
-    """What a core withholds of the pressure (MPa) of nodes under so much: all of it from the share `FULL` of
-    what it leaves on, so that a node that opens loses it continuously.
-    """
+    """What a core withholds of the pressure (MPa) of nodes under so much, all from the share `FULL` on."""
     return np.asarray(withheld * np.clip(pressure / (FULL * np.asarray(left)), 0.0, 1.0))
 
 

@@ -249,9 +249,7 @@ def put_in(tables: dict[str, Any], key: str, value: Any) -> None:
 
 
 def check_output(output: Any, motions: int) -> None:
-    """InputError unless `output` is COLUMN.STATISTIC or COLUMN.STATISTIC.N of a scene with so many
-    motions.
-    """
+    """InputError unless `output` is COLUMN.STATISTIC[.N] of a scene with so many motions."""
     words = output.split(".") if isinstance(output, str) else []
     columns = [name for name in (*COLUMNS, *SPATIAL) if name != "motion"]
     allowed = f"COLUMN.STATISTIC, STATISTIC one of {', '.join(STATISTICS)}, and .N for motion N alone"

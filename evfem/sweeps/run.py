@@ -105,9 +105,7 @@ class SweepResult:
         return values
 
     def table(self) -> Any:
-        """A row for each point: a `pandas.DataFrame`, or where pandas is not installed a numpy
-        record array.
-        """
+        """A row for each point: a `pandas.DataFrame`, without pandas a numpy record array."""
         return frame({name: self[name] for name in self.columns})
 
     def to_csv(self, path: str | Path) -> None:
